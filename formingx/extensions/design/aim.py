@@ -1,4 +1,4 @@
-"""Target of a search for a wall, and the distance of its answer from the target."""
+"""Target of a search for a wall thickness, and the deviation of its result from the target."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ class Search:
     """Weights of searches and their stopping criteria.
 
     Attributes:
-        held: weight of the volume that is held, relative, beside relative walls.
-        spare: part by which a volume that is to be kept is aimed lower, so that round-off does not exceed it.
-        kept: a volume or a minimum wall that is missed by more than this part is said.
-        reached: a wanted wall is reached where it deviates by less than this part of it.
-        less: the reason for the end of a search is told if the deviation without it would be less than this part of
-            what it is.
-        damped: Levenberg's damping over the largest singular value of the sensitivities: less effect counts as none.
-        damped_measured: likewise, where a measured wall, which scatters, is fitted.
-        worth: the search ends after two runs that lower the sum of squares by less than this part of it.
-        shortest: a step is halved, where it is no better, down to this part of it.
+        held: weight of a prescribed volume, relative to relative wall thicknesses.
+        spare: relative reduction of the target of a prescribed volume, so that round-off does not exceed it.
+        kept: relative deviation of the volume or the minimum wall above which it is reported.
+        reached: relative deviation of the wall below which the wanted wall is reached.
+        less: a bound or the volume is reported as the reason for the end of a search if removing it would reduce the
+            deviation below this part.
+        damped: Levenberg damping over the largest singular value of the sensitivities. Smaller effects are ignored.
+        damped_measured: Levenberg damping for the fit to a measured wall, which contains scatter.
+        worth: the search ends after two runs that each lower the sum of squares by less than this part.
+        shortest: smallest part of a step to which it is halved if the result is no better.
     """
 
     held: float = 1e2
@@ -43,21 +43,30 @@ SEARCH = Search()
 
 
 def lack(what: str, wanted: float | None, found: float) -> str:
-    """Return the part of the target that was not reached, as text, or ""."""
+    """Return the target and the value found, as text, if the target was missed; else ""."""
     if wanted is None or abs(found / wanted - 1) < SEARCH.kept:
         return ""
     return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
 
 
 class Aim:
-    """A wanted wall as least squares: relative deviations, and that of the volume where it is held.
+    """Least-squares target of a wall: relative deviations of the wall, and of a prescribed volume.
+
+    Args:
+        run: the first run.
+        wall: wanted thickness, length: a number, a function of the reference length, or None for an even wall.
+        within: reference lengths that count, (low, high); None for all.
+        held: prescribed volume, length^3, or None.
 
     Attributes:
-        inside: the places of the wall that count, shape (k,).
-        held: the volume that is held, length^3, or None.
-        wanted: the wanted wall at the m places that count, shape (m,), length; None: an even or a measured one.
+        inside: mask of the nodes of the wall that count, shape (k,).
+        held: prescribed volume, length^3, or None.
+        wanted: wanted wall at the m nodes that count, shape (m,), length; None for an even or a measured wall.
         measured: the `MeasuredWall`, or None.
-        damped: see `Search`.
+        damped: Levenberg damping, see `Search`.
+
+    Raises:
+        InputError: a wanted wall that is not positive at all reference lengths.
     """
 
     measured: Any = None
@@ -74,7 +83,7 @@ class Aim:
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Shape (m,), and its derivatives, (m, n)."""
+        """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
         by = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
         wanted = wall.mean() if self.wanted is None else self.wanted
@@ -85,7 +94,7 @@ class Aim:
         return self._with_volume(run, left, slopes)
 
     def _with_volume(self, run: DesignRun, left: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals and their derivatives, with those of the volume where it is held."""
+        """Append the weighted residual of a prescribed volume and its derivatives."""
         if self.held is not None:
             grows = run.derivative("volume")[1][0] / self.held
             weight = SEARCH.held * np.sqrt(len(left))
@@ -94,13 +103,13 @@ class Aim:
         return left, slopes
 
     def cost(self, run: DesignRun) -> float:
-        """Mean square of the relative deviations, and of the volume's."""
+        """Return the mean square of the relative deviations plus the square of the volume's relative deviation."""
         wall = run.wall[self.inside]
         left = np.mean((wall / (wall.mean() if self.wanted is None else self.wanted) - 1) ** 2)
         return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return how far the best run is from the wanted wall, and the reason for the end of the search, or ""."""
+        """Return the deviation of the best run from the wanted wall and the reason for the end of the search, or ""."""
         if self.wanted is None:
             return ""
         wall = run.wall[self.inside]
@@ -113,7 +122,7 @@ class Aim:
                 f" deviation is {100 * off[worst]:+.3g} %, at reference length {s[worst]:.4g}. {self._stop(run)}.")
 
     def _stop(self, run: DesignRun) -> str:
-        """Return the bounds, or the kept volume, that prevent the wanted wall, by the derivatives of a run."""
+        """Return the bounds or the prescribed volume that prevent the wanted wall, predicted by the derivatives."""
         try:
             left, by = self.residual(run)
         except InputError as error:
@@ -139,12 +148,12 @@ class Aim:
 
 
 class MeasuredAim(Aim):
-    """A measured wall as least squares: relative deviations at its points, wherever they are on the part.
+    """Least-squares target of a measured wall: relative deviations at the measured points of the part.
 
     Args:
-        run: the first.
+        run: the first run.
         measured: a `MeasuredWall`.
-        held: see `Aim`.
+        held: prescribed volume, length^3, or None.
     """
 
     damped = SEARCH.damped_measured
@@ -154,12 +163,12 @@ class MeasuredAim(Aim):
         self.measured = measured
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Shape (m,), and its derivatives, (m, n)."""
+        """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
         wall, by = run.derivative(self.measured.of_path)
         return self._with_volume(run, wall / self.measured.wall - 1, by / self.measured.wall[:, None])
 
     def cost(self, run: DesignRun) -> float:
-        """Mean square of the relative deviations, and of the volume's."""
+        """Return the mean square of the relative deviations plus the square of the volume's relative deviation."""
         left = self.measured.of_path(run.path) / self.measured.wall - 1
         return float(np.mean(left**2) + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
@@ -172,16 +181,16 @@ def _deviation(left: np.ndarray, by: np.ndarray, m: int, low: np.ndarray, high: 
 
 
 def _range(values: np.ndarray) -> str:
-    """Return the mean of values in words, and their range where they differ."""
+    """Return the mean of values as text, with their range if they differ."""
     low, high = values.min(), values.max()
     return f"{values.mean():.4g}" + (f" on the mean ({low:.4g} to {high:.4g})" if high - low > 1e-9 * high else "")
 
 
 def inside_of(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    """Return which places of the wall count, shape (k,).
+    """Return the mask of the nodes of the wall that count, shape (k,).
 
     Raises:
-        InputError: fewer than two do.
+        InputError: fewer than two nodes count.
     """
     s = run.profile.reference_length
     if within is None:

@@ -1,4 +1,4 @@
-"""Result of a search: before and after, and its confidence."""
+"""Result of a design search: the first and the best run, and the confidence of the parameters."""
 
 from __future__ import annotations
 
@@ -16,25 +16,29 @@ from .confidence import Confidence, confidence
 from .run import DesignRun
 
 _SCATTER = 6e-5
-"""Of the wall, relative: by so much it may differ as runs take other steps."""
+"""Relative scatter of the wall between runs that take different steps."""
 
 
 def unevenness(wall: np.ndarray) -> float:
-    """Standard deviation over mean."""
+    """Return the standard deviation of the wall over its mean."""
     return float(wall.std() / wall.mean())
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A design that was searched for; print it.
+    """Result of a design search; print it.
 
     Attributes:
-        before, best: the first and the best `DesignRun`; runs: all that were taken, in order; failed: why others made
-            no path, as text; inside: which places of the wall counted, shape (k,); why: the search ended; predicted:
-            the wall that the run before the best predicted for it, shape (k,), length; lack: a volume, a wall or a
-            least wall that was asked for and not reached, and the reason for the end of it, as text, or ""; wanted:
-            the wall that was asked for at the places that count, shape (m,), length, or None; measured: the
-            `MeasuredWall` that was fitted to, or None.
+        before: the first `DesignRun`.
+        best: the best `DesignRun`.
+        runs: all successful runs, in order.
+        failed: error messages of the other runs.
+        inside: mask of the nodes of the wall that count, shape (k,).
+        why: reason for the end of the search, as text.
+        foretold: wall of the best run as predicted by the run before it, shape (k,), length.
+        lack: targets that were missed (volume, wall or minimum wall) and the reason, as text, or "".
+        wanted: wanted wall at the m nodes that count, shape (m,), length, or None.
+        measured: the `MeasuredWall` of the fit, or None.
     """
 
     before: DesignRun
@@ -50,10 +54,10 @@ class Answer:
 
     @cached_property
     def confidence(self) -> Confidence:
-        """Confidence of the parameters after a fit to a measured wall, and parameters that it leaves undetermined.
+        """Confidence of the parameters after a fit to a measured wall.
 
         Raises:
-            InputError: no measured wall was fitted to, or it has no more points than there are parameters.
+            InputError: the fit used no measured wall, or a wall with no more points than parameters.
         """
         if self.measured is None:
             raise InputError("confidence: needs a fit to a MeasuredWall")
@@ -66,30 +70,35 @@ class Answer:
 
     @property
     def paths(self) -> int:
-        """Runs that were taken, those that failed too."""
+        """Number of runs, including the failed ones."""
         return len(self.runs) + len(self.failed)
 
     @property
     def cv(self) -> tuple[float, float]:
-        """Standard deviation over mean of the wall, before and after."""
+        """Standard deviation over mean of the wall, (before, after)."""
         return unevenness(self.before.wall[self.inside]), unevenness(self.best.wall[self.inside])
 
     def at_bounds(self) -> list[str]:
-        """The parameters that stand at a bound."""
+        """Return the parameters that lie on a bound, as text."""
         p, v = self.best.parameters, self.best.vector
         near = 1e-6 * p.size
         return [f"{name} at its {'lowest' if x <= a + h else 'highest'}, {x:.6g}"
                 for name, x, a, b, h in zip(p.names, v, p.low, p.high, near) if x <= a + h or x >= b - h]
 
     def without_effect(self) -> list[str]:
-        """Parameters whose whole range, predicted by the derivatives, changes the wall by less than its scatter."""
+        """Return the names of the parameters without effect.
+
+        Their whole range changes the wall, as predicted by the derivatives, by less than its scatter.
+        """
         by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
         return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
 
     def attainable(self) -> float:
-        """The unevenness to which these parameters could bring the wall within their bounds, for any volume, as
-        the derivatives of the best run predict."""
+        """Return the lowest unevenness that the parameters can reach within their bounds, for any volume.
+
+        The derivatives of the best run predict it.
+        """
         from scipy.optimize import lsq_linear
         p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
         wall, by, mean = wall[self.inside], by[self.inside] * p.size, wall[self.inside].mean()
@@ -124,7 +133,14 @@ class Answer:
     __repr__ = __str__
 
     def plot_wall(self, axes: Any = None) -> Any:
-        """Draw the wall before, after and as wanted over the reference length; returns the matplotlib axes."""
+        """Draw the first, the best and the wanted wall over the reference length.
+
+        Args:
+            axes: matplotlib axes; default a new figure.
+
+        Returns:
+            The matplotlib axes.
+        """
         if axes is None:
             from ...figures import figure
             axes = figure(width=7)[1]
@@ -143,17 +159,19 @@ class Answer:
 
     def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
                units: Units | None = None) -> FilePath:
-        """Write one HTML file: the result and its confidence, walls, the pattern, and the effects of the parameters.
+        """Write an HTML report of the search (rank 0 writes).
+
+        It shows the walls before and after, the profiles, the confidence, and the effect of each parameter on the wall.
 
         Args:
-            file: its name; rank 0 writes it.
-            title: heading of the file.
-            deviations: as for `DesignRun.spread`: the wall is drawn with its standard deviation; a table has the
-                standard deviations of the wall, the volume, pressures and forces.
+            file: path of the file.
+            title: heading of the page.
+            deviations: as in `DesignRun.spread`. Adds the standard deviation to the wall, and a table with the standard
+                deviations of wall, volume, pressures and forces.
             units: a `formingx.Units`, for the labels.
 
         Returns:
-            The path of the file.
+            Path of the file.
 
         Raises:
             InputError: the best run has no derivative.

@@ -1,11 +1,15 @@
-"""Neighbours carried along a run, state by state, to its last.
+"""Transfer of perturbed runs from state to state along the base run, to its last state.
 
-Without a history the last state depends on its own equations alone (and on where stages before it ended). With one, a
-neighbour remembers its own states. Where a node sticks depends on when it touches, which moves with the parameter: so
-where the run's node arrived, the neighbour's is moved along the run's velocity onto its own tool, independently of
-the step. (With the steps held as they were, derivatives would be wrong by up to a factor of three.) Where a node
-arrives at the end of a step, which turns the path, the neighbour is looked at where its own does; at a target where
-it meets its own; else in the plane normal to the path of the run: it is all one.
+Without history variables the last state depends on its own equations alone, and on the end of earlier stages. With
+history variables a perturbed run stores its own states.
+
+The sticking position of a node depends on the time of its gap closure, which changes with the parameter. So the
+perturbed node is moved along the velocity of the base run onto its own tool, independently of the step. With the steps
+of the base run instead, derivatives were wrong by up to a factor of three.
+
+A perturbed state is compared at the same event as the state of the base run. If a gap closure ends the step and turns
+the path, the perturbed gap is closed too. At a target the perturbed run meets its own target. Elsewhere the perturbed
+state lies in the plane normal to the path of the base run.
 """
 
 from __future__ import annotations
@@ -27,12 +31,15 @@ from .neighbours import Neighbour, settle
 
 
 def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
-    """Solve for all neighbours beside the last state of a run.
+    """Solve for all perturbed runs at the last state of the base run.
 
-    end: the `Target` of a run with one control, or the stages of a process.
+    Args:
+        path: the base run.
+        end: the `Target` of a run with one control, or the stages of a process.
+        neighbours: the perturbed runs; their states are updated in place.
 
     Raises:
-        Failure: the run has no derivative, as text.
+        Failure: the run has no derivative; its text is the reason.
     """
     _Carrier(path, end, neighbours).run()
 
@@ -57,7 +64,7 @@ class _Carrier:
                 raise Failure(f"parameter {one.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
-        """Compute the sensitivities from the first state to the last."""
+        """Carry the perturbed runs from the first state to the last."""
         states = self.path.states
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):
@@ -88,7 +95,7 @@ class _Carrier:
             raise Failure("it did not reach its target", [])
 
     def _begin(self, state: State) -> None:
-        """The first state: the body at rest, or in equilibrium with its loads."""
+        """Set up the first state: the undeformed body, or the body in equilibrium with its loads."""
         for one in self.neighbours:
             one.x, one.control = state.x.copy(), state.control
         self._late: list[np.ndarray] = []
@@ -99,7 +106,7 @@ class _Carrier:
                 settle(self.curve, state, self.neighbours, constraint, [constraint] * len(self.neighbours))
 
     def _enter(self, setting: Setting) -> None:
-        """The setting of a stage, of each neighbour from where it stands."""
+        """Begin a stage in each perturbed run from its current state."""
         for one in self.neighbours:
             problem, p = one.problem, one.plans[setting.stage]
             now = problem.setting
@@ -123,13 +130,13 @@ class _Carrier:
             one.control = control
 
     def _settle(self, state: State, before: State, last: bool) -> None:
-        """The neighbours beside a state that was solved for."""
+        """Solve for the perturbed runs at a converged state of the base run."""
         with self.problem.state_context(replace(state, memory=state.before)):
             self._late = []
             for number, face in enumerate(self.problem.contacts):
                 self._late.append(self._arrivals(number, face, state, before))
             self._leave_out(state)
-            for one in self.neighbours:                      # they go on as the run did
+            for one in self.neighbours:                      # the perturbed runs keep the events of the base run
                 one.x = state.x + (one.x - self._beside.x)
                 one.control = state.control + (one.control - self._beside.control)
             equation, equations = self._equations(state, last)
@@ -152,7 +159,7 @@ class _Carrier:
                     mine.leave_out(free | late)
 
     def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
-        """Put the neighbours' points that arrive in a step where they do; which arrived at its end, shape (n,)."""
+        """Place the perturbed points whose gap closes in a step; return the mask of closures at its end, shape (n,)."""
         touch, law, n = face.touch, face.law, self.problem.n_owned
         none = np.zeros(len(face.points), dtype=bool)
         if touch is None or not law.has_friction or not face.present:
@@ -174,8 +181,10 @@ class _Carrier:
         return late
 
     def _put_on_tools(self, state: State) -> None:
-        """Neighbours' points touch where the run's do; those that arrived at the end of the step are where its velocity
-        brings them to their tools."""
+        """Copy the contact status of the base run to the perturbed runs.
+
+        Points whose gap closed at the end of the step are projected onto the tool along the velocity of the base run.
+        """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
             if not face.law.remembers or not face.present:
@@ -201,13 +210,13 @@ class _Carrier:
         self._late = []
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
-        """The constraint of the run's state, and those of the neighbours; None: the plane normal to the path."""
+        """Return the constraints of the base run and of the perturbed runs; None for the plane normal to the path."""
         setting = self.problem.setting
         if not last:
             timed = setting.rate[-1] and self.problem.relaxes
             hold = fixed(state.control)
             return (hold, [hold] * len(self.neighbours)) if timed else self._gaps()
-        if setting.piece == 0 and not self._single:          # the change has done so
+        if setting.piece == 0 and not self._single:          # the stage change ends at control 1
             return fixed(1.0), [fixed(1.0)] * len(self.neighbours)
         key = (setting.stage, setting.piece)
         p = None if self._single else self._plans[setting.stage]
@@ -228,7 +237,7 @@ class _Carrier:
         return self._until[key]
 
     def _gaps(self) -> tuple[Any, list[Any]]:
-        """The gap of a point that arrives at the end of the step, which turns the path; None: there is none."""
+        """Return the gap of a point that closes at the end of the step and turns the path; None if no point does."""
         for number, late in enumerate(self._late):
             face = self.problem.contacts[number]
             size = np.where(late, abs(face.rule.area), 0.0)
@@ -241,8 +250,10 @@ class _Carrier:
 
 
 def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
-    """The distance of a point of a face from its tool, as a constraint, `sloped`: with its gradient; the point's number
-    on the rank that has it, else None."""
+    """Return a constraint: the gap of a point of a face, with its gradient if `sloped`.
+
+    `point` is the local number of the point on its owner rank, and None on other ranks.
+    """
     mine = np.array([] if point is None else [point], dtype=int)
     law = face.law.part(mine)
 
@@ -265,7 +276,7 @@ def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
 
 
 def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Points x moved along a velocity to where their distance from a tool is `gap`; they are near it. Shape (n, 2)."""
+    """Return points x moved along a velocity until their distance from a tool is `gap`, shape (n, 2)."""
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
     sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)

@@ -1,4 +1,4 @@
-"""Confidence of parameters that were fitted to a measured wall, and parameters that it does not tell."""
+"""Confidence of parameters fitted to a measured wall, and parameters that the wall leaves undetermined."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Confidence:
     """Uncertainty of the best design of a fit to a measured wall, to first order; print it.
 
     Attributes:
-        names: of the numbers of the design.
-        values: of the best design, shape (n,).
-        covariance: of these, shape (n, n).
+        names: names of the n numbers of the design.
+        values: values of the best design, shape (n,).
+        covariance: their covariance, shape (n, n).
         sizes: ranges of the parameters, shape (n,).
-        points: number of measured walls.
+        points: number of measured points.
     """
 
     names: list[str]
@@ -35,7 +35,7 @@ class Confidence:
 
     @property
     def errors(self) -> dict[str, float]:
-        """{parameter: standard error}."""
+        """Standard error of each parameter, by name."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist()))
 
     @property
@@ -45,7 +45,17 @@ class Confidence:
         return self.covariance / np.outer(size, size)
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """{parameter: (lowest, highest)} by Student's t."""
+        """Return the confidence interval of each parameter by Student's t distribution.
+
+        Args:
+            confidence: confidence level, between 0 and 1.
+
+        Returns:
+            {parameter: (lowest, highest)}.
+
+        Raises:
+            InputError: a confidence outside (0, 1).
+        """
         from scipy.stats import t
         if not 0 < (confidence := finite("intervals: confidence", confidence)) < 1:
             raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
@@ -55,12 +65,12 @@ class Confidence:
 
     @property
     def not_told(self) -> list[str]:
-        """Parameters of which the wall says little: a standard error above a quarter of their range."""
+        """Parameters that the wall leaves undetermined: the standard error exceeds a quarter of the range."""
         return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _OPEN * size]
 
     @property
     def not_told_apart(self) -> list[tuple[str, str, float]]:
-        """(parameter, parameter, correlation) of pairs, not told each, whose effects on the wall are alike."""
+        """Pairs of undetermined parameters with like effects on the wall: (parameter, parameter, correlation)."""
         n, C, open_ = len(self.names), self.correlation, self.not_told
         return [(self.names[i], self.names[j], float(C[i, j])) for i in range(n) for j in range(i)
                 if abs(C[i, j]) > _ALIKE and {self.names[i], self.names[j]} <= {*open_}]
@@ -77,10 +87,17 @@ class Confidence:
 
 
 def confidence(run: Any, measured: Any) -> Confidence:
-    """Return the confidence of a run that was fitted to a measured wall, from its derivatives there.
+    r"""Return the confidence of a run fitted to a measured wall, from its derivatives.
 
-    The covariance is s^2 (J^T J)^-1 with J the derivatives of the walls over the measured ones, s^2 the sum of their
-    squared relative deviations over the points in excess of the parameters.
+    With the m measured walls w and the n parameters p:
+
+    .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial w_i}{\partial p_j}, \quad
+        s^2 = \frac{1}{m - n} \sum_i r_i^2
+
+    where r are the relative deviations of the walls.
+
+    Raises:
+        InputError: the wall has no more points than there are parameters.
     """
     wall, by = run.derivative(measured.of_path)
     J, left, size = by / measured.wall[:, None] * run.parameters.size, wall / measured.wall - 1, run.parameters.size

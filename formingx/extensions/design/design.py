@@ -1,4 +1,4 @@
-"""The search for what should be made: an even or a wanted wall, the least weight, by exact derivatives of runs."""
+"""Search for design parameters by exact derivatives of runs: an even or a wanted wall, or the minimum weight."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Design:
     """Parameters of a run, and the search for their best values.
 
     Args:
-        build: a function of the parameters, by name, that returns (scene, target) or (scene, stages), as `trace` or
-            `Process.run` want them. It is called beside a design, too, for derivatives: it must give the same mesh but
-            for the places of its nodes. A contact of it that leaves `nodes_per_step` open takes one a step: so their
-            arrivals have exact derivatives.
-        parameters: {name: (start, low, high), a number to start from, or `along(...)`: a profile, which `build` gets as
-            a function of a length from 0 to 1}.
-        step, tolerances, max_steps: of the runs, see `trace`.
+        build: function of the parameters, by name. It returns (scene, target) or (scene, stages) for `trace` or
+            `Process.run`. It is also called at perturbed parameters, for derivatives. Only the positions of the nodes
+            of its mesh may differ. A contact without `nodes_per_step` takes one node a step, so that the gap closures
+            have exact derivatives.
+        parameters: {name: (start, low, high), a start value, or `spline(...)`}. `build` receives a spline as a function
+            of a length from 0 to 1.
+        step, tolerances, max_steps: settings of the runs, see `trace`.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -61,13 +61,19 @@ class Design:
             raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
                              f" cannot be called with these: {error}") from None
         self._step, self._tolerances, self._most = step, tolerances, max_steps
-        self.paths = 0                                       # taken so far
+        self.paths = 0                                       # runs so far
 
     def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
-        """Run it with some values, the other parameters at their start.
+        """Run the design with some values.
+
+        Args:
+            values: values of parameters, by name; the others keep their start values.
+
+        Returns:
+            The `DesignRun`.
 
         Raises:
-            InputError: the result of `build` is no scene with an end, or the scene is not allowed.
+            InputError: `build` returns no (scene, target) or (scene, stages), or a scene that is not allowed.
             ConvergenceError: see `trace`.
         """
         return self._run(self.parameters.vector(values or {}))
@@ -97,22 +103,25 @@ class Design:
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
             volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
             start: Mapping[str, Any] | DesignRun | None = None) -> Answer:
-        """Search for a wall: Gauss and Newton's method with bounds, each step tried by a run of its own.
+        """Search for a wall by a Gauss-Newton method with bounds; each step is checked by a run.
 
         Args:
-            wall: the wanted thickness, length: a number, or a function of the reference length; or a `MeasuredWall`, to
-                which the parameters are fitted (`Answer.confidence`); or
-            even: True: as even as can be; least standard deviation over mean.
-            within: reference lengths (of the middle line, from the axis) that count; default all.
-            volume: "kept": the body's in the reference configuration stays that of the start (with a measured wall
-                it is free); a number: it is that, length^3; None: free.
-            runs: at most this number of.
-            good: relative change of the wall, in the mean square, that is predicted and not worth another run.
-            start: values to start from, by name, or a run of this design.
+            wall: wanted thickness, length: a number, or a function of the reference length. With a `MeasuredWall` the
+                parameters are fitted to it (see `Answer.confidence`).
+            even: True for the most even wall, with the lowest standard deviation over mean.
+            within: reference lengths that count (of the middle line, from the axis), (low, high); default all.
+            volume: "kept": the reference volume of the first run is prescribed (free with a measured wall).
+                A number prescribes the volume, length^3; None leaves it free.
+            runs: maximum number of runs.
+            good: the search ends if the predicted relative change of the wall (root mean square) is smaller.
+            start: start values by name, or a run of this design.
+
+        Returns:
+            The `Answer`.
 
         Raises:
-            InputError: nothing to fit, or nothing has an effect.
-            ConvergenceError: the first run.
+            InputError: no target, or no parameter has an effect on it.
+            ConvergenceError: the first run fails.
         """
         if (wall is None) == (not instance("fit: even", even, bool, "True or False")):
             raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
@@ -129,7 +138,7 @@ class Design:
         return self._search(first, aim, most, good)
 
     def _search(self, first: DesignRun, aim: Aim, most: int, good: float) -> Answer:
-        """Gauss-Newton steps from the best run so far, halved where a run is worse or fails."""
+        """Take Gauss-Newton steps from the best run, halved if a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, taken, foretold, before = first, [first], first.wall, 1.0
@@ -145,7 +154,7 @@ class Design:
                 break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            held = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # what has no effect stays
+            held = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # keeps those without effect
             step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
@@ -170,7 +179,7 @@ class Design:
             foretold = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
-            if max(gained, before) < SEARCH.worth:     # a first step may lead beyond, to what is hardly better
+            if max(gained, before) < SEARCH.worth:     # a single small improvement may precede a larger one
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained
@@ -180,18 +189,23 @@ class Design:
                       aim.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
-        """Search for the smallest volume of the body with a wall nowhere less than so much (successive linear
-        programs).
+        """Search for the smallest reference volume with a minimum wall thickness, by successive linear programs.
 
-        Each iteration minimises the volume along its derivative with the wall as its derivatives predict it, within a
-        range that shrinks where a run is worse (Palacios-Gomez, Lasdon and Engquist 1982): the wall at every node is a
-        bound, and its smallest value, which has kinks, is not differentiated.
+        Each iteration minimises the linearised volume within a trust region, which shrinks if a run is worse
+        (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a linear constraint. So the minimum wall,
+        which has kinks, needs no derivative.
 
         Args:
-            min_wall: length; within: reference lengths that count; runs: at most this number of.
+            min_wall: minimum wall thickness, length.
+            within: reference lengths that count, (low, high); default all.
+            runs: maximum number of runs.
+
+        Returns:
+            The `Answer`.
 
         Raises:
-            InputError, ConvergenceError: as `fit`.
+            InputError: an argument that is not allowed, or the first run has no derivative.
+            ConvergenceError: the first run fails.
         """
         from scipy.optimize import linprog
         least, most = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: runs", runs)
@@ -214,7 +228,7 @@ class Design:
                 break
             grows = best.derivative("volume")[1][0] / first.volume
             n = len(size)
-            # the wall's lack is one more unknown: there is a solution at any rate
+            # a slack variable for the missing wall makes the program feasible
             rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), unit)])
             room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
                     for a, b, v, s in zip(low, high, best.vector, size)]

@@ -1,12 +1,13 @@
-"""The neighbours of a run: the same with one parameter a little more, or less, carried along with its factors.
+"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
 
-Each neighbour is a problem of its own, made of the scene of the user's function: every change by a parameter (nodes,
-constants, tools, friction, targets, temperatures) is changed in it. At a state of the run with dF/dx = K, a neighbour
-solves its own F = 0 and its own constraint by iterations with the factors of K, which are near its own,
+Each perturbed run has a problem of its own, built from the scene of the user's function. So every effect of a parameter
+is included (nodes, constants, tools, friction, targets, temperatures). At a state of the base run with dF/dx = K, a
+perturbed run solves its own equilibrium F' = 0 and its own constraint c' = 0 by modified Newton iterations,
 
-    K dx + F_c dc = -F',    c_x dx + c_c dc = -c',
+    K dx + F_c dc = -F',    c_x dx + c_c dc = -c'.
 
-and every output quantity at two neighbours has their difference over 2 dp for its derivative: of second order in dp.
+The derivative of an output quantity is its central difference between two perturbed runs, over 2 dp, with an error of
+second order in dp.
 """
 
 from __future__ import annotations
@@ -25,13 +26,14 @@ from ...solve.state import State
 
 @dataclass(frozen=True)
 class Solved:
-    """Convergence criterion of a perturbed run: corrections of Newton's method over its distance from the state.
+    """Convergence criterion of a perturbed run: Newton corrections over its distance from the base state.
 
     Attributes:
-        enough, enough_in_contact: without contact, and with it.
-        good: of one that is taken as it is after all iterations.
-        iterations: at most this number of.
-        none: corrections over the unknowns that are round-off.
+        enough: tolerance without contact.
+        enough_in_contact: tolerance with contact.
+        good: tolerance after the last iteration.
+        iterations: maximum number of iterations.
+        none: relative correction of the unknowns that counts as round-off.
     """
 
     enough: float = 1e-9
@@ -45,17 +47,19 @@ _SOLVED = Solved()
 
 
 class Apart(Failure):
-    """A neighbour is not found near its run: its parameter was changed by too much for contact's thin ramps."""
+    """Failure to find a perturbed state near the base run: the change is too large for the contact's thin ramps."""
 
 
 class Neighbour:
-    """One problem beside that of a run, and its state.
+    """Problem and state of one perturbed run.
 
     Args:
-        scene, end: as the parameter makes them; base: the `Problem` of the run; name: of the parameter.
+        scene, end: scene and target (or stages) with the perturbed parameter.
+        base: the `Problem` of the base run.
+        name: name of the parameter.
 
     Raises:
-        InputError: the mesh has other elements.
+        InputError: the mesh has other elements, or the number of items or unknowns differs.
     """
 
     def __init__(self, scene: Any, end: Any, base: Problem, name: str):
@@ -75,21 +79,25 @@ class Neighbour:
         self.then = 0.0
 
     def state(self, like: State) -> State:
-        """Its state beside one of the run."""
+        """Return its state, with the path data of a state of the base run."""
         return State(self.x, self.control, like.direction, like.slope, memory=self.memory, stage=like.stage,
                      kind=like.kind, time=self.problem.time_at(self.control))
 
     def residual(self, left_over: np.ndarray) -> np.ndarray:
-        """F at its state less the residual of the run's, own part, shape (n,)."""
+        """Return F at its state less the residual of the base run, locally owned entries, shape (n,)."""
         self.problem.x.array_w[:] = self.x
         self.problem.residual(self.problem.x, self.control, self.F)
         self.F.array_w[:] -= left_over
         return np.array(self.F.array_r)
 
     def balance(self, left_over: np.ndarray) -> None:
-        """Forces of tools are what the body bears: theirs, of gaps smaller than round-off, tell nothing beside a run's.
+        """Set the contact forces to the reactions of the body.
 
-        left_over: as in `residual`."""
+        The gaps of the perturbed run are below round-off, so its contact law gives no useful force.
+
+        Args:
+            left_over: residual of the base run, locally owned entries, shape (n,).
+        """
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(left_over)[: self.problem.n_owned]
         unit = forms.stress * forms.volume / forms.length
@@ -115,14 +123,21 @@ class Neighbour:
 
 def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
-    """Solve for the neighbours beside a state of the run, at which its problem stands; its residual, locally owned
-    entries.
+    """Solve for the perturbed runs at a state of the base run, whose problem is restored to that state.
 
-    equation: the constraint of the run's state; None: the neighbours are in the plane normal to its path; equations: of
-    the neighbours.
+    Args:
+        curve: the `Curve` of the base run.
+        state: its state.
+        neighbours: the perturbed runs; their states are updated in place.
+        equation: constraint of the base state; None: the perturbed states lie in the plane normal to its path.
+        equations: constraints of the perturbed runs.
+
+    Returns:
+        Residual of the base run, locally owned entries, shape (n,).
 
     Raises:
-        Apart: one is not found near it. Failure: the state has no tangent.
+        Apart: no perturbed state is found near the base state.
+        Failure: the state has no tangent, or the target quantity does not change along the path.
     """
     problem, newton = curve.problem, curve.newton
     problem.x.array_w[:] = state.x
@@ -141,7 +156,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
         raise Failure("the quantity of the target does not change along the path at its end", [])
     problem.x.array_w[:] = state.x
     problem.residual(problem.x, state.control, newton.F)
-    left_over = newton.F.array_r.copy()                      # round-off, and the forces of points that are left out
+    left_over = newton.F.array_r.copy()                      # round-off, and the forces of points kept open
 
     def constraint(k: int) -> float:
         one = neighbours[k]
@@ -167,7 +182,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
         for j, k in enumerate(todo):
             one = neighbours[k]
             correction = _norm(problem, dx[:, j]) + abs(steps[j])
-            if iteration != 1:                               # there it is but a sample: all are treated alike
+            if iteration != 1:                               # this iteration only checks one of them: update none
                 one.x, one.control = one.x + dx[:, j], one.control + steps[j]
             away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
             if not np.isfinite(correction):
@@ -178,7 +193,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
                 raise Apart(f"with {one.name} a little changed no state is found near", [])
         if good:
             break
-        # what is left is of second order: if nothing is of the one that was corrected most, the others are solved for
+        # the error is now of second order: if the most corrected run has converged, so have the others
         todo = [int(np.argmax(first))] if iteration == 0 else list(range(len(neighbours)))
     return left_over
 

@@ -1,4 +1,4 @@
-"""The numbers that a design may change, and profiles of them along the body."""
+"""Design parameters: numbers, and profiles along the body."""
 
 from __future__ import annotations
 
@@ -13,9 +13,18 @@ from ...errors import InputError, count, finite, instance, several
 
 
 class Knots:
-    """A profile over a length from 0 to 1: called with places it gives values; `values` are those of its knots.
+    """A profile over a length from 0 to 1, with equidistant knots.
 
-    The knots are equidistant; between them it is linear, or a cubic spline (`smooth`).
+    It is linear between the knots, or a cubic spline. Call it with positions to get values.
+
+    Args:
+        values: values at the k knots, shape (k,).
+        smooth: True for a cubic spline.
+
+    Attributes:
+        values: values at the knots, shape (k,).
+        smooth: True for a cubic spline.
+        places: positions of the knots, shape (k,).
     """
 
     def __init__(self, values: Any, smooth: bool = False):
@@ -43,7 +52,14 @@ class Knots:
 
 @dataclass(frozen=True)
 class Spline:
-    """See `along`. start: at the knots, shape (k,); profile: False if it is one number."""
+    """Start values and bounds of a parameter, see `spline`.
+
+    Attributes:
+        start: start values at the knots, shape (k,).
+        low, high: bounds of every value.
+        smooth: True for a cubic spline, False for straight lines.
+        profile: False if the parameter is a single number.
+    """
 
     start: np.ndarray
     low: float
@@ -53,16 +69,18 @@ class Spline:
 
 
 def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
-    """A parameter of a design that is a profile of this number of equidistant knots: of thickness, temperature, a
-    constant.
+    """Return a design parameter that is a profile: of thickness, temperature, or a material constant.
 
-    The function that makes the scene gets it as a function of a length from 0 to 1, see `Knots`.
+    The function that builds the scene receives it as a function of a length from 0 to 1, see `Knots`.
 
     Args:
-        knots: at least 2, with `smooth` 4.
+        knots: number of equidistant knots, at least 2; with `smooth` at least 4.
         start: a number, or one for each knot.
         low, high: bounds of every knot.
-        smooth: a cubic spline through the knots, not straight lines.
+        smooth: True for a cubic spline through the knots, False for straight lines.
+
+    Returns:
+        The parameter, for `Design`.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -82,14 +100,18 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
 
 
 class Parameters:
-    """Parameters of a design, one after the other in a vector of n numbers.
+    """Parameters of a design as a vector of n numbers.
 
     Args:
-        given: {name: (start, low, high), a number, or the result of `along`}.
+        given: {name: (start, low, high), a number, or the result of `spline`}.
 
     Attributes:
-        names: of the numbers, such as "travel" or "wall[3]"; start, low, high: shape (n,); size: what counts as one of
-            each: the amount by which a bounded one may change, else its start, else 1, shape (n,).
+        names: names of the numbers, such as "travel" or "wall[3]".
+        start, low, high: start values and bounds, shape (n,).
+        size: reference size of each number, shape (n,): its range if bounded, else its start value, else 1.
+
+    Raises:
+        InputError: no parameters, or values that are not allowed.
     """
 
     def __init__(self, given: Mapping[str, Any]):
@@ -114,7 +136,7 @@ class Parameters:
 
     @property
     def profiles(self) -> dict[str, tuple[float, float]]:
-        """Bounds of those that are profiles, by name."""
+        """Bounds of the profiles, by name."""
         return {name: (one.low, one.high) for name, one in self._given.items() if one.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
@@ -124,7 +146,11 @@ class Parameters:
                 for (name, one), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
-        """The numbers of some parameters, the others at their start, shape (n,)."""
+        """Return the numbers for values of some parameters, the others at their start, shape (n,).
+
+        Raises:
+            InputError: an unknown name, or the wrong number of values.
+        """
         found, first = self.start.copy(), 0
         for name in values:
             if name not in self._given:
@@ -143,6 +169,7 @@ class Parameters:
 
 
 def _number(name: str, given: Any) -> Spline:
+    """Return a parameter that is a single number, from the user's argument."""
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
         raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.along(...)")
@@ -152,6 +179,7 @@ def _number(name: str, given: Any) -> Spline:
 
 
 def _check_bounds(who: str, start: np.ndarray, low: Any, high: Any) -> None:
+    """Raise an InputError unless the bounds are in order and contain the start values."""
     try:
         low, high = float(low), float(high)
     except (TypeError, ValueError):

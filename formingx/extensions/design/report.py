@@ -1,4 +1,4 @@
-"""One HTML file of a run of a design, or of the result of a search: walls, pattern, derivatives."""
+"""HTML reports of a design run and of a search: walls, profiles, derivatives."""
 
 import datetime
 import html
@@ -18,7 +18,7 @@ from .scatter import deviations as deviations_of
 
 
 def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """See `Answer.report`."""
+    """Write the report of a search, see `Answer.report`."""
     units = _of_scene(answer.best, units)
     before, best, (a, b) = answer.before, answer.best, answer.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
@@ -52,7 +52,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """See `DesignRun.report`."""
+    """Write the report of a run, see `DesignRun.report`."""
     units = _of_scene(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
@@ -71,7 +71,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
 
 
 def _of_scene(run: Any, units: Units) -> Units:
-    """The units of the labels: in plane strain per unit depth."""
+    """Return the units of the labels, per unit depth in plane strain."""
     return units.per_depth() if run.path.scene.kinematics.dimension_of_volume == 2 else units
 
 
@@ -92,7 +92,7 @@ def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictu
 
 
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
-    """The parts side by side, coloured by their wall."""
+    """Draw the parts side by side, coloured by their wall."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -138,7 +138,7 @@ def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
 
 
 def _patterns(before: Any, best: Any) -> str:
-    """Every profile over its knots."""
+    """Draw every profile over its knots."""
     found = best.parameters.profiles
     if not found:
         return ""
@@ -166,7 +166,7 @@ def _heat_map(effects: Any, units: Units) -> str:
 
 
 def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
-    """A table of the standard deviations of walls, volume, pressures and forces, where parameters are uncertain."""
+    """Return a table of the standard deviations of walls, volume, pressures and forces; empty without uncertainties."""
     if not deviations:
         return []
     covariance = covariance_of("report", run.parameters, deviations)
@@ -188,7 +188,7 @@ def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
 
 
 def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
-    """A row for every parameter."""
+    """Return a table with a row for every parameter."""
     p, tenth = run.parameters, effects.by * effects.sizes / 10
     thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),

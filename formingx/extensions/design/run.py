@@ -1,4 +1,4 @@
-"""One run of a design, and the derivatives of its result by all parameters."""
+"""A run of a design, and the derivatives of its results by all parameters."""
 
 from __future__ import annotations
 
@@ -25,19 +25,26 @@ from .parameters import Parameters
 from .scatter import Band
 
 _SMOOTH = 1e-5
-"""Change of a parameter, over its size, to the neighbours of a scene without contact, one above and one below."""
+"""Relative change of a parameter without contact: one perturbed run above, one below."""
 
 _CLOSER = (1e-8, 1e-9, 1e-10)
-"""With contact, which acts within a thin ramp, to one neighbour: one change after the other until all are found. (So
-near, a difference to one side leaves nothing out.)"""
+"""Relative changes of a parameter with contact, to one side, tried in order until all perturbed runs converge.
+
+Contact acts within a thin ramp. The changes are so small that a one-sided difference is accurate.
+"""
 
 
 @dataclass(frozen=True)
 class Effects:
-    """Derivatives of one measure: of shape (m,) by n parameters.
+    """Derivatives of m values of an output quantity by n parameters.
 
-    names: of the parameters; sizes: their ranges (else their starts), shape (n,); places: what the rows are at (a
-    length, or nothing); value: shape (m,); by: (m, n).
+    Attributes:
+        measure: name of the quantity.
+        names: names of the parameters.
+        sizes: ranges of the parameters, or their start values without a range, shape (n,).
+        places: positions of the values, shape (m,): reference lengths of the wall, else numbers.
+        value: values of the quantity, shape (m,).
+        by: derivatives, shape (m, n).
     """
 
     measure: str
@@ -57,8 +64,14 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map: the amount by which the measure changes, to first order, where a parameter goes over a
-        tenth of its range; returns the matplotlib axes."""
+        """Draw a heat map of the first-order change of the quantity by a tenth of each parameter's range.
+
+        Args:
+            axes: matplotlib axes; default a new figure.
+
+        Returns:
+            The matplotlib axes.
+        """
         from ...figures import figure
         axes = axes if axes is not None else figure()[1]
         tenth, n = (self.by * self.sizes / 10).T, len(self.names)
@@ -74,11 +87,13 @@ class Effects:
 
 
 class DesignRun:
-    """A run of the scene of the user's function of some values.
+    """A run of the user's scene for given parameter values.
 
     Attributes:
-        vector: the numbers of the parameters, shape (n,); values: the same by name; parameters: what they are
-            (`Parameters`); path: the `Path`.
+        vector: numbers of the parameters, shape (n,).
+        values: values by name.
+        parameters: the `Parameters` of the design.
+        path: the `Path`.
     """
 
     def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
@@ -108,8 +123,10 @@ class DesignRun:
 
     @cached_property
     def _neighbours(self) -> list[tuple[list[Neighbour], float]]:
-        """For each parameter neighbours, solved for to the last state: one above, or one above and one below; how far
-        the first is from the last, or from the run."""
+        """For each parameter, the perturbed runs at the last state and the parameter difference between them.
+
+        The difference is taken from the base run if there is only one.
+        """
         contact, reason = bool(self.path.problem.contacts), ""
         for size in _CLOSER if contact else (_SMOOTH,):
             made = []
@@ -128,7 +145,7 @@ class DesignRun:
         raise InputError(f"Design: this run has no derivative: {reason}")
 
     def _beside(self, k: int, step: float) -> Neighbour:
-        """A neighbour, one parameter changed; not solved for."""
+        """Return an unsolved perturbed run with one parameter changed."""
         moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
@@ -138,14 +155,17 @@ class DesignRun:
                              f" fails: {error}") from None
 
     def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
-        """A measure of the last state, shape (m,), and its derivatives by the parameters, shape (m, n).
+        """Return a quantity of the last state and its derivatives by the n parameters.
 
         Args:
             measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body in the reference
-                configuration), a column of the path, or a function of a path that looks at its last state.
+                configuration), or a column of the path. Or a function of a path that uses only its last state.
+
+        Returns:
+            The quantity, shape (m,), and its derivatives, shape (m, n).
 
         Raises:
-            InputError: the run has no derivative, or the measure looks at more than the last state.
+            InputError: the run has no derivative, or the quantity depends on earlier states.
         """
         here, by = self._here(measure), []
         for beside, apart in self._neighbours:
@@ -154,32 +174,48 @@ class DesignRun:
         return here, np.stack(by, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:
-        """`derivative` as a table, of the wall over the reference length."""
+        """Return the derivatives of a quantity as a table; the wall over the reference length.
+
+        Args:
+            measure: as in `derivative`.
+
+        Returns:
+            The `Effects`.
+
+        Raises:
+            InputError: as `derivative`.
+        """
         value, by = self.derivative(measure)
         places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
         return Effects(name, self.parameters.names, self.parameters.size, places, value, by)
 
     def spread(self, deviations: Any, measure: Any = "wall") -> np.ndarray:
-        """Return the standard deviation of a measure, to first order, shape (m,).
+        """Return the standard deviation of a quantity, to first order.
 
         Args:
-            deviations: {parameter: standard deviation}, of a profile that of every knot, independent of each other; or
-                a `Fit` whose constants are parameters under the same names: its covariance counts; or a list of such.
-            measure: as of `derivative`.
+            deviations: {parameter: standard deviation}. The knots of a profile are independent, with equal deviations.
+                Or a `Fit` whose constants have the names of parameters, with its covariance. Or a list of such.
+            measure: as in `derivative`.
+
+        Returns:
+            Standard deviation, shape (m,).
 
         Raises:
-            InputError: the run has no derivative, a name that is no parameter, or a fit that leaves constants open.
+            InputError: the run has no derivative, a name is no parameter, or the fit leaves constants undetermined.
         """
         return scatter.deviations(self.derivative(measure)[1],
                                   scatter.covariance_of("spread", self.parameters, deviations))
 
     def band(self, deviations: Any, measure: Any = "wall", confidence: float = 0.95) -> Band:
-        """Return a measure with its uncertainty, to first order and without further runs: print it, `.plot()`.
+        """Return a quantity with its confidence band, to first order and without further runs; print it or plot it.
 
         Args:
-            deviations, measure: as of `spread`.
-            confidence: of the band, as of a normal distribution.
+            deviations, measure: as in `spread`.
+            confidence: confidence level of the band, for a normal distribution.
+
+        Returns:
+            The `Band`.
 
         Raises:
             InputError: as `spread`.
@@ -188,17 +224,17 @@ class DesignRun:
 
     def report(self, file: Any = "design.html", title: str = "", *, deviations: Any = None,
                units: Units | None = None) -> FilePath:
-        """Write one HTML file: the part, its wall, and the effects of the parameters.
+        """Write an HTML report of the part, its wall, and the effects of the parameters (rank 0 writes).
 
         Args:
-            file: its name; rank 0 writes it.
-            title: heading of the file.
-            deviations: as for `spread`: the wall is drawn with its standard deviation; a table has the standard
-                deviations of the wall, the volume, pressures and forces.
+            file: path of the file.
+            title: heading of the page.
+            deviations: as in `spread`. Adds the standard deviation to the wall, and a table with the deviations
+                of wall, volume, pressures and forces.
             units: a `formingx.Units`, for the labels.
 
         Returns:
-            The path of the file.
+            Path of the file.
 
         Raises:
             InputError: the run has no derivative.
@@ -245,7 +281,7 @@ def _volume(problem: Any) -> float:
 
 
 def _of_one(state: Any, record: Record) -> Path:
-    """A path of one state."""
+    """Return a path of one state."""
     path = Path(record)
     record.segments[-1].states.append(state)
     for told in record.on_state:

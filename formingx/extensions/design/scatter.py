@@ -1,4 +1,4 @@
-"""Uncertain parameters of a design: their covariance, and the band that it gives a measure, to first order."""
+"""Uncertain design parameters: their covariance, and the confidence band of an output quantity, to first order."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .parameters import Parameters
 
 @dataclass(frozen=True)
 class Band:
-    """Uncertainty of a measure of a run, to first order in the parameters.
+    """Confidence band of an output quantity of a run, to first order in the parameters.
 
     Attributes:
-        measure: its name.
+        measure: name of the quantity.
         places: reference lengths of the wall, or numbers, shape (m,).
-        value: of the run, shape (m,).
+        value: values of the run, shape (m,).
         deviation: standard deviation, shape (m,).
-        confidence: of the band between `low` and `high`, as of a normal distribution.
+        confidence: confidence level of the band between `low` and `high`, for a normal distribution.
 
     >>> band = fx.Design(lambda c10: (fx.Scene(
     ...     mesh=sheet, materials=fx.NeoHookean(c10=c10), loads=[fx.Pressure("bottom")],
@@ -53,11 +53,14 @@ class Band:
         return norm.ppf((1 + self.confidence) / 2) * self.deviation
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
-        """Draw the value and its band over the places; returns the matplotlib axes.
+        """Draw the value and its band over the positions.
 
         Args:
-            axes: where to draw; default a new figure.
-            options: of the line, as of matplotlib's `plot`.
+            axes: matplotlib axes; default a new figure.
+            options: options of the line for matplotlib's `plot`.
+
+        Returns:
+            The matplotlib axes.
         """
         if axes is None:
             from ...figures import figure
@@ -83,11 +86,13 @@ def covariance_of(who: str, parameters: Parameters, given: Any) -> np.ndarray:
     """Return the covariance of the n numbers of a design, shape (n, n).
 
     Args:
-        given: {parameter: standard deviation}, of a profile that of every knot, independent of each other; or a fit
-            (`Fit`), whose constants are parameters under the same names; or a list of such, independent of each other.
+        who: name of the caller, for messages.
+        parameters: the parameters of the design.
+        given: {parameter: standard deviation}. The knots of a profile are independent and have the same deviation.
+            Or a fit (`Fit`) whose constants have the names of parameters. Or a list of such, independent of each other.
 
     Raises:
-        InputError: a name that is no parameter, or constants that the tests of a fit leave open.
+        InputError: a name is no parameter, or the tests of a fit leave constants undetermined.
     """
     found = np.zeros((len(parameters), len(parameters)))
     for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
@@ -114,7 +119,11 @@ def covariance_of(who: str, parameters: Parameters, given: Any) -> np.ndarray:
 
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
-    """See `DesignRun.band`."""
+    """Return the band of `DesignRun.band`.
+
+    Raises:
+        InputError: a confidence outside (0, 1), or as `DesignRun.spread`.
+    """
     if not 0 < finite("band: confidence", confidence) < 1:
         raise InputError(f"band: confidence = {confidence!r}: must be between 0 and 1")
     effects = run.sensitivities(measure)
@@ -123,10 +132,11 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
 
 
 def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of m measures with derivatives `by`, shape (m, n)."""
+    """Return the standard deviations of m values with derivatives `by`, shape (m, n); the result has shape (m,)."""
     return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", by, covariance, by), 0.0))
 
 
 def _unknown(who: str, name: Any, parameters: Parameters) -> InputError:
+    """Return the InputError for an unknown parameter."""
     known = dict.fromkeys(one.partition("[")[0] for one in parameters.names)
     return InputError(f"{who}: parameter {name!r} is not known; known: {', '.join(known)}")
