@@ -9,7 +9,7 @@ from .adapted import adapted, of_columns
 
 
 class _Adaptation:
-    """The `MeshAdaptation` of runs with a pilot."""
+    """`MeshAdaptation` of runs with a pilot run."""
 
     def check(self, mesh: Any) -> None:
         if not hasattr(mesh, "of_size"):                     # a sheet in three dimensions

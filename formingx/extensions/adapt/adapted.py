@@ -1,4 +1,4 @@
-"""A mesh of the sizes that a run asks for, of columns or in space: the next run begins on it from rest."""
+"""Adapted meshes: element sizes from the states of a run, for a new run from the undeformed body."""
 
 from __future__ import annotations
 
@@ -12,39 +12,41 @@ from .column_factors import column_factors
 from .sizes import wanted_sizes
 
 _GROWTH = 0.25
-"""By how much a column may be longer than its neighbour, over the neighbour."""
+"""Largest relative excess of a column's length over its neighbour's."""
 
 _LEAST = 1 / 8
-"""Of the length of a column in the run: shorter ones are not asked for, as what a long one sees there is too rough."""
+"""Smallest length of a column over its length in the run: finer sizes are unreliable on coarse columns."""
 
 _SAMPLES = 16
-"""Places of a column at which sizes are looked up."""
+"""Sampling points of a column for sizes."""
 
 _MOST = 20_000             # columns
 
 
 def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = None) -> Mesh:
-    """The mesh of a run made again, with columns of elements as its states ask for: small where they matter, no more.
+    """Return the mesh of a run with columns of elements as fine as its states need. Collective.
 
-    A column is as long, in the reference configuration, as the strictest of its states allows, and at most 1.25
-    times its neighbour; but not shorter than an eighth of that of the run, as long ones know no better: then adapt
-    again, to a run on the new mesh. The subdivision through the sheet stays: elements, layers and their interfaces. For
-    meshes of `disc`, `sphere`, `parison` and `from_lines`; of a `sheet` in three dimensions triangles are made
-    smaller, to a quarter at the least, never larger. Collective.
+    The reference length of a column is the smallest that its states demand. It is at most 1.25 times its neighbour's
+    and at least an eighth of the column in the run, because coarse columns give unreliable sizes. To refine further,
+    adapt a second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
+
+    The mesh must come from `disc`, `sphere`, `parison` or `from_lines`. In a `sheet` in three dimensions triangles
+    become smaller, at most to a quarter, and never larger.
 
     Args:
-        path: a run, on coarse elements for one (a pilot run), as far as it came.
-        share: the amount by which a column may turn as the sheet bends, radians; where one lies on a fillet of a
-            tool, its length there over the radius of the fillet. In space: from triangle to triangle. None: it does
-            not count.
-        error: the estimated error of the stress, over all the body, relative (`StressError.relative`), that no state is
-            to be above; columns share it, as an error of the second order. (More of them do not help where too few
-            elements lie through the sheet.) In space: the change of the wall from triangle to triangle, relative. None:
-            it does not count.
+        path: a run on a coarse mesh (a pilot run); it may be incomplete.
+        share: largest rotation of the sheet along a column, radians. On a fillet of a tool it is the length of the
+            column over the fillet radius. In three dimensions it is the rotation between triangles. None: ignored.
+        error: largest estimated relative error of the stress over the body (`StressError.relative`), shared by the
+            columns as a second-order error. More columns do not help if too few elements lie through the sheet. In
+            three dimensions it is the relative change of the wall between triangles. None: ignored.
+
+    Returns:
+        The new mesh.
 
     Raises:
-        InputError: an argument that is not allowed; a mesh that is not one of columns; nothing asks for a size: the
-            sheet neither bends nor touches a fillet, and no `error` is given.
+        InputError: an argument that is not allowed, or a mesh without columns. Also a sheet that neither bends nor
+            touches a fillet, if no `error` is given.
 
     >>> plug = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
     >>> scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(20, 1)),
@@ -71,7 +73,11 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
 
 
 def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
-    """With triangles of sizes at points, linear between these."""
+    """Return the sheet with triangles of given sizes at points, linear in between.
+
+    Raises:
+        InputError: the mesh is no `sheet`, or its nodes were moved.
+    """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
     if mesh.of_size is None:
@@ -85,7 +91,11 @@ def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
 
 
 def of_columns(mesh: Mesh) -> Columns:
-    """The columns of a mesh; an InputError if it has none, or its nodes were moved."""
+    """Return the columns of a mesh.
+
+    Raises:
+        InputError: the mesh has no columns, or its nodes were moved.
+    """
     columns = mesh.columns
     if columns is None:
         raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in space, by sheet")
@@ -98,7 +108,7 @@ def of_columns(mesh: Mesh) -> Columns:
 
 
 def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Ends of columns of `factors` times the present lengths, shape (n,), inf: as long as the longest."""
+    """Return the ends of columns scaled by `factors`, shape (n,); inf gives the length of the longest."""
     old = columns.ends
     at = np.append((old[:-1, None] + np.diff(old)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), old[-1])
     faces = columns.place(at)[[0, -1]]

@@ -1,4 +1,4 @@
-"""Factors by which the columns of a mesh should become shorter, from the states of a run."""
+"""Factors for the lengths of mesh columns, from the states of a run."""
 
 from __future__ import annotations
 
@@ -12,26 +12,31 @@ from ...results.extend import method_of
 from ...results.path import Path
 
 _STATES = 12
-"""States whose stresses are looked at: those, evenly, of all."""
+"""Number of states whose stresses are examined, evenly spaced."""
 
 _NEAR = 0.25
-"""Gap over the radius of a fillet within which the face counts as lying on it: that of a chord of 80 degrees."""
+"""Gap over the fillet radius up to which the face lies on the fillet: the gap of a chord of 80 degrees."""
 
 _PARTS = 16
-"""Straight pieces of an edge of the face."""
+"""Straight segments of an edge of the face."""
 
 _MOST = 1.0
-"""Turn of a column that is believed, radians: a larger one is of an element that does not resolve it, or is crushed."""
+"""Largest rotation of a column that is used, radians: a larger one belongs to a coarse or a crushed element."""
 
 _ORDER = 2
-"""Of the error of stresses."""
+"""Order of the stress error."""
 
 
 @method_of(Path)
 def column_factors(path: Any, share: float | None, error: float | None) -> np.ndarray:
-    """Wanted over present length of the n columns, the least of all states, shape (n,); inf: none is asked for.
+    """Return the wanted over the present length of the n columns, the smallest over all states.
 
-    share, error: see `formingx.mesh.adapted`.
+    Args:
+        path: the run.
+        share, error: see `formingx.mesh.adapted`.
+
+    Returns:
+        Factors, shape (n,); inf where no state demands a size.
     """
     path.section_only("column_factors", "use fx.mesh.adapted")
     share, error = (value if value is None else positive(f"column_factors: {name}", value)
@@ -47,24 +52,24 @@ def column_factors(path: Any, share: float | None, error: float | None) -> np.nd
 
 
 def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """Numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
+    """Return the numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
     n = middles.shape[1]
     from scipy.spatial import cKDTree
     return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
 
 
 def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
-    """A column turns by at most `share`, as its middle line does, or as a fillet would on which it lies."""
+    """Return factors that limit the rotation of a column to `share`, of its middle line or of a fillet it touches."""
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
     faces = [outline.of(contact.contact.on) for contact in problem.contacts]
     column = _column_of(outline.rest[:, 2], middles[[0, -1]])
     begin = columns.place(columns.ends[:-1])[[0, -1]]
-    sides = []                                               # edges of a face column by column, and which run back
+    sides = []                                               # edges column by column, mask of reversed ones
     for name, first in zip(columns.faces, begin):
         edges = np.flatnonzero(outline.of(name))
-        edges = edges[np.unique(column[edges], return_index=True)[1]]               # a ghost is there twice
+        edges = edges[np.unique(column[edges], return_index=True)[1]]               # ghosts appear twice
         a, b = (np.linalg.norm(outline.rest[edges, k] - first, axis=1) for k in (0, 1))
         sides.append((edges, a > b))
     for state in path.states:
@@ -90,7 +95,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
 
 def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Return the rotation along each column, with half of the kinks at its ends, radians, shape (n,)."""
-    way = np.zeros(edges.shape[-1])                          # directions at both ends, of both faces together
+    way = np.zeros(edges.shape[-1])                          # directions at both ends, averaged over both faces
     for numbers, back in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)
         first, last = 4 * m - 3 * a - b, 3 * b - 4 * m + a
@@ -103,9 +108,10 @@ def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.
 
 
 def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    """Columns that share an error of the stress, per length, as meshes of fewest elements do.
+    """Return factors that equidistribute the stress error, as in a mesh with the fewest elements.
 
-    With errors C(s) h^p, p the order: h ~ C^(-2/(2 p + 1)), so that the integral of (C h^p)^2 is the tolerance.
+    The error of a column is C(s) h^p per length, with the order p. The optimal size is h ~ C^(-2/(2 p + 1)), scaled so
+    that the integral of (C h^p)^2 meets the tolerance.
     """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(

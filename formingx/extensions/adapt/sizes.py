@@ -1,4 +1,4 @@
-"""Sizes of the triangles of a sheet in three dimensions, from the states of a run."""
+"""Triangle sizes of a sheet in three dimensions, from the states of a run."""
 
 from __future__ import annotations
 
@@ -9,17 +9,24 @@ import numpy as np
 from ...mesh.nodes import COORDINATES
 
 _FINEST = 0.25
-"""Wanted over present size, at the least: what a mesh does not resolve it shows, but not how fine it is."""
+"""Smallest wanted over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
 _GROWTH = 0.25
-"""By how much sizes grow with the distance along the sheet."""
+"""Growth of the size per distance along the sheet."""
 
 
 def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (x, y) of the flat sheet, shape (n, 2), and the size of triangles there, shape (n,), length.
+    """Return the triangle sizes that the states of a run demand.
 
-    From triangle to triangle the surface is to turn by at most `share` (radians), and its wall to change by at most the
-    part `error`, in all states; both fall with the size. None: it does not count.
+    Both limits decrease with the size; the strictest of all states counts.
+
+    Args:
+        path: the run.
+        share: largest rotation of the surface between triangles, radians; None: ignored.
+        error: largest relative change of the wall between triangles; None: ignored.
+
+    Returns:
+        Nodes (x, y) of the flat sheet, shape (n, 2), length, and sizes there, shape (n,), length.
     """
     factor: np.ndarray = np.ones(0)
     for state in path.states:
@@ -43,7 +50,7 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
-    """Numbers of triangles that have an edge in common, shape (k, 2)."""
+    """Return the pairs of triangles with a common edge, shape (k, 2)."""
     edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
     of = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort(edges.T)
@@ -52,7 +59,7 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Sizes at nodes that grow no faster than `_GROWTH` along edges."""
+    """Return sizes at nodes, reduced so that they grow by at most `_GROWTH` along edges."""
     a, b = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).T
     reach = _GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:

@@ -1,4 +1,4 @@
-"""Forces round the axis along a sheet: where they are below 0 it may wrinkle."""
+"""Hoop stress resultants of a sheet; it may wrinkle where they are compressive."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ _THROUGH = 4               # Gauss points of a layer
 
 @dataclass(frozen=True, repr=False)
 class HoopResultants(Sheet):
-    """The force round the axis at n places of a sheet, from the axis to the rim, in one state.
+    """Hoop stress resultants at n positions of a sheet, from the axis to the rim, in one state.
 
-    Compression is where wrinkles may begin, and no proof of them: what is thick stands (`Path.stability`); a membrane,
+    Compression is necessary for wrinkles, not sufficient: a thick sheet may stay stable (`Path.stability`). A membrane,
     which has no bending stiffness, wrinkles there.
 
     Attributes:
-        points: of the middle line in the reference configuration, (R, Z), in the middle of its elements, shape (n,
-            2), length.
-        resultant: N = the integral of P (first Piola-Kirchhoff, hoop) through the sheet in the reference
-            configuration, shape (n,): force by length of the middle line in the reference configuration.
-        comm: of the run.
+        points: reference positions (R, Z) on the middle line, at the middle of its elements, shape (n, 2), length.
+        resultant: hoop component of the first Piola-Kirchhoff stress P, integrated through the reference thickness,
+            shape (n,), force per reference length of the middle line.
+        comm: MPI communicator of the run.
     """
 
     points: np.ndarray
@@ -44,7 +43,7 @@ class HoopResultants(Sheet):
 
     @property
     def least(self) -> tuple[float, float]:
-        """(the least resultant, the reference radius where it is)."""
+        """(smallest resultant, its reference radius)."""
         k = int(np.argmin(self.resultant))
         return float(self.resultant[k]), float(self.points[k, 0])
 
@@ -55,7 +54,11 @@ class HoopResultants(Sheet):
 
 @method_of(Path)
 def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
-    """Compute the hoop forces along a sheet, of which negative ones may wrinkle it; collective.
+    r"""Compute the hoop stress resultants along a sheet; negative ones may cause wrinkles. Collective.
+
+    .. math:: N = \int P_{\theta\theta} \, dH
+
+    with the first Piola-Kirchhoff stress P and the reference thickness H.
 
     Args:
         path: the path of an axisymmetric solid or membrane.
@@ -77,7 +80,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
         return HoopResultants(*Tension(problem).hoop(state), problem.comm)
     profile = path.profile(state)
     (names, between), bottom, top = between_layers(scene.mesh, profile), profile.rest_bottom, profile.rest_top
-    lines = np.array([bottom, *between, top])[:, 1::2]                       # beside the corners of a rim, not on it
+    lines = np.array([bottom, *between, top])[:, 1::2]                       # keep off the corners of the rim
     gauss, weights = np.polynomial.legendre.leggauss(_THROUGH)
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])
     for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):

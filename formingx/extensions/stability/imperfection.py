@@ -13,14 +13,18 @@ from .instability import CriticalPoint
 
 
 def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
-    """The mesh with its nodes moved along a mode, free of stress there: an imperfection; collective.
+    """Return a stress-free mesh with an imperfection: its nodes are moved along a mode. Collective.
 
     Args:
-        mode: a `CriticalPoint` with n = 0 of a run on this mesh, or on one with the same nodes.
-        amplitude: the largest motion of a node, length; negative: against the mode.
+        mesh: the perfect mesh.
+        mode: a `CriticalPoint` with n = 0 of a run on this mesh, or on a mesh with the same nodes.
+        amplitude: the largest displacement of a node, length; negative: against the mode.
+
+    Returns:
+        The new mesh.
 
     Raises:
-        InputError: the mode varies round the body, or is of other nodes; the moved elements are no mesh.
+        InputError: the mode varies round the axis or has other nodes, or the moved elements are inverted.
 
     >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
     >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[

@@ -1,4 +1,4 @@
-"""Stability of the states of a run: unstable modes, their critical points, and their shapes."""
+"""Stability of the states of a run: unstable modes, critical points, and mode shapes."""
 
 from __future__ import annotations
 
@@ -22,18 +22,23 @@ from .modes import Kind, Located, Modes
 
 @dataclass(eq=False, repr=False)
 class CriticalPoint:
-    """One mode that begins (or ceases) to be unstable along a path.
+    """Point of a path at which one mode becomes unstable, or stable again.
 
     Attributes:
-        number: waves round the axis, cos(n theta); in plane strain the wave number along the depth, over length.
-        flipped: name of the mirror that turns its image round, or None.
-        left, right: the states of the path before and behind; state: where it happens, with `measures`.
-        gained: False if the body is stable again behind.
-        control, driven: the controlled quantity there, the user's units (pressure, travel, time), and what it is.
-        limit_point: True if it is that of the controlled quantity (n = 0): expected, no branch begins there.
-        solved: True if `state` is a solution; False if it lies on the smooth path between its neighbours.
-        points, amplitudes: reference positions (R, Z) of nodes, shape (m, 2), length, and amplitudes (U, W, V) of
-            u_r = U cos, u_z = W cos, u_hoop = V sin there, the largest 1, shape (m, 3); of all ranks.
+        path: the path.
+        found: the located point, see `Located`.
+        number: circumferential wave number n, cos(n theta); in plane strain the wave number along the depth, 1/length.
+        flipped: name of the symmetry plane under which the mode is antisymmetric, or None.
+        left, right: the neighbouring states of the path.
+        state: the state at the critical point, with its output quantities `measures`.
+        gained: False if the body is stable again behind this point.
+        control: value of the controlled quantity (pressure, travel, time), the user's units.
+        driven: name of the controlled quantity.
+        limit_point: True if the point is a limit point of the controlled quantity (n = 0). No branch begins there.
+        solved: True if `state` is a converged solution, False if it is interpolated between its neighbours.
+        points: reference positions (R, Z) of the m nodes of all ranks, shape (m, 2), length.
+        amplitudes: mode (U, W, V) at these nodes, shape (m, 3): u_r = U cos, u_z = W cos, u_hoop = V sin; the largest
+            is 1.
     """
 
     path: Any
@@ -46,12 +51,12 @@ class CriticalPoint:
 
     @property
     def number(self) -> float:
-        """See the class."""
+        """Wave number of the mode, see the class."""
         return self.found.kind.number
 
     @property
     def flipped(self) -> str | None:
-        """See the class."""
+        """Symmetry plane under which the mode is antisymmetric, or None."""
         return self.found.kind.flipped
 
     left = property(lambda self: self.found.left)
@@ -66,12 +71,18 @@ class CriticalPoint:
         return without_round_off(self.points[np.argmax(np.linalg.norm(self.amplitudes, axis=1))], self.points)
 
     def branch(self, sense: int) -> Any:
-        """A path that ends where another begins, headed along it: for `trace(scene, start=...)` (n = 0).
+        """Return a path that ends at this bifurcation, with its tangent along the mode.
 
-        sense: 1 or -1, along the mode or against it.
+        `trace(scene, start=...)` continues it on the bifurcated branch (n = 0).
+
+        Args:
+            sense: 1 or -1, along the mode or against it.
+
+        Returns:
+            The path.
 
         Raises:
-            InputError: the mode varies round the axis (its branch is three-dimensional), or at a limit point.
+            InputError: the mode varies round the axis (its branch is three-dimensional), or the point is a limit point.
         """
         if sense not in (1, -1):
             raise InputError(f"CriticalPoint.branch: sense = {sense!r}: must be 1 or -1")
@@ -94,10 +105,14 @@ class CriticalPoint:
         return path
 
     def view3d(self, file: Any, scale: float = 0.15) -> Picture:
-        """Draw the body with the mode, its largest amplitude `scale` of the body's size, as a PNG (rank 0 draws).
+        """Draw the body with the mode as a PNG (rank 0 draws).
+
+        Args:
+            file: path of the PNG file.
+            scale: largest amplitude of the mode over the size of the body.
 
         Raises:
-            InputError: there is neither a screen nor Xvfb to draw on, or the mesh is no sheet.
+            InputError: neither a screen nor Xvfb is available, or the mesh is no sheet.
         """
         from . import show as modes
         modes.draw(self, file, scale)
@@ -108,12 +123,13 @@ class CriticalPoint:
 
 
 class Stability:
-    """The unstable modes of states of a path.
+    """Stability of states of a path.
 
     Attributes:
-        numbers: the waves that were asked for; states: the states looked at, in order.
+        numbers: the wave numbers examined.
+        states: the states examined, in order.
         counts: {(number, flipped): number of unstable modes in each state, shape (states,)}.
-        losses: list of `CriticalPoint` in order along the path.
+        losses: the `CriticalPoint` objects, in order along the path.
     """
 
     def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
@@ -123,16 +139,16 @@ class Stability:
 
     @property
     def bifurcations(self) -> list[CriticalPoint]:
-        """Losses that are no limit points."""
+        """Critical points that are no limit points."""
         return [loss for loss in self.losses if loss.gained and not loss.limit_point]
 
     @property
     def first(self) -> CriticalPoint | None:
-        """The first alarm on the path, or None: the states looked at are stable."""
+        """First bifurcation on the path, or None if there is none."""
         return next(iter(self.bifurcations), None)
 
     def first_of(self, number: float) -> CriticalPoint | None:
-        """The first alarm of modes with so many waves, or None."""
+        """Return the first bifurcation with a wave number, or None."""
         return next((loss for loss in self.bifurcations if loss.number == number), None)
 
     def __str__(self) -> str:
@@ -161,20 +177,20 @@ def _shown(loss: CriticalPoint) -> str:
 
 
 class Watch:
-    """Looks at states of one path; made once."""
+    """Stability examination of the states of one path; created once."""
 
     def __init__(self, path: Any):
         self._path, self._modes = path, {}                              # type: ignore[var-annotated]
 
     def of(self, segment: Any) -> Modes:
-        """The modes of a segment's problem."""
+        """Return the modes of a segment's problem."""
         key = id(segment.problem)
         if key not in self._modes:
             self._modes[key] = Modes(segment.curve)
         return self._modes[key]
 
     def look(self, modes: Iterable[float], states: Any) -> Stability:
-        """See `Path.stability`."""
+        """Examine states of the path, see `Path.stability`."""
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
@@ -217,7 +233,7 @@ class Watch:
         return [self._loss(segment, one, fold) for one, fold in zip(found, folds, strict=True)]
 
     def _is_fold(self, segment: Any, found: Located) -> bool:
-        """True if the mode is the tangent of the path at its limit point: the driven load does work on it."""
+        """Return True if the mode is the tangent at a limit point: the controlled load does work on it."""
         x, direction = found.x, found.left.direction
         problem = segment.problem
         a, b, c = problem.x.duplicate(), problem.x.duplicate(), problem.x.duplicate()
@@ -234,7 +250,7 @@ class Watch:
         amplitudes = amplitudes / size.max()
         if found.solved and not found.state.measures:
             found.state.measures = self._path._measures(segment, found.state)
-        elif not found.state.measures:                      # no equilibrium: its forces would be none
+        elif not found.state.measures:                      # no equilibrium: it has no reaction forces
             before, behind = found.left.measures, found.right.measures
             found.state.measures = {name: before[name] + found.fraction * (behind[name] - before[name])
                                     for name in before.keys() & behind.keys()}
@@ -245,10 +261,10 @@ class Watch:
 
 @method_of(Path)
 def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
-    """Find the modes of instability of states of a path, and where the path loses its stability in them.
+    """Examine states of a path for stability, and locate the critical points between them.
 
     Args:
-        path: the path of a solid; no load on it may depend on the mode in an unknown way.
+        path: the path of a solid; the second variation of all its loads must be known.
         modes: circumferential wave numbers; in plane strain wave numbers along the depth, 1/length.
         states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
 
@@ -256,7 +272,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
         The `Stability`, which prints a table.
 
     Raises:
-        InputError: a membrane, or a load that does not say how it changes with a mode.
+        InputError: a membrane, or a load without a second variation.
     """
     path.section_only("stability")
     watch: Watch = vars(path).setdefault("_stability_watch", Watch(path))      # keeps its matrices
@@ -264,7 +280,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
 
 
 class InstabilityCondition:
-    """Ends a run where modes that were stable at its first state are not; see `unstable`."""
+    """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`."""
 
     def __init__(self, modes: Any):
         self.modes = modes
@@ -289,10 +305,16 @@ class InstabilityCondition:
 
 
 def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
-    """For `trace(stop_at=...)`: end the run, as a result, once a mode is unstable that was not at its first state.
+    """Return a condition for `trace(stop_at=...)`: stop once a mode is unstable that was stable at the first state.
 
-    modes: waves round the axis; in plane strain wave numbers along the depth. It costs about two iterations a mode and
-    state. `Path.ended` says which mode, `Path.stability` finds where.
+    It costs about two iterations per mode and state. `Path.ended` names the mode, `Path.stability` locates the critical
+    point.
+
+    Args:
+        modes: circumferential wave numbers; in plane strain wave numbers along the depth, 1/length.
+
+    Returns:
+        The condition.
 
     >>> fx.trace(scene, until=fx.pole_height(12.0), stop_at=fx.instability([0, 1]), progress=False).ended
     ''
@@ -301,7 +323,11 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
-    """`modes` of `Path.stability` as a list, each once, or an InputError."""
+    """Return the wave numbers of `Path.stability` as a list without duplicates.
+
+    Raises:
+        InputError: wave numbers that are not allowed.
+    """
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
@@ -320,7 +346,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 
 
 def _chosen(path: Any, states: Any) -> list[State]:
-    """The states to look at: as many of the path's as asked for, evenly, its ends among them; or those given."""
+    """Return the states to examine: evenly spaced ones with both ends of the path, or the given ones."""
     there = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
@@ -336,7 +362,7 @@ def _chosen(path: Any, states: Any) -> list[State]:
 
 
 def _most_waves(scene: Any) -> float:
-    """The number of waves as long as the shortest edge of an element, where the body is widest."""
+    """Return the number of waves as long as the shortest edge of an element, at the largest radius."""
     domain = scene.mesh.domain
     domain.topology.create_connectivity(1, domain.topology.dim)
     edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)

@@ -1,7 +1,8 @@
-"""Modes in which a state is not stable: how many there are (inertia), which (shift-invert), and where they begin.
+"""Unstable modes of a state: their number (inertia), their shapes (inverse iteration), and their critical points.
 
-The second variation K of a saddle point, with pressures and Lagrange multipliers, has one negative pivot for each of
-these in K = L D L^T, and one more for each unstable mode (Sylvester's law of inertia).
+The second variation K of a mixed formulation, with pressures and Lagrange multipliers, is a saddle-point matrix. In
+K = L D L^T it has one negative pivot for each of them, and one more for each unstable mode (Sylvester's law of
+inertia).
 """
 
 from __future__ import annotations
@@ -21,13 +22,13 @@ from .second_variation import SecondVariation
 
 @dataclass(frozen=True)
 class Lanczos:
-    """Settings of Lanczos' method with the inverse, which computes the modes.
+    """Settings of the Lanczos method with the inverse of K, which computes the modes.
 
     Attributes:
-        steps: at most, each a solve with factors that are there.
-        accurate: error of an eigenvalue, relative to it, at which it ends.
-        exhausted: size of the rest of a new vector, over the largest eigenvalue of the inverse, that is round-off:
-            all modes are found.
+        steps: maximum number of steps, each a solve with the stored LU factors.
+        accurate: relative error of an eigenvalue at which the iteration ends.
+        exhausted: norm of the remainder of a new vector, over the largest eigenvalue of the inverse, that is round-off.
+            Then all modes are found.
     """
 
     steps: int = 80
@@ -40,13 +41,13 @@ class Locating:
     """Settings for the location of a critical point between two states.
 
     Attributes:
-        states: solved for at most.
-        located: error of its place, in parts of the distance of the two.
-        beside: how far beside it counts of unstable modes make sure of it, in the same parts.
-        patience: how often the bracket may fail to halve before it is halved.
-        alike: scalar product of two normed modes above which they are one, seen from two states.
-        astray: how far a state may be from the cubic between the two, over their distance: further off lies another
-            branch.
+        states: maximum number of states to solve for.
+        located: tolerance of its position, relative to the distance of the two states.
+        beside: distance on either side at which counts of unstable modes verify it, relative to the same distance.
+        patience: number of steps without halving of the bracket after which it is bisected.
+        alike: scalar product of two normalised modes above which they are the same mode.
+        astray: largest distance of a state from the cubic between the two states, over their distance. A state further
+            away lies on another branch.
     """
 
     states: int = 60
@@ -58,7 +59,12 @@ class Locating:
 
 
 class Kind(NamedTuple):
-    """Modes with so many waves round the axis (in plane strain the wave number); flipped: see `SecondVariation`."""
+    """Wave number and symmetry of a class of modes.
+
+    Attributes:
+        number: circumferential wave number; in plane strain the wave number along the depth.
+        flipped: name of the symmetry plane under which the modes are antisymmetric, or None (see `SecondVariation`).
+    """
 
     number: float
     flipped: str | None = None
@@ -67,11 +73,15 @@ class Kind(NamedTuple):
 class Located(NamedTuple):
     """Critical point at which a mode becomes unstable, or stable again.
 
-    kind: of the mode; left, right: the states before and behind; state: there; mode: amplitudes (U, W, V) at `nodes` of
-    the second variation, locally owned entries; x: its U and W as unknowns of the problem, locally owned entries;
-    fraction: where it is from left (0) to right (1); gained: True if the body is less stable behind; solved: True if
-        `state` was solved for, else it
-    lies on the cubic between left and right.
+    Attributes:
+        kind: wave number and symmetry of the mode.
+        left, right: states before and behind the point.
+        state: state at the point.
+        fraction: position between left (0) and right (1).
+        mode: amplitudes (U, W, V) at `nodes` of the second variation, locally owned entries.
+        x: U and W of the mode as unknowns of the problem, locally owned entries.
+        gained: True if the body is less stable behind the point.
+        solved: True if `state` is a converged solution, False if it lies on the cubic between left and right.
     """
 
     kind: Kind
@@ -86,8 +96,15 @@ class Located(NamedTuple):
 
 
 class _Look(NamedTuple):
-    """A state between two others, how many modes are unstable, and those nearest to 0: eigenvalues, ascending,
-    dimensionless, and own unknowns."""
+    """Number of unstable modes and the modes nearest to zero in a state between two others.
+
+    Attributes:
+        fraction: position between the two states, from 0 to 1.
+        state: the state.
+        unstable: number of unstable modes.
+        values: eigenvalues nearest to 0, ascending, dimensionless.
+        modes: their modes, locally owned entries.
+    """
 
     fraction: float
     state: State
@@ -97,10 +114,12 @@ class _Look(NamedTuple):
 
 
 class Modes:
-    """The unstable modes of the states of a problem; created once.
+    """Unstable modes of the states of a problem; created once.
 
     Args:
-        curve: the `Curve` that solves for states. lanczos, locating: how it is done.
+        curve: the `Curve` that solves for states.
+        lanczos: settings of the eigenvalue solver.
+        locating: settings for critical points.
 
     Raises:
         InputError: as `SecondVariation`.
@@ -114,7 +133,7 @@ class Modes:
         self._in, self._out = self.variation.matrix.createVecs()
 
     def count(self, state: State, kind: Kind) -> int:
-        """The number of unstable modes of a kind."""
+        """Return the number of unstable modes with a wave number and symmetry."""
         with self.problem.state_context(state):
             return self._count(kind)
 
@@ -125,10 +144,10 @@ class Modes:
         return self._solver.negative_pivots() - self.variation.negative
 
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
-        """Locate the sign change of the eigenvalue with this number of lower ones between two states.
+        """Locate the zero of the eigenvalue number `index` (in ascending order) between two states.
 
-        Counts bracket it; inside the bracket it is predicted by the eigenvalues of one mode, which is followed by its
-        shape: others cross it on their way.
+        Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode.
+        The mode is tracked by its shape, because eigenvalues of other modes cross it.
         """
         looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
         (low, high), how = looks, self._how
@@ -141,7 +160,7 @@ class Modes:
             width = high.fraction - low.fraction
             if width < 2 * how.beside or len(looks) == how.states:
                 break
-            if abs(nearest.fraction - fraction) < how.located:     # a root, but of the mode that is looked for?
+            if abs(nearest.fraction - fraction) < how.located:     # the root may belong to another mode
                 fraction = low.fraction + how.beside if nearest is low else high.fraction - how.beside
             try:
                 looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
@@ -169,13 +188,13 @@ class Modes:
             return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
     def _of_index(self, look: _Look, index: int) -> Array:
-        """The mode whose eigenvalue has so many below it; of those that are known the nearest to it."""
+        """Return the mode with a given number of lower eigenvalues, or the nearest known one."""
         negative = np.flatnonzero(look.values < 0)
         k = (negative[-1] + 1 if len(negative) else 0) + index - look.unstable
         return look.modes[min(max(k, 0), len(look.modes) - 1)]
 
     def _follow(self, looks: list[_Look], end: _Look, index: int) -> list[tuple[float, float]]:
-        """(fraction, eigenvalue) of the mode that is unstable at that end of the bracket, where it is found again."""
+        """Track the mode that is unstable at an end of the bracket; return its (fraction, eigenvalue) pairs."""
         mode, found = self._of_index(end, index), []
         for look in looks:
             alike = [abs(self._inner(mode, other)) for other in look.modes]
@@ -184,7 +203,11 @@ class Modes:
         return found
 
     def _between(self, a: State, b: State, fraction: float) -> State:
-        """The state there, solved for; raises `Failure`."""
+        """Solve for the state at a fraction between two states.
+
+        Raises:
+            Failure: no convergence, or convergence to another branch.
+        """
         if self.problem.has_history:
             raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.state_context(a):
@@ -198,9 +221,10 @@ class Modes:
         return state
 
     def _lanczos(self, number: int) -> tuple[Array, Array]:
-        """Eigenvalues nearest to 0 of K x = value M x, and modes; all vectors are kept orthogonal to each other.
+        """Return the eigenvalues nearest to 0 of K x = value M x, and their modes, by full reorthogonalisation.
 
-        M is the lumped mass, which is 0 for pressures: so all begin in the range of K^-1 M. Rigid motions are left out.
+        M is the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1 M.
+        Rigid motions are removed.
         """
         variation = self.variation
         out: list[Array] = []
@@ -231,7 +255,7 @@ class Modes:
         return 1 / theta[best], modes
 
     def _invert(self, x: Array) -> Array:
-        """K^-1 M x."""
+        """Return K^-1 M x."""
         self._in.array_w[:] = self.variation.mass(x)
         self._solver.solve(self._in, self._out)
         return self._out.array_r.copy()
@@ -243,7 +267,7 @@ class Modes:
         return x / np.sqrt(self._inner(x, x))
 
     def _clean(self, x: Array, others: list[Array]) -> Array:
-        """x without its parts along others, which are normal to each other."""
+        """Return x without its components along other vectors, which are orthogonal to each other."""
         if not others:
             return x
         basis = np.array(others)
@@ -259,7 +283,7 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Return the root of the polynomial (of the fraction over the eigenvalue) through those nearest to 0, if inside."""
+    """Return the root of the polynomial (fraction over eigenvalue) through the values nearest to 0, if inside."""
     known = sorted(values, key=lambda one: abs(one[1]))[:4]
     for n in range(len(known), 1, -1):
         s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))

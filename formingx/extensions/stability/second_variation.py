@@ -1,17 +1,24 @@
-"""The second variation of the energy of an accepted state for modes that vary round the body (or along its depth).
+r"""Second variation of the energy of an accepted state for modes that vary round the axis (or along the depth).
 
-A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_hoop = V sin(n theta), pressure Q cos(n theta); in plane strain
-the same with k x3 for n theta. Modes of different n do not couple, nor do, at second order and by reflection, changes
-of F within its blocks (from U, W and the hoop stretch) and across them, so
+A mode is
 
-    d2E[mode, mode] = d2E(F + H within) + d2E(F + H across),      H: `Kinematics.mode_gradient`,
+.. math:: u_r = U \cos n\theta, \quad u_z = W \cos n\theta, \quad u_\theta = V \sin n\theta, \quad
+    p = Q \cos n\theta
 
-each the potential of the scene derived twice. n is a number in one form. At n = 0 V is torsion, and the rest the
-tangent of the path; amplitudes count alike at all n (round the body cos^2 has half the mean of 1). A follower pressure
-and friction have no energy: the symmetric part of their tangents counts. Where a point slides, nothing holds it round
-the axis, which is a bound. A material that relaxes has the stiffness of the instant.
+and in plane strain the same with k x3 for n theta. Modes of different n are not coupled. By reflection, changes of F
+within its blocks (from U, W and the hoop stretch) and across them are not coupled at second order, so
 
-Unknowns are (U, W, V + m U, Q), m = 1 for n = 1 and 0 else: what is to be 0 on the axis is then an unknown.
+.. math:: \delta^2 E = \delta^2 E(F + H_{within}) + \delta^2 E(F + H_{across})
+
+with H from `Kinematics.mode_gradient`. Each term is the second derivative of the potential of the scene. One form
+serves all n. At n = 0, V is torsion, and U and W give the tangent of the path. Amplitudes are normalised alike at all n
+(the mean of cos^2 round the axis is 1/2, not 1).
+
+A follower pressure and friction have no energy: the symmetric part of their tangents is used. A sliding point is free
+round the axis, which is a bound. A relaxing material has its instantaneous stiffness.
+
+The unknowns are (U, W, V + m U, Q), with m = 1 for n = 1 and 0 else. So the quantity that vanishes on the axis is an
+unknown.
 """
 
 from __future__ import annotations
@@ -30,11 +37,11 @@ from ...physics.kinematics import BLOCK
 from ...physics.supports import Held, Symmetry
 
 _AT_REST = 1e-6
-"""Forces by a rigid motion (over those of its single unknowns) below which nothing holds it."""
+"""Relative force of a rigid motion (over the forces of its single unknowns) below which it is unconstrained."""
 
 
 class _ModedBody(LoadedBody):
-    """The body as `Load.mode_work` sees it."""
+    """Body data for `Load.mode_work`."""
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
         super().__init__(forms)
@@ -45,17 +52,18 @@ class SecondVariation:
     """Second variation of the energy of a problem at its present state; created once.
 
     Args:
-        problem: of a solid.
+        problem: the `Problem` of a solid.
 
     Attributes:
-        matrix: of the modes that `fill` was last told; symmetric. Of each rigid motion that nothing holds one unknown
-            is held: what other modes do is the same, and the matrix is regular.
-        rigid: these motions, own parts of unknowns. negative: pivots of `matrix` that are so in stable states, too.
-        nodes: reference positions of the nodes, own, shape (m, 2), length.
-        mirrors: names of the boundaries that are mirrors.
+        matrix: symmetric matrix for the modes of the last `fill`. One unknown of each free rigid motion is constrained.
+            This leaves other modes unchanged and makes the matrix regular.
+        rigid: free rigid motions, locally owned entries.
+        negative: number of negative pivots of `matrix` in a stable state.
+        nodes: reference positions of the locally owned nodes, shape (m, 2), length.
+        mirrors: names of the symmetry planes.
 
     Raises:
-        InputError: a membrane, an elastic support, or a load that does not know how it changes with a mode.
+        InputError: a membrane, an elastic support, or a load without a second variation.
     """
 
     def __init__(self, problem: Any):
@@ -80,7 +88,12 @@ class SecondVariation:
         self._held = np.zeros(0, dtype=np.int32)
 
     def fill(self, number: float, flipped: str | None = None) -> Any:
-        """`matrix` of modes with so many waves; `flipped`: those for which a mirror turns their image round."""
+        """Assemble `matrix` for a wave number.
+
+        Args:
+            number: circumferential wave number; in plane strain the wave number along the depth.
+            flipped: name of the symmetry plane under which the modes are antisymmetric, or None.
+        """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._turned.value = number, m
         self._held = self._find_held(number, flipped)
@@ -101,7 +114,7 @@ class SecondVariation:
         return self.matrix
 
     def mass(self, x: np.ndarray) -> np.ndarray:
-        """The lumped mass times a mode, own parts."""
+        """Return the lumped mass times a mode, locally owned entries."""
         U, W, V = self._unknowns.T
         m, out = self._turned.value, np.zeros_like(x)
         round_axis = self._lumped * (x[V] - m * x[U])
@@ -110,7 +123,7 @@ class SecondVariation:
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """(U, W, V) of a mode at `nodes`, shape (m, 3)."""
+        """Return (U, W, V) of a mode at `nodes`, shape (m, 3)."""
         U, W, V = self._unknowns[~self._bubble].T
         return np.column_stack([x[U], x[W], x[V] - self._turned.value * x[U]])
 
@@ -121,7 +134,7 @@ class SecondVariation:
         return found
 
     def _find_rigid(self) -> list[np.ndarray]:
-        """The body's rigid motions that nothing holds."""
+        """Find the unconstrained rigid motions of the body."""
         kinematics, own = self.problem.scene.kinematics, self._held[self._held < self._own]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
@@ -144,7 +157,7 @@ class SecondVariation:
         return bool(forces < _AT_REST * single)
 
     def _pin(self) -> None:
-        """Hold, of each rigid motion, the unknown that it moves most, the motions before it being held."""
+        """Constrain the largest unknown of each rigid motion, the earlier motions being constrained already."""
         first, rest = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid]
         rows = []
         while rest:
@@ -162,7 +175,7 @@ class SecondVariation:
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
-        """Bilinear form of the second variation, dimensionless."""
+        """Return the bilinear form of the second variation, dimensionless."""
         forms, kinematics = self._forms, self.problem.scene.kinematics
         h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
 
@@ -194,7 +207,7 @@ class SecondVariation:
         return form
 
     def _number_unknowns(self) -> None:
-        """Nodes, their unknowns, and which those of the problem are."""
+        """Find the nodes, their unknowns, and the corresponding unknowns of the problem."""
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
@@ -213,7 +226,7 @@ class SecondVariation:
         old_lists = [np.asarray(old.sub(0).sub(i).dofmap.list).ravel()[first] for i in components]
         bubble = (first % lists[0].shape[1]) >= 6
         axis, numbers = new.sub(0).sub(0).collapse()
-        X = np.zeros((size, len(components)))                           # unknowns of bubbles are no values at a point
+        X = np.zeros((size, len(components)))                           # bubble unknowns are no nodal values
         place = fem.Function(axis)
         for i in components:
             place.interpolate(lambda X, i=i: X[i])
@@ -237,7 +250,7 @@ class SecondVariation:
         self._pressures = int(self.comm.allreduce(mine))
 
     def _dofs(self, component: int, item: Any) -> np.ndarray:
-        """Local numbers of an unknown displacement where something is held."""
+        """Return the local numbers of the constrained unknowns of a displacement component."""
         space, forms = self.space.sub(0).sub(component), self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(space, 1, forms.mesh.facets_of(item.on))
@@ -246,9 +259,9 @@ class SecondVariation:
                                            lambda X: np.hypot(X[0] - point[0], X[1] - point[1]) < near)[0]
 
     def _find_held(self, number: float, flipped: str | None) -> np.ndarray:
-        """Local numbers of the unknowns that are held, ghosts too.
+        """Return the local numbers of the constrained unknowns, with ghosts.
 
-        Round the axis the constraints in r and in z are held, too: a clamped rim, a node, a face that is driven.
+        Constraints in r and in z also act round the axis: a clamped rim, a node, a face with a prescribed displacement.
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, thing in enumerate(problem.scene.items):
@@ -276,7 +289,7 @@ class SecondVariation:
         return np.flatnonzero(marks).astype(np.int32)
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """(number of the thing, row of a mean that it holds, what m takes off it), own parts; the mean of V, too."""
+        """Return (item number, row of a mean constraint, correction for m) of each mean and of the mean of V."""
         forms, problem = self._forms, self.problem
         n = problem.n_owned
         for number, thing in enumerate(problem.scene.items):
@@ -291,7 +304,7 @@ class SecondVariation:
                     yield number, round_axis, row
 
     def _of_contact(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """(unknowns, stiffness) of the points of a contact, for `ExtendedMatrix.fill`."""
+        """Return (unknowns, stiffness) of the points of a contact, for `ExtendedMatrix.fill`."""
         control = self.problem.control
         plane = contact.stiffness(fields, control)
         plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.stiffness_round(fields, control)
@@ -305,9 +318,9 @@ class SecondVariation:
         return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
 
     def _of_guided(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """The same of nodes whose radius is held, but not their way round the axis.
+        """Return (unknowns, stiffness) of nodes with a constrained radius that are free round the axis.
 
-        The force f on such a node, outward, is that on a circle: it takes -f V^2/r.
+        The outward force f on such a node acts along a circle: its second variation is -f V^2/r.
         """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
         held = np.zeros(len(self._V_of), dtype=bool)
@@ -321,7 +334,7 @@ class SecondVariation:
         return self._unknowns[guided], values
 
     def _unknowns_of(self, mode: Any) -> np.ndarray:
-        """A rigid mode as unknowns, own part."""
+        """Return a rigid mode as unknowns, locally owned entries."""
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]
         values = mode(self._X + u) / forms.length

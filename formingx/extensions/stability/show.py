@@ -1,4 +1,4 @@
-"""Modes of a body drawn: in space, its whole surface, and over the section."""
+"""Drawings of buckling modes: the whole surface in three dimensions, and the section."""
 
 from typing import Any
 
@@ -10,9 +10,9 @@ from ...results.show.views import plotted
 
 
 def draw(loss: Any, file: Any, scale: float) -> None:
-    """See `CriticalPoint.view3d`: the deformed body with the mode, coloured by how far and which way the mode moves it.
+    """Draw the deformed body with a mode, see `CriticalPoint.view3d`.
 
-    Blue: towards the axis (downwards, where that is more), red: away from it.
+    The colour is the amplitude: blue towards the axis (or downwards, where that is larger), red away from it.
     """
     file = files.named("Loss.view3d", file, ".png")
     scale = positive("Loss.view3d: scale", scale)
@@ -21,7 +21,7 @@ def draw(loss: Any, file: Any, scale: float) -> None:
 
 
 def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """[(deformed points (m, 2), amplitudes there (m, 3))] of each boundary; collective."""
+    """Return (deformed points, shape (m, 2), amplitudes there, shape (m, 3)) of each boundary; collective."""
     path, state = loss.path, loss.state
     segment = path.segment(loss.left)
     mesh = segment.problem.scene.mesh

@@ -1,6 +1,6 @@
-"""The top load of a formed body: pushed down on a plate by its neck, where it buckles and how much it bears.
+"""Top load of a formed body: its neck is pressed down against a plate until the body buckles.
 
-Elastic: nothing is plastic here. Units are those of the script; a force is one round the whole axis.
+The body is elastic, without plasticity. Units are the user's; forces are totals round the axis.
 """
 
 from __future__ import annotations
@@ -25,25 +25,30 @@ from ...units import NONE, Units
 from .instability import CriticalPoint, Stability, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
-"""Contact of the foot: a line on a rigid plate hops from point to point; this many, on a plate that deforms by a
-thousandth of the wall or so, roll."""
+"""Contact of the foot: enough points on a compliant plate to let the standing ring roll.
+
+The compliance is about a thousandth of the wall. On a rigid plate a contact line hops from point to point.
+"""
 
 _STEP = 0.004
-"""Longest step: a crushed wall snaps through short arcs."""
+"""Largest step length: a crushed wall snaps through along short arcs."""
 
 
 @dataclass(eq=False, repr=False)
 class TopLoad:
-    """Top load of a body pushed down on a plate; prints a table.
+    """Top load of a body that is pressed down onto a plate; prints a table.
 
     Attributes:
-        path: its axisymmetric path; stability: modes that are lost along it.
-        travel, force: of the neck, positive downwards, at all states, shape (n,) each, length and force.
-        largest_force, at_travel: the peak of the force of the axisymmetric path.
+        path: the axisymmetric path.
+        stability: stability of its states, with the critical points.
+        travel: displacement of the neck at all n states, positive downwards, shape (n,), length.
+        force: its force, positive downwards, shape (n,), force.
+        largest_force: peak force of the axisymmetric path.
+        at_travel: travel at the peak force, length.
         peak: False if the force is largest in the last state: it may grow further.
-        ended: why the path ended before the travel that was asked for, as text, or "".
-        energy: up to the first buckling, or to the largest force, length force.
-        units: of the labels.
+        ended: why the path ended before the requested travel, as text, or "".
+        energy: work up to the first buckling or to the largest force, length force.
+        units: a `Units` for the labels.
     """
 
     path: Path
@@ -55,17 +60,17 @@ class TopLoad:
 
     @property
     def largest_force(self) -> float:
-        """See the class."""
+        """Peak force of the axisymmetric path."""
         return float(self.force.max())
 
     @property
     def at_travel(self) -> float:
-        """See the class."""
+        """Travel at the peak force, length."""
         return float(self.travel[self.force.argmax()])
 
     @property
     def peak(self) -> bool:
-        """See the class."""
+        """True if the force passes a maximum within the path."""
         return bool(self.force.argmax() < len(self.force) - 1)
 
     @property
@@ -74,17 +79,17 @@ class TopLoad:
         return self.stability.first
 
     def of(self, number: float) -> CriticalPoint | None:
-        """Return the first buckling point with a number of waves, or None; `buckling` has its force and travel."""
+        """Return the first buckling point with a number of waves, or None; `buckling` returns its force and travel."""
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
-        """(force, travel) at which it first buckles in so many waves, or None."""
+        """Return (force, travel) of the first buckling with a number of waves, or None."""
         loss = self.of(number)
         return None if loss is None else (loss.state.measures["support_force"], -loss.control)
 
     @property
     def energy(self) -> float:
-        """See the class."""
+        """Work up to the first buckling or to the largest force, length force."""
         first = self.first
         end = self.at_travel if first is None else -first.control
         there = int(np.argmax(self.travel >= end * (1 - 1e-12)))
@@ -115,24 +120,28 @@ class TopLoad:
 def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = None,
              modes: Iterable[float] = range(2, 9), neck: str = "neck", foot: str = "outer",
              step: StepControl | None = None, units: Units | None = None) -> TopLoad:
-    """Push a body, free of stress, down on a frictionless plate by its neck; look where it buckles round the axis.
+    """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
-    The neck is held radially and round the axis. Contact deforms by about a thousandth of the wall, so that the ring
-    on which a bottle stands rolls on.
+    The neck is constrained radially and round the axis. The contact compliance is about a thousandth of the wall,
+    so that the standing ring of a bottle rolls.
 
     Args:
         body: for example `Path.deformed_mesh()`.
         material: as in `Scene`.
-        travel: how far the neck is to go down, length; the run may end earlier, see `TopLoad.ended`.
-        floor: what it stands on; default: a plane at its lowest node.
-        modes: waves round the axis that are looked for.
-        neck, foot: the boundaries that are pushed and that stand.
+        travel: requested downward displacement of the neck, length. The run may end earlier, see `TopLoad.ended`.
+        floor: the plate; default: a plane at the lowest node of the body.
+        modes: circumferential wave numbers to examine.
+        neck: boundary that is pressed down.
+        foot: boundary that stands on the plate.
         step: default `StepControl(largest=0.004)`.
         units: a `formingx.Units`, for the labels.
 
+    Returns:
+        The `TopLoad`.
+
     Raises:
-        InputError: an argument that is not allowed; the foot does not reach the floor.
-        ConvergenceError: not even the first state was found.
+        InputError: an argument that is not allowed, or a foot that does not reach the floor.
+        ConvergenceError: the first state was not found.
 
     >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))
     >>> found = fx.top_load(tube, material=fx.NeoHookean(c10=1.0), travel=0.3, neck="top", foot="bottom", modes=[1],

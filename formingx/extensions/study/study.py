@@ -1,4 +1,6 @@
-"""Many runs of one script with other numbers: tables, main effects, the best run; in parallel, and to continue with.
+"""Parameter studies: many runs of one script with different values, in parallel and resumable.
+
+The results are tables, main effects, and the best run.
 
     def pot(depth, radius):                                  # importable: a function of a script or of a module
         ...
@@ -50,11 +52,11 @@ class StudyRun:
     """One run of a study.
 
     Attributes:
-        values: {variable: its value}.
-        measures: {name: number}; empty if it failed.
-        error: why it failed, or "".
-        seconds: that it took.
-        warnings: what it warned of, one text each.
+        values: {variable: value}.
+        measures: {name: number}; empty if the run failed.
+        error: reason for the failure, or "".
+        seconds: duration of the run.
+        warnings: texts of its warnings.
     """
 
     values: dict[str, float]
@@ -78,7 +80,7 @@ class _Task(NamedTuple):
             found = {name: float(result.last.measures[of] if isinstance(of, str) else of(result))
                      for name, of in self.measure.items()}
             error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
-        except Exception as failure:                         # whatever a script raises: the others go on
+        except Exception as failure:                         # the other runs continue after any exception of the script
             found, error = {}, f"{type(failure).__name__}: {failure}"
         finally:
             log.removeFilter(names)
@@ -86,7 +88,7 @@ class _Task(NamedTuple):
 
 
 class _NamesRun(logging.Filter):
-    """Puts the values of a run before what it logs, and keeps its warnings; others may run in other threads."""
+    """Log filter that prefixes records with the values of the run and collects warnings; one per thread."""
 
     def __init__(self, values: dict[str, float]):
         super().__init__()
@@ -102,10 +104,13 @@ class _NamesRun(logging.Filter):
 
 
 class Study(Sheet):
-    """The runs of a study.
+    """Runs of a parameter study.
 
     Attributes:
-        runs: in the order of the design; variables, measures: names; goal: {measure: "max" or "min"}.
+        runs: runs in the order of the design.
+        variables: names of the variables.
+        measures: names of the measures.
+        goal: {measure: "max" or "min"}.
     """
 
     comm = MPI.COMM_SELF
@@ -116,12 +121,12 @@ class Study(Sheet):
 
     @property
     def good(self) -> list[StudyRun]:
-        """The runs that did not fail."""
+        """Successful runs."""
         return [run for run in self.runs if not run.error]
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """{name: values, shape (runs,)}: variables, measures (nan where a run failed), seconds, error."""
+        """Columns of the table, {name: values, shape (runs,)}: variables, measures (nan if failed), seconds, error."""
         found: dict[str, Any] = {name: [run.values[name] for run in self.runs] for name in self.variables}
         found |= {name: [run.measures.get(name, math.nan) for run in self.runs] for name in self.measures}
         found |= {"seconds": [run.seconds for run in self.runs], "error": [run.error for run in self.runs]}
@@ -129,17 +134,24 @@ class Study(Sheet):
 
     @property
     def best(self) -> StudyRun:
-        """The run that comes nearest to the first goal.
+        """Run with the best value of the first goal.
 
         Raises:
-            InputError: the study has no goal, or no run that did not fail.
+            InputError: the study has no goal, or all runs failed.
         """
         if not self.goal or not self.good:
             raise InputError("Study.best: the study has no goal" if not self.goal else "Study.best: all runs failed")
         return min(self.good, key=self._distance)
 
     def pareto(self, a: str, b: str) -> list[StudyRun]:
-        """The runs that no other beats in two measures at once, by the first; each to its goal, else to the largest."""
+        """Return the Pareto front of two measures, sorted by the first.
+
+        Args:
+            a, b: names of the measures; each is optimised to its goal, without a goal to the largest value.
+
+        Returns:
+            Runs that no other run beats in both measures.
+        """
         signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
         points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
         front = [run for run, p in zip(self.good, points)
@@ -147,10 +159,16 @@ class Study(Sheet):
         return sorted(front, key=lambda run: run.measures[a])
 
     def effects(self, measure: str) -> dict[str, dict[float, float]]:
-        """Main effects: {variable: {level: mean of the measure over the runs at that level}}.
+        """Return the main effects on a measure.
 
-        Where runs failed, the means are those of the sum of effects that fits the others best (least squares): else a
-        level would be judged by what failed beside it.
+        After failures an additive model is fitted to the other runs by least squares. This keeps a level's mean
+        independent of the failed combinations.
+
+        Args:
+            measure: name of the measure.
+
+        Returns:
+            {variable: {level: mean of the measure over the runs at this level}}.
         """
         self._known(measure)
         values = np.array([run.measures[measure] for run in self.good])
@@ -164,32 +182,57 @@ class Study(Sheet):
                 for (name, of), part, own in zip(levels.items(), parts, usual)}
 
     def plot_effects(self, measure: str) -> Any:
-        """Draw the main effects on a measure, and every run; returns the matplotlib figure."""
+        """Draw the main effects on a measure, and every run.
+
+        Args:
+            measure: name of the measure.
+
+        Returns:
+            The matplotlib figure.
+        """
         return effects.main_effects(self.good, self.effects(measure), measure)
 
     def plot_pareto(self, a: str, b: str) -> Any:
-        """Draw two measures of all runs against each other, and those that no other beats; the matplotlib figure."""
+        """Draw two measures of all runs against each other, with the Pareto front.
+
+        Args:
+            a, b: names of the measures.
+
+        Returns:
+            The matplotlib figure.
+        """
         return effects.pareto(self.good, self.pareto(a, b), a, b)
 
     def report(self, file: Any, title: str = "Study") -> None:
-        """Write one HTML file: the best, main effects, Pareto fronts of the goals, all runs."""
+        """Write an HTML report: best run, main effects, Pareto fronts of the goals, all runs.
+
+        Args:
+            file: path of the file.
+            title: heading of the page.
+
+        Returns:
+            Path of the file.
+        """
         replace(file, lambda stream: stream.write(effects.page(self, title)))
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
                executor: futures.Executor | None = None) -> StudyRun:
-        """Search between the runs for the best, by the method of Nelder and Mead from the best run; all runs are kept.
+        """Improve the best run by the Nelder-Mead method with bounds; all runs are kept.
 
-        Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy, with bounds. For few
-        variables whose effect is smooth. A run that fails counts as worse than all others.
+        Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy. It suits few
+        variables with a smooth effect. A failed run counts as worse than all others.
 
         Args:
-            evaluations: at most this number of more runs, one after the other.
-            within: {variable: (lowest, highest)}; a variable without a range stays at its best. Default: all that
-                vary, within the ranges of the study.
-            executor: as in `study`; default: a process of its own.
+            evaluations: maximum number of further runs, one after the other.
+            within: {variable: (lowest, highest)}; a variable without a range keeps its best value. Default: all varied
+                variables, within the ranges of the study.
+            executor: as in `study`; default: a new process.
+
+        Returns:
+            The best run.
 
         Raises:
-            InputError: no goal, no run that did not fail, a variable that is not known.
+            InputError: no goal, no successful run, or an unknown variable.
         """
         from scipy.optimize import minimize
         start, evaluations = self.best, count("refine: evaluations", evaluations)
@@ -229,7 +272,7 @@ class Study(Sheet):
                                     for text in run.warnings)])
 
     def _edges(self) -> list[str]:
-        """The variables whose best value is the last that was run on its side, in words."""
+        """Return the variables whose best value is the first or last one tried, as text."""
         found = []
         for name in self.variables:
             values = [run.values[name] for run in self.runs]
@@ -249,9 +292,9 @@ class Study(Sheet):
         return measure
 
     def _keep(self, run: StudyRun) -> None:
-        """Take up a run, and write it to the folder."""
+        """Add a run, and write it to the folder."""
         if self._folder is not None:
-            # numbered behind all others; the values tell apart two that are written at once
+            # numbered last; the values keep the names of simultaneous files apart
             last = max((int(file.name[4:9]) for file in _files(self._folder)), default=-1)
             values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())
             file = self._folder / f"run-{last + 1:05d}-{values:08x}.json"
@@ -262,24 +305,27 @@ class Study(Sheet):
 def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | Sequence[Mapping[str, float]],
           measure: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
           executor: futures.Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
-    """Run a script with many sets of numbers, and measure each.
+    """Run a script with many sets of values, and measure each run.
 
-    The first run goes alone, so that forms are compiled once for all; then as many at a time as there are workers.
+    The first run goes alone, so that the forms are compiled only once. The others run in parallel.
 
     Args:
-        build: called with one value for each variable, by name; gives back a path. Under an MPI executor it must make
-            its mesh on `MPI.COMM_SELF`.
-        variables: {name: values}: all their combinations; or a list of {name: value}, one for each run.
-        measure: {name: a function of the path that gives a number, or the name of a column, at the last state}.
-        goal: {measure: "max" or "min"}: the best run, the first before the others.
-        folder: where runs are kept as they come in; those in it are not run again.
-        executor: any of `concurrent.futures`, `mpi4py.futures.MPIPoolExecutor` for one; default: processes of this
-            machine. What is run in other processes must be importable: no lambda, no function inside another.
-        workers: how many processes at a time; default one for each core.
+        build: function of the variables, by name, that returns a path. Under an MPI executor it must make its mesh on
+            `MPI.COMM_SELF`.
+        variables: {name: values} for all combinations, or a list of {name: value}, one for each run.
+        measure: {name: a function of the path that returns a number, or the name of a column, at the last state}.
+        goal: {measure: "max" or "min"}; the first one defines the best run.
+        folder: folder for the results of the runs. Runs stored there are not repeated.
+        executor: an executor of `concurrent.futures`, or `mpi4py.futures.MPIPoolExecutor`. Default: processes of this
+            machine. Functions run in other processes must be importable: no lambda, no function inside another.
+        workers: number of parallel processes; default one per core.
         progress: show a progress bar.
 
+    Returns:
+        The `Study`, with the failed runs.
+
     Raises:
-        InputError: an argument that is not allowed; a folder of another study. A run that fails raises nothing.
+        InputError: an argument that is not allowed, or a folder of another study.
 
     >>> from concurrent.futures import ThreadPoolExecutor
     >>> def build(c10):
@@ -316,7 +362,7 @@ def _shown(numbers: Mapping[str, float]) -> str:
 
 
 def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
-    """The runs as they finish; the first one alone."""
+    """Yield the runs as they finish; the first one runs alone."""
     for some in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in some}
         for job in futures.as_completed(jobs):
@@ -325,7 +371,7 @@ def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
 
 
 def _pool(executor: futures.Executor | None, workers: int) -> Any:
-    """The user's executor, left open; or processes of our own, which end with the block."""
+    """Yield the user's executor, which stays open, or a pool of processes, which is closed after the block."""
     if executor:
         return nullcontext(executor)
     from multiprocessing import get_context  # costs time, which others do not spend
@@ -333,7 +379,11 @@ def _pool(executor: futures.Executor | None, workers: int) -> Any:
 
 
 def design(variables: Any) -> list[dict[str, float]]:
-    """The sets of numbers of a study, one {name: value} for each run; see `study`."""
+    """Return the sets of values of a study, {name: value} for each run; see `study`.
+
+    Raises:
+        InputError: variables or values that are not allowed.
+    """
     if isinstance(variables, Mapping):
         levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
                   for name, values in variables.items()}
@@ -365,7 +415,11 @@ def _check_importable(task: _Task) -> None:
 
 
 def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
-    """The folder, made or checked."""
+    """Return the folder, made or checked.
+
+    Raises:
+        InputError: a folder of another study.
+    """
     about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
              "measures": list(task.measure)}
     file = folder / "study.json"
@@ -381,7 +435,11 @@ def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
 
 
 def _there(folder: FilePath, variables: list[str]) -> list[StudyRun]:
-    """The runs in a folder, one for each set of values."""
+    """Return the runs stored in a folder, one for each set of values.
+
+    Raises:
+        InputError: a file that cannot be read.
+    """
     found: list[StudyRun] = []
     for file in sorted(_files(folder)):
         try:
