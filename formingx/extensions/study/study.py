@@ -209,9 +209,6 @@ class Study(Sheet):
         Args:
             file: path of the file.
             title: heading of the page.
-
-        Returns:
-            Path of the file.
         """
         replace(file, lambda stream: stream.write(effects.page(self, title)))
 
