@@ -1,4 +1,4 @@
-"""A run beside another program's curve: differences, limit points and a picture."""
+"""Comparison of a run with another program's curve: differences, limit points, and a figure."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from ...io import csv_files
 from ...results import files
 from ...results.show import plots
 
-_SAMPLES = 2000                    # of a curve
+_SAMPLES = 2000                    # of a curve, for the arc length
 _FINE = 33                         # of the two pieces that meet at a sample
 _MOST = 10_000                     # points of theirs: each is measured against every sample
-_LARGEST = 1e100                   # range of a side over that of the other: its square is a number
+_LARGEST = 1e100                   # largest ratio of the two ranges: its square stays finite
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Theirs minus ours, of one column, at the points of theirs.
+    """Difference of one column, theirs minus ours, at their points.
 
     Attributes:
-        values: at every compared point, shape (n,). range: of our column.
-        maximum: the largest |value|; at: its index among the compared points. rms: root mean square along the curve.
+        values: differences at the n compared points, shape (n,).
+        range: range of our column.
+        maximum: largest |value|.
+        at: index of the largest among the compared points.
+        rms: root mean square along the curve.
     """
 
     values: np.ndarray
@@ -42,17 +45,17 @@ class Comparison:
     """Result of `compare`; its text is a report.
 
     Attributes:
-        columns: the compared columns, by our names.
-        ours, theirs: the two sides as points in order, shape (n, columns), in our units.
+        columns: compared columns, by our names.
+        ours, theirs: both sides as ordered points, shape (n, columns), in our units.
         line: our curve as compared, shape (m, columns).
-        pairs: the points of `theirs` that were compared (indices), and their partners on our curve, shape (k, columns).
+        pairs: indices of the compared points of `theirs`, and their partners on our curve, shape (k, columns).
         differences: {column: `Difference`}.
-        along: the column that is the independent variable, at which the others are compared; "": none, by arc length.
-        limit_points: ours and theirs, each a list of {column: value}: those that a run located, else those of the
-            parabola through the three points where the control (pressure or travel; else the first column) turns.
-        resolution: how much each side's curve changes, as a share of the ranges, if every other point is left out: a
-            difference below a tenth of that may come from drawing curves through points (a `Path` knows its tangents
-            too: its curve is better than this says).
+        limit_points: (ours, theirs), each a list of {column: value}. They are located by the run, else on the parabola
+            through the three points at which the control turns (pressure or travel, else the first column).
+        resolution: change of each side's curve, relative to the ranges, if every second point is left out. A difference
+            below a tenth of it may come from interpolation. A `Path` also knows its tangents: its curve is more
+            accurate.
+        along: independent column at which the others are compared; "" for the arc length.
     """
 
     columns: list[str]
@@ -67,7 +70,7 @@ class Comparison:
 
     @property
     def beyond(self) -> int:
-        """Number of their points that lie beyond the ends of our curve and were left out."""
+        """Number of their points beyond the ends of our curve, which are left out."""
         return len(self.theirs) - len(self.pairs[0])
 
     def __str__(self) -> str:
@@ -97,7 +100,11 @@ class Comparison:
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """Both curves (first column over second), and the differences along the curve; returns the figure."""
+        """Draw both curves (first column over second), and the differences along the curve.
+
+        Returns:
+            The matplotlib figure.
+        """
         figure, (left, right) = plots.figure(2)
         y, x = self.columns[:2]
         line, = left.plot(self.line[:, 1], self.line[:, 0], label="ours")
@@ -115,7 +122,12 @@ class Comparison:
         return figure
 
     def to_csv(self, file: Any, comm: Any = MPI.COMM_WORLD) -> None:
-        """One row per compared point: both values and the difference of every column (rank 0 of `comm` writes)."""
+        """Write a row per compared point: both values and the difference of every column (rank 0 writes).
+
+        Args:
+            file: path of the CSV file.
+            comm: MPI communicator.
+        """
         header = [f"{c}_{side}" for c in self.columns for side in ("theirs", "ours", "difference")]
         theirs = self.theirs[self.pairs[0]]
         rows = np.stack([theirs, self.pairs[1], theirs - self.pairs[1]], 2).reshape(len(theirs), -1)
@@ -124,27 +136,31 @@ class Comparison:
 
 def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str] | None = None,
             units: Mapping[str, float | str] | None = None, along: str | None = None) -> Comparison:
-    """Compare a run with another program's curve, also one that turns back.
+    """Compare a run with another program's curve, which may turn back.
 
-    A side is a curve in the space of the columns, with its rows in order along it. A column that grows, or falls, all
-    along both sides is the independent variable (of several the one over which the curve is least steep): the others
-    are compared at the same value of it, as walls at the same radius. Where every column turns back, points are paired
-    by arc length: each column is divided by its range, both arc lengths grow together and the sum of squared distances
-    is least. Then a shift along the curve is none: differences are those across it. Points of theirs beyond our ends
-    are left out, and counted.
+    Each side is a curve in the space of the columns, with its rows in order. A column that is monotonic on both sides
+    is the independent variable. The others are compared at equal values of it, as walls at the same radius. Of several
+    such columns the one with the flattest curve is chosen.
+
+    If every column turns back, points are paired by arc length. Each column is divided by its range. Both arc lengths
+    increase together, and the sum of squared distances is minimal. So a shift along the curve counts as no difference:
+    differences are measured across it. Their points beyond our ends are left out and counted.
 
     Args:
-        ours: a `Path`, a CSV file (of `Path.to_csv`, for one), or {column: values}.
-        theirs: the same choice. In CSV a header names the columns; it may state units, as "pressure [psi]".
-        columns: {our name: their name}, or names that both sides share; at least two. Default: the controlled
-            quantity and the next measure of ours that theirs also has.
-        units: {our name: factor} that turns their values into our units, or {our name: our unit} where their header
-            states theirs ("m", "cm", "mm", "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
-        along: our name of the independent variable, or "arc length"; default as said.
+        ours: a `Path`, a CSV file (for example of `Path.to_csv`), or {column: values}.
+        theirs: the same choice. The header of a CSV file names the columns and may state units, as "pressure [psi]".
+        columns: {our name: their name}, or names on both sides; at least two. Default: the controlled quantity and the
+            next column of ours that theirs also has.
+        units: {our name: factor} to our units, or {our name: our unit} if their header states theirs ("m", "cm", "mm",
+            "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
+        along: our name of the independent variable, or "arc length"; default as above.
+
+    Returns:
+        The `Comparison`.
 
     Raises:
-        InputError: a file that cannot be read, an unknown column or unit, a column that does not vary, rows that run
-            backwards, or no point in common.
+        InputError: a file that cannot be read, an unknown column or unit, a constant column, rows that run backwards,
+            or no common point.
 
     >>> other = {"pressure": 1.01 * path["pressure"], "pole_height": path["pole_height"]}
     >>> compared = fx.compare(path, other)
@@ -198,7 +214,7 @@ def _table(side: str, given: Any) -> csv_files.Table:
 
 
 def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[str, str]:
-    """{our name: their name}, checked."""
+    """Return {our name: their name}, checked."""
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
         pairs = {c: c for c in shared[:2]}
@@ -227,10 +243,11 @@ def _arc_length(points: np.ndarray) -> np.ndarray:
 
 
 class Smooth:
-    """A curve through points, by arc length: Akima's, which a kink (a first contact) does not make wiggle.
+    """Curve through points by arc length, with Akima's interpolation: a kink (a first contact) causes no oscillation.
 
     Attributes:
-        s, line: `_SAMPLES` arc lengths, evenly spread, and the points there, shape (m, columns).
+        s: `_SAMPLES` equidistant arc lengths.
+        line: points there, shape (m, columns).
     """
 
     def __init__(self, points: np.ndarray):
@@ -243,7 +260,7 @@ class Smooth:
         self.line = self.at(self.s)
 
     def foot(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
-        """The point nearest to `point` between the neighbours of sample k; is `point` rather beyond the curve's end?"""
+        """Return the closest point between the neighbours of sample k, and True if `point` is beyond the end."""
         low, high = max(k - 1, 0), min(k + 1, _SAMPLES - 1)
         line = self.at(np.linspace(self.s[low], self.s[high], _FINE))
         d = np.diff(line, axis=0)
@@ -261,7 +278,7 @@ class Smooth:
 
 
 def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Least sum of squared distances up to point i whose partner is sample j, shape (points, samples)."""
+    """Return the minimum sum of squared distances up to point i with partner sample j, shape (points, samples)."""
     cost = np.stack([((line - p) ** 2).sum(1) for p in points])
     for i in range(1, len(points)):
         cost[i] += np.minimum.accumulate(cost[i - 1])
@@ -269,7 +286,7 @@ def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def _pair(points: np.ndarray, curve: Smooth) -> tuple[np.ndarray, np.ndarray]:
-    """(indices of the points that have a partner, their partners on the curve); both run forward."""
+    """Return the indices of the points with a partner, and their partners on the curve; both in increasing order."""
     n, line = len(points), curve.line
     if n > _MOST:
         raise InputError(f"compare: theirs has {n} points; at most {_MOST} can be compared: thin it out")
@@ -287,7 +304,7 @@ def _pair(points: np.ndarray, curve: Smooth) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
-    """Number of the column that is the independent variable; None: arc length. a, b: both sides, scaled."""
+    """Return the number of the independent column, or None for the arc length."""
     rising = [k for k in range(len(names)) if _rises(a[:, k]) and _rises(b[:, k])]
     if along is None:
         return min(rising, key=lambda k: _steepest(a, k), default=None)
@@ -301,26 +318,26 @@ def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | No
 
 
 def _rises(values: np.ndarray) -> bool:
-    """True if values rise, or fall, all the way."""
+    """Return True if values are monotonic."""
     steps = np.diff(values)
     return bool(np.all(steps > 0) or np.all(steps < 0))
 
 
 def _steepest(points: np.ndarray, k: int) -> float:
-    """Largest slope of a curve over column k."""
+    """Return the largest slope of a curve over column k."""
     steps = np.abs(np.diff(points, axis=0))
     return float((steps.max(1) / steps[:, k]).max())
 
 
 def _over(points: np.ndarray, k: int) -> Any:
-    """The curve through points as a function of column k, which rises or falls."""
+    """Return the curve through points as a function of the monotonic column k."""
     from scipy.interpolate import Akima1DInterpolator, interp1d
     points = points[np.argsort(points[:, k])]
     return (Akima1DInterpolator if len(points) > 3 else interp1d)(points[:, k], points, axis=0)
 
 
 def _at_same(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """(indices of the points within the curve's ends, their partners on it): at the same value of column k."""
+    """Return the indices of the points within the curve's ends, and their partners at equal values of column k."""
     low, high = curve[:, k].min(), curve[:, k].max()
     inside = np.flatnonzero((points[:, k] >= low - 1e-9) & (points[:, k] <= high + 1e-9))
     return inside, _over(curve, k)(np.clip(points[inside, k], low, high))
@@ -329,7 +346,7 @@ def _at_same(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray,
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
     s = _arc_length(partners)
     weights = np.ones(len(s))
-    if s[-1] > 0:                                                   # trapezoids: crowded points do not count more
+    if s[-1] > 0:                                                   # trapezoidal weights
         weights = (np.diff(s, prepend=s[0]) + np.diff(s, append=s[-1])) / 2
     at = int(np.argmax(np.abs(values)))
     return Difference(values, float(size), float(abs(values[at])), at,
@@ -337,8 +354,7 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
 
 
 def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
-    """Return the limit points that the table marks; else those where the control turns, on a parabola of three
-    points."""
+    """Return the limit points marked in the table, else the turning points of the control on parabolas."""
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]
     from scipy.signal import find_peaks

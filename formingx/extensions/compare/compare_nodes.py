@@ -1,4 +1,4 @@
-"""Displacements node by node: written for other solvers, and compared with theirs."""
+"""Nodal displacements: export for other solvers, and comparison with their results."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class NodalComparison:
     """Result of `compare_nodes`; its text is a report.
 
     Attributes:
-        nodes: their numbers, shape (n,).
-        points: reference (R, Z), in three dimensions (X, Y), shape (n, 2), our unit of length.
+        nodes: numbers of the n nodes, shape (n,).
+        points: reference positions (R, Z), in three dimensions (X, Y), shape (n, 2), our unit of length.
         ours, theirs: displacements (u_r, u_z), shape (n, 2), in three dimensions (u_x, u_y, u_z), shape (n, 3), our
             unit of length.
-        largest: our largest displacement: the scale of the differences.
+        largest: our largest displacement, the scale of the differences.
     """
 
     nodes: np.ndarray
@@ -41,7 +41,7 @@ class NodalComparison:
 
     @property
     def difference(self) -> np.ndarray:
-        """Length of theirs minus ours at each node, shape (n,)."""
+        """Norm of the displacement difference at each node, shape (n,)."""
         return np.linalg.norm(self.theirs - self.ours, axis=1)
 
     @property
@@ -67,7 +67,11 @@ class NodalComparison:
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """Draw the deformed nodes of both, z over r (in space over x); returns the figure."""
+        """Draw the deformed nodes of both sides, z over r (in three dimensions over x).
+
+        Returns:
+            The matplotlib figure.
+        """
         figure, axes = plots.figure()
         rest = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
@@ -83,15 +87,17 @@ class NodalComparison:
 def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
     """Write node, R, Z, u_r, u_z of every node of a state as CSV, in the user's unit of length (rank 0 writes).
 
-    Of a sheet in three dimensions: node, X, Y, u_x, u_y, u_z.
+    For a sheet in three dimensions the columns are node, X, Y, u_x, u_y, u_z.
 
     Args:
-        state: of the path; default: the last.
-        mesh: a text mesh file (`formingx.mesh.Grid`) whose nodes and numbers are taken; default: those of the run's own
-            mesh as `mesh.write` numbers them (one rank only).
+        path: the path.
+        file: path of the CSV file.
+        state: a state of the path; default: the last.
+        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the nodes and their numbers. Default: the run's own
+            mesh, numbered as by `mesh.write` (one rank only).
 
     Raises:
-        InputError: the mesh file cannot be read, or a node of it lies outside the run's mesh.
+        InputError: the mesh file cannot be read, or one of its nodes lies outside the run's mesh.
 
     >>> fx.write_nodes(path, "nodes.csv")
     >>> open("nodes.csv").readline().strip()
@@ -106,18 +112,22 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
 def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.PathLike | None = None,
                   columns: Mapping[str, str] | None = None,
                   units: Mapping[str, float | str] | None = None) -> NodalComparison:
-    """Compare a state with another program's nodal displacements, at its nodes, wherever in our mesh they lie.
+    """Compare a state with another program's nodal displacements, at its nodes; the meshes may differ.
 
     Args:
-        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node; of a sheet in
-            three dimensions with u_x, u_y, u_z and X, Y.
-        state: of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
-        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the coordinates of the numbered nodes, in our unit.
-        columns: {our name: their name} for columns that are called otherwise.
+        path: the path.
+        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node. For a sheet in three
+            dimensions u_x, u_y, u_z and X, Y.
+        state: a state of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
+        mesh: a text mesh file (`formingx.mesh.Grid`) with the coordinates of the numbered nodes, in our unit.
+        columns: {our name: their name} for columns with other names.
         units: as for `compare`, by our column names: R, Z, u_r, u_z.
 
+    Returns:
+        The `NodalComparison`.
+
     Raises:
-        InputError: a file that cannot be read, a column, unit or node that is not known, or a node outside our mesh.
+        InputError: a file that cannot be read, an unknown column, unit or node, or a node outside our mesh.
 
     >>> fx.write_nodes(path, "nodes.csv")                                   # or what another program wrote
     >>> found = fx.compare_nodes(path, "nodes.csv")
@@ -161,7 +171,7 @@ def _columns(path: Any) -> list[str]:
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
-    """u at reference points in a state (default: the last), shape (n, components)."""
+    """Return the displacements at reference points in a state (default: the last), shape (n, components)."""
     problem, state = path.problem, state or path.last
     with problem.state_context(state):
         return probe(problem, points).displacement(problem.x)

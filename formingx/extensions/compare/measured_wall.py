@@ -1,4 +1,4 @@
-"""Measured walls of a formed part beside those of a run."""
+"""Comparison of the measured wall of a formed part with a run."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ _REFERENCE = ("reference_length", "R")
 
 @dataclass(frozen=True, eq=False)
 class MeasuredWall:
-    """Wall thickness that was measured at points of a formed part.
+    """Measured wall thickness at m points of a formed part.
 
     Args:
-        wall: shape (m,), length.
-        length: along the section of the part, from the axis, on its middle line, shape (m,), length; or
+        wall: thickness, shape (m,), length.
+        length: arc length along the middle line of the part, from the axis, shape (m,), length; or
         points: (r, z) on the section, shape (m, 2), length; or
-        reference_length: where the points were on the flat sheet (as by a printed grid), shape (m,), length.
+        reference_length: positions on the flat sheet (for example of a printed grid), shape (m,), length.
 
     Raises:
-        InputError: not just one place is given, a wall is not above 0, or the shapes do not fit.
+        InputError: not exactly one kind of position, a wall that is not positive, or shapes that do not agree.
 
     >>> part = fx.MeasuredWall(wall=[0.06, 0.1, 0.2], length=[0.0, 5.0, 14.0])
     >>> round(part.compare(path).mean_percent, 1)
@@ -114,7 +114,7 @@ class MeasuredWall:
                               there(profile.wall_thickness), away, path.problem.comm)
 
     def _numbers(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Places on the middle line as (fractional) numbers of its points, and their distances from it, shapes (m,)."""
+        """Return the (fractional) point numbers on the middle line, and the distances from it, shape (m,) each."""
         numbers = np.arange(len(profile.middle), dtype=float)
         if self.points is None:
             name = "length" if self.length is not None else "reference_length"
@@ -135,10 +135,11 @@ class MeasuredWall:
 
 
 class WallComparison:
-    """Computed walls beside measured ones; print it, `.plot()`, `.to_csv(file)`.
+    """Computed and measured walls; print it, `.plot()`, `.to_csv(file)`.
 
     Attributes:
-        length, reference_length: where the m points are on the computed part, shape (m,), length.
+        length: arc lengths of the m points on the computed part, shape (m,), length.
+        reference_length: reference arc lengths, shape (m,), length.
         measured, computed: walls, shape (m,), length.
         away: distance of the measured points from the computed middle line, or beyond its end, shape (m,), length.
     """
@@ -175,10 +176,13 @@ class WallComparison:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw measured and computed walls, and the deviation in %, over the length; returns two matplotlib axes.
+        """Draw measured and computed walls, and the deviation in %, over the length.
 
         Args:
-            axes: a pair of them; default a new figure.
+            axes: a pair of matplotlib axes; default a new figure.
+
+        Returns:
+            The two matplotlib axes.
         """
         if axes is None:
             from ...figures import figure
@@ -195,7 +199,14 @@ class WallComparison:
         return axes
 
     def to_csv(self, file: Any) -> FilePath:
-        """Write the table (rank 0 writes); returns where it is."""
+        """Write the table (rank 0 writes).
+
+        Args:
+            file: path of the CSV file.
+
+        Returns:
+            Path of the file.
+        """
         columns: Mapping[str, np.ndarray] = {
             "length": self.length, "reference_length": self.reference_length, "measured": self.measured,
             "computed": self.computed, "deviation_percent": self.deviation_percent, "away": self.away}

@@ -1,4 +1,4 @@
-"""New meshes for deformed bodies during a run."""
+"""Remeshing of deformed bodies during a run."""
 
 from typing import Any
 

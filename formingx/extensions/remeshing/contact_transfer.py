@@ -1,7 +1,7 @@
 """Transfer of contact tractions from the old to the new mesh of a remeshed body.
 
-On one rank. Values are linear between neighbouring points of the other face. At a node on the axis, whose share of the
-area is a rule's choice (`Lobatto`), the pressure is that beside it, and there is no friction.
+On one rank. Values are interpolated linearly between neighbouring points of the old face. A node on the axis has an
+area that only the quadrature rule defines (`Lobatto`). It takes the pressure of its neighbour, without friction.
 """
 
 from __future__ import annotations
@@ -16,11 +16,15 @@ from ...physics.contact_law import Touch
 
 
 class Worn(NamedTuple):
-    """A face in contact as a state leaves it: its n points in m pairs of neighbours.
+    """Contact state of a face on the old mesh, with n points in m pairs of neighbours.
 
-    position, distance: seen from the tool, shapes (n, 2), (n,), length; touches: shape (n,); traction: pressure and
-    friction over present area, shape (n, 2), stress; pairs: shape (m, 2); slip: the largest elastic slip, over
-    thickness.
+    Attributes:
+        position: positions in the frame of the tool, shape (n, 2), length.
+        distance: distances from the tool, shape (n,), length.
+        touches: mask of points in contact, shape (n,).
+        traction: pressure and friction per present area, shape (n, 2), stress.
+        pairs: pairs of neighbours, shape (m, 2).
+        slip: largest elastic slip over the thickness.
     """
 
     position: np.ndarray
@@ -32,7 +36,13 @@ class Worn(NamedTuple):
 
     @classmethod
     def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> Worn:
-        """fields: owned unknowns."""
+        """Return the contact state of a face.
+
+        Args:
+            face: the face on the old mesh.
+            fields: locally owned unknowns.
+            control: value of the control.
+        """
         found, rule, x = face.tractions(fields, control), face.rule, face.positions(fields, control)
         assert isinstance(rule, Lobatto)
         share = np.divide(rule.area, rule.lumped, out=np.zeros_like(rule.area), where=rule.has_area)
@@ -47,9 +57,9 @@ class Worn(NamedTuple):
         return cls(x, d, touches, traction, pairs, slip)
 
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return the motion out of the tool of points, shape (n, 2), at distances d, length.
+        """Return the motion out of the tool of points x, shape (n, 2), at distances d, shape (n,), length.
 
-        No point of the body lies deeper in it than points in contact beside it; between two that touch as deep as they.
+        A point is moved until it is as deep as its neighbours in contact.
         """
         pair, share = self._near(x)
         both = self.touches[pair]
@@ -58,13 +68,13 @@ class Worn(NamedTuple):
         return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
 
     def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(pressure, friction, whether both neighbours touch) at points, shape (n,) each."""
+        """Return (pressure, friction, mask of points between two contacts) at points x, shape (n,) each."""
         pair, share = self._near(x)
         found = _between(self.traction[pair], share[:, None])
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
     def _near(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The nearest pair of neighbours to points, shape (n, 2), and how far from the first to the second, (n,)."""
+        """Return the nearest pair of neighbours, shape (n, 2), and the position between its points, shape (n,)."""
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         by = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", by, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
@@ -73,8 +83,16 @@ class Worn(NamedTuple):
 
 
 def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float) -> None:
-    """A face carries the same pressure and friction per present area as on the mesh before, however deep it lies in the
-    tool: distances count from where it has that pressure. fields: owned unknowns."""
+    """Give a new face the pressure and friction per present area of the old one.
+
+    The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.
+
+    Args:
+        face: the face on the new mesh.
+        worn: contact state on the old mesh.
+        fields: locally owned unknowns.
+        control: value of the control.
+    """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)
@@ -90,12 +108,12 @@ def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float)
     if law.has_friction:
         held = law.tractions(x, Touch(x, depth, none + 1e-9 * theta, x)).tangential
         slip = np.divide(friction * share * 1e-9 * theta, held, out=none.copy(), where=touches & (held != 0))
-        most = 2 * worn.slip * face.thickness            # where next to nothing presses, nothing can hold
+        most = 2 * worn.slip * face.thickness            # no friction without pressure
         slip = np.clip(slip, -most, most)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
     face.put(Memory(Touch(x, distance, slip, x), arrived, np.ones(len(x))))
 
 
 def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return the values between pairs, shape (n, 2, ...)."""
+    """Return the values interpolated between pairs, shape (n, 2, ...)."""
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

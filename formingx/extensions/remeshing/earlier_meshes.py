@@ -1,4 +1,4 @@
-"""A body whose mesh was made again on the way: where points of its first mesh are in the present one, and back."""
+"""Positions of points between the first mesh of a remeshed body and its present one."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ _PARTS = 16                # of an edge, to find the nearest of its points
 
 
 class FollowedProbe(Probe):
-    """The same at points of the first mesh: they are followed from mesh to mesh.
+    """Probe of the displacement at points of the first mesh, tracked from mesh to mesh.
 
     Attributes:
-        points: (R, Z) on the first mesh, shape (n, 2); so_far: how they had moved as the last mesh was made, likewise.
+        points: (R, Z) on the first mesh, shape (n, 2), length.
+        so_far: their displacement when the last mesh was made, shape (n, 2), length.
     """
 
     def __init__(self, problem: Any, points: Any):
@@ -35,8 +36,7 @@ class FollowedProbe(Probe):
 
 
 def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
-    """Return the positions on the first mesh of points of a new mesh, shape (n, 2): fitted to the nodes of the mesh
-    before."""
+    """Return the first-mesh positions of points of a new mesh, shape (n, 2), fitted to the nodes of the old mesh."""
     old, state = preformed.before
     nodes = of_mesh(old.forms.domain)
     first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
@@ -45,7 +45,7 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on(mesh: Any, preformed: Any) -> Any:
-    """The scene of the mesh before on a new one of the body as it was left, with its temperature then."""
+    """Return the scene of the old mesh on a new mesh of the deformed body, with its last temperature."""
     old, state = preformed.before
     if old.temperature is None:
         return old.scene.with_mesh(mesh, preformed)
@@ -67,7 +67,7 @@ def followed(problem: Any, points: np.ndarray) -> np.ndarray:
 
 
 class _Onto:
-    """Puts points that are outside a mesh, or nearly, on its outline."""
+    """Projection of points outside or near the outline of a mesh onto the outline."""
 
     def __init__(self, problem: Any):
         self._edges = Outline(problem.forms).rest
@@ -83,7 +83,7 @@ class _Onto:
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
         s = part[:, None] / _PARTS
         bend = 2 * (a + b - 2 * middle)
-        for _ in range(4):                                   # Newton's method for the nearest point of the parabola
+        for _ in range(4):                                   # Newton's method for the closest point on the parabola
             slope, off = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
             rate = (slope * slope + bend * 2 * off).sum(1, keepdims=True)
             s = np.clip(s - (slope * off).sum(1, keepdims=True) / rate, 0.0, 1.0)

@@ -16,7 +16,7 @@ from .earlier_meshes import scene_on
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """All that makes the problem once more, from its scene, on one rank: in the order that its mesh was made in."""
+    """Return the data from which `load` makes the problem again, on one rank, in the original order of the mesh."""
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
     number = mesh.domain.topology.original_cell_index
@@ -31,13 +31,15 @@ def save(problem: Any) -> dict[str, Any]:
 
 
 def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callable[..., Any]) -> Problem:
-    """The problem on the mesh that `save` gave, after the last state on the mesh before; an InputError if it is not
-    that.
+    """Return the problem on the mesh of `save`, after the last state on the old mesh.
 
     Args:
-        before: the problem and the last state on the mesh before.
+        before: the problem and the last state on the old mesh.
         data: the result of `save`.
-        preformed: makes the earlier deformation from its fields (`Preformed`).
+        preformed: function that makes the earlier deformation from its fields (`Preformed`).
+
+    Raises:
+        InputError: data that `save` did not write.
     """
     scene = before[0].scene
     if scene.mesh.comm.size > 1:

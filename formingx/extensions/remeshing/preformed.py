@@ -1,9 +1,11 @@
-"""A body whose mesh is what it was deformed to: F = grad x . F_old, and how a state continues from there.
+"""A body whose mesh is its deformed shape, F = grad x . F_old, and the transfer of a state to it.
 
-What is carried is b = F F^T/J, in which stress and energy of a neo-Hookean body are linear: in each new element the
-quadratic field that is nearest to it in the mean over its volume. So the stress does the same virtual work as before in
-every motion of the new elements. (The mean of F is of less stress: what F varies by about it is lost.) With that, det b
-exceeds 1, and so does det F_old: the volume that is kept is det F over it. F_old turns as F did.
+The transferred quantity is b = F F^T/J: stress and energy of a neo-Hookean body are linear in it. In each new element
+it is the quadratic field nearest to b in the mean over the volume. So the stress does the same virtual work as before
+in every motion of the new elements. The mean of F itself would lose the stress of its variation.
+
+The projection raises det b, and det F_old, above 1. The conserved volume is det F divided by det F_old. F_old has the
+rotation of F.
 """
 
 from __future__ import annotations
@@ -21,37 +23,38 @@ from .earlier_meshes import FollowedProbe, first_places, followed
 from .files import save
 
 _QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
-"""Of what is carried, by its values at the corners and at the middles of the edges opposite to them."""
+"""Element of the transferred quantities: values at the corners and at the midpoints of the opposite edges."""
 
 _POSITIONS = basix.ufl.enriched_element([_QUADRATIC, basix.ufl.element("Bubble", "triangle", 3)])
-"""Of positions, by those of the corners, the middles and the centre."""
+"""Element of positions: values at the corners, the midpoints and the centre."""
 
 _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
 """Corners, middles of the edges opposite to them, centre of a cell."""
 
 _LATTICE = np.array([(i, j) for i in range(5) for j in range(5 - i)]) / 4
-"""Places all over a cell."""
+"""Sampling points of a cell."""
 
 _DEGREE = 12
-"""Of the rule for means over new elements, in which old ones end."""
+"""Quadrature degree of means over new elements, which old edges cross."""
 
 _CANDIDATES = 8
-"""Old elements that a point is looked for in."""
+"""Number of old elements in which a point is searched."""
 
 _LEAST = 0.3
-"""Of det b and of the hoop's part in it, over those of the mean: a field that is less somewhere is flattened."""
+"""Smallest det b and hoop part, over the values of the mean: a field below it is flattened."""
 
 
 class Preformed(NamedTuple):
-    """State transfer from the mesh before, of m cells; on one rank.
+    """State of the old mesh with m cells, for transfer to a new mesh; on one rank.
 
     Attributes:
-        x, rest: where corners, middles and centres are now, and were without displacement, shape (m, 7, 2), length.
-        b: what it had brought to that mesh, at corners and middles: entries rr, rz, zz, hoop of b, cos and sin of the
-            rotation, shape (m, 6, 6).
-        pressures: of the pressure fields at the corners, shape (m, 3, fields), dimensionless.
-        held: stiffness of the volume of each point besides (`Model.volume_stiffness`), dimensionless.
-        before: the problem of that mesh, and its last state.
+        x: present positions of corners, midpoints and centres, shape (m, 7, 2), length.
+        rest: their reference positions, shape (m, 7, 2), length.
+        b: deformation at the start of that mesh, at corners and midpoints, shape (m, 6, 6): rr, rz, zz, hoop entry of
+            b, cos and sin of the rotation.
+        pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
+        held: additional volume stiffness of each point (`Model.volume_stiffness`), dimensionless.
+        before: the problem of the old mesh, and its last state.
     """
 
     x: np.ndarray
@@ -106,7 +109,7 @@ class Preformed(NamedTuple):
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
-        """The unknowns of the body as it stands, own part: no displacement, its pressures."""
+        """Return the unknowns of the present body, locally owned entries: no displacement, its pressures."""
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
         for k in range(fitted.shape[2]):
@@ -115,7 +118,7 @@ class Preformed(NamedTuple):
         return x
 
     def _carried(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
-        """`b` and `pressures` of the cells of a formulation on the body as it stands: by least squares in each."""
+        """Return `b` and `pressures` of the cells of a formulation on the present body, by cell-wise least squares."""
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _DEGREE)
         at, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
@@ -135,7 +138,7 @@ class Preformed(NamedTuple):
                 nearest(pressures, np.column_stack([1 - at.sum(1), at])))
 
     def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
-        """The entries of `b` at places of cells, shape (n, 6), and J there, shape (n,)."""
+        """Return the entries of `b` at points of cells, shape (n, 6), and J there, shape (n,)."""
         x, rest, (shapes, *slopes) = self.x[cells], self.rest[cells], _tabulated(_POSITIONS, places, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, rest))
         r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, rest))
@@ -150,9 +153,9 @@ class Preformed(NamedTuple):
         return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
     def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cells that points, shape (n, 2), are in, shape (n,), and where in them, shape (n, 2), by Newton's method.
+        """Return the cells of points, shape (n, 2), and the local coordinates, shape (n, 2), by Newton's method.
 
-        New edges cut corners of old ones: points outside the body are in the element next to them, at its edge.
+        New edges cut corners of old ones: a point outside the body is placed on the edge of the nearest element.
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
@@ -179,12 +182,12 @@ class Preformed(NamedTuple):
 
 
 def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray:
-    """Shape functions, then their derivatives, at places, shape (n, 2): shape (1 or 3, n, functions)."""
+    """Return shape functions and their derivatives at n points, shape (1 or 3, n, functions)."""
     return np.asarray(element.tabulate(derivatives, at)) if len(at) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 
 
 def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
-    """V with V^2 = b in the plane, cos and sin of a rotation, det V: of entries of `Preformed.b`."""
+    """Return V with V^2 = b in the plane, cos and sin of a rotation, and det V, from entries of `Preformed.b`."""
     area = sqrt(rr * zz - rz * rz)
     trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
     off = rz / trace
@@ -192,8 +195,11 @@ def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tupl
 
 
 def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Quadratic fields of the entries of `Preformed.b`, shape (cells, 6, 6), as near to their means, shape (cells, 6),
-    as it takes to be of a body everywhere: where it turns within an element, as beside a corner, they may not be."""
+    """Return quadratic fields of the entries of `Preformed.b` that are positive definite everywhere.
+
+    A rapid rotation within an element, as beside a corner, can make them indefinite. Such fields are moved towards
+    their means, shape (cells, 6), as far as needed. The result has shape (cells, 6, 6).
+    """
     mean = mean[:, None]
     by, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):

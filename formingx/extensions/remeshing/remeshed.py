@@ -1,4 +1,4 @@
-"""A mesh of the interior of a closed outline of curved edges, by gmsh: small elements at corners, names kept."""
+"""Mesh of the interior of a closed curved outline, by gmsh: small elements at corners, boundary names kept."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,24 +11,32 @@ from ...mesh.grid import Grid, to_mesh
 from ...mesh.mesh import Mesh
 
 _GROWTH = 0.3
-"""Of the size of elements, by the distance from a corner."""
+"""Growth of the element size per distance from a corner."""
 
-_FINE = 16                 # straight pieces of an edge, to measure its length
+_FINE = 16                 # straight segments that measure the length of an edge
 
 
 def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
              layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
-    """Six-node triangles inside an outline, with second-order geometry along it; on one rank.
+    """Return a mesh of six-node triangles inside an outline, with second-order geometry along it; on one rank.
 
     Args:
-        edges: of the outline one after the other, each from where the last ended, the body to the left: end, other end,
-            middle, shape (m, 3, 2), length.
-        names: the boundaries that each belongs to.
-        corners: where elements are `corner` long, shape (k, 2); `size` elsewhere, lengths.
-        axisymmetric, volume: R is scaled so that the volume of revolution (else: the area) is this, by default that
-            inside the outline.
-        outside: (points, shape (n, 2), names of their boundaries) -> where they may be, outside tools, length.
+        edges: edges of the outline in counter-clockwise order, each beginning at the end of the last: first end, second
+            end, midpoint, shape (m, 3, 2), length.
+        names: names of the boundaries of each edge.
+        corners: positions of small elements, shape (k, 2), length.
+        size: element size away from the corners, length.
+        corner: element size at the corners, length.
+        layer: name of the layer.
+        axisymmetric: True for a body of revolution.
+        comm: MPI communicator.
+        volume: R is scaled to this volume of revolution (else area); default: the volume inside the outline.
+        outside: function of points, shape (n, 2), and names of their boundaries; it returns the points moved out of the
+            tools, length.
+
+    Raises:
+        InputError: gmsh made no mesh.
     """
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
@@ -86,7 +94,7 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
 
 
 def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
-    """Volume of revolution (area) inside a closed outline of parabolas, the body to the left: exact."""
+    """Return the volume of revolution (or the area) inside a closed outline of parabolas, counter-clockwise; exact."""
     at, weights = np.polynomial.legendre.leggauss(4)
     s = (1 + at) / 2
     shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
@@ -96,7 +104,7 @@ def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
 
 
 def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
-    """New ends, shape (n + 1, 2), and middles, shape (n, 2), on a line of edges; sizes by the distance from corners."""
+    """Return new ends, shape (n + 1, 2), and midpoints, shape (n, 2), on a line of edges, graded to corners."""
     parameter = np.linspace(0, len(edges), _FINE * len(edges) + 1)
 
     def place(t: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Runs whose mesh is made again on the way: the deformed body becomes the reference, F = grad x . F_old.
+"""Runs with remeshing: the deformed body becomes the reference configuration, F = grad x . F_old.
 
-For blocks that are crushed: where the volume ratio J at a quadrature point leaves its range, a new mesh is made of the
-outline as it is now, and takes over what the body carries: deformation so far, pressures, points in contact and with
-which pressure and friction. The state that the new mesh reaches at the same travel is one of kind "remesh".
+For strongly compressed blocks. If the volume ratio J at a quadrature point leaves its range, the present outline is
+meshed again. The new mesh receives the deformation, the pressures, and the contact tractions. Its first state has the
+same travel and the kind "remesh".
 """
 
 from __future__ import annotations
@@ -36,45 +36,45 @@ from .remeshed import enclosed, remeshed
 log = logging.getLogger("formingx")
 
 _SHARES = (1.0, 0.9, 1.1, 0.8)
-"""Sizes that are tried, over what is asked for."""
+"""Element sizes to try, relative to the requested size."""
 
 _GOOD = 0.4
-"""Part of the way from the limits of J to 1 that is good."""
+"""A mesh is good if its J keeps this part of the distance from 1 to the limits."""
 
 _FEWEST = 3
-"""States on a mesh, after which it may be the reason why no state follows."""
+"""Number of states on a mesh from which its quality may be the cause of a failed step."""
 
 _CHANGED = 0.1
-"""A change of the volume of elements from which on the mesh may be the reason."""
+"""Volume change of elements above which the mesh may be the cause."""
 
 _FAILED = 4
-"""At most so many states in a row of which no new mesh is found."""
+"""Maximum number of successive states without a new mesh."""
 
 _CRUSHED = 0.5
-"""Of the least J of a good mesh: an old one with less is not kept for another state."""
+"""Smallest J over the limit of a good mesh: below it the old mesh is not kept for another state."""
 
 _POCKET = 0.25
-"""Of the size of an element: a pocket between the body and a tool that is not so deep is closed."""
+"""Depth over the element size up to which a gap between body and tool is closed."""
 
 _OWN = "step", "counts", "until", "column"
-"""What `Record.complete_step` notes by itself."""
+"""Entries that `Record.complete_step` writes itself."""
 
 _WORN = "the mesh is worn"
-"""Why a run ends whose mesh is to be made again."""
+"""Reason for the end of a run that needs a new mesh."""
 
 
 @dataclass(frozen=True)
 class Remesh:
-    """Criterion for a new mesh, and the sizes of its elements: for `formingx.trace`.
+    """Remeshing criterion and element sizes, for `formingx.trace`.
 
     Args:
-        size: length of an edge of an element, as the body is then.
-        corner: the same where faces meet that tools press on, and where they leave them; default a third of it.
-        volume_ratio: (least, largest) volume ratio J at a quadrature point of a good mesh, of a material that keeps its
-            volume.
+        size: edge length of the elements on the deformed body, length.
+        corner: edge length where faces under tools meet and where contact ends, length; default a third of `size`.
+        volume_ratio: (least, largest) volume ratio J at the quadrature points of a good mesh, for an incompressible
+            material.
 
     Raises:
-        InputError: a size that is not positive, a range that does not hold 1.
+        InputError: a size that is not positive, or a range without 1.
 
     >>> fx.Remesh(size=0.5, corner=0.1)
     Remesh(size=0.5, corner=0.1, volume_ratio=(0.6, 1.5))
@@ -98,7 +98,7 @@ class Remesh:
         _check(caller, scene, targets)
 
     def follow(self, path: Any, tolerances: Tolerances, part: Callable[[], None], done: Callable[[], bool]) -> None:
-        """Continue a path with as many meshes as it needs (`formingx.run_hooks.MeshRenewal`)."""
+        """Continue a path with as many meshes as needed (`formingx.run_hooks.MeshRenewal`)."""
         _follow(path, self, tolerances, part, done)
 
 
@@ -134,26 +134,29 @@ def _check(who: str, scene: Any, targets: Sequence[Target]) -> None:
 
 def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
             done: Callable[[], bool]) -> None:
-    """Follow a path with as many meshes as it takes.
+    """Continue a path with as many meshes as needed.
 
     Args:
-        part: continues from the last state, on the mesh of that, as a run that was interrupted does.
-        done: True if nothing is left to do.
+        path: the path, extended in place.
+        remesh: criterion and sizes.
+        tolerances: tolerances of the states.
+        part: continues from the last state on its mesh, as after an interruption.
+        done: True if the path is complete.
 
     Raises:
-        ConvergenceError: its end was not reached.
+        ConvergenceError: the end of the path was not reached.
     """
     record = path.record
     record.on_state.append(lambda state: _look(record, state, remesh))
     worn = bool(record.states) and _worn(record, record.last, remesh)
     failed: list[State] = []
     while not (worn and done()):
-        record.problem.limit.one_by_one()                    # a mesh that wears is looked at as each node arrives
+        record.problem.limit.one_by_one()                    # check the mesh at each gap closure
         if worn:
             try:
                 _take_up(path, remesh, tolerances)
                 failed = []
-            except ConvergenceError as error:                # the next state may have a mesh
+            except ConvergenceError as error:                # a mesh may succeed at the next state
                 crushed = _ratios(record, record.last)[0] < _CRUSHED * remesh.volume_ratio[0]
                 if crushed or len(failed) == _FAILED or any(record.last is state for state in failed):
                     raise
@@ -165,7 +168,7 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
         except ConvergenceError as error:
             low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
             if len(record.segments[-1].states) < _FEWEST or low > 1 - _CHANGED and high < 1 + _CHANGED:
-                raise                                        # the mesh is not the reason
+                raise                                        # the mesh is not the cause
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _WORN
         worn = record.ended == _WORN
@@ -175,7 +178,7 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
 
 
 def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
-    """Make the mesh again, and take up the first state on it, from which a part goes on with the steps before."""
+    """Remesh and add the first state on the new mesh; a part then continues with the earlier step lengths."""
     record, last = path.record, path.last
     kept = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
     first = record.segments[-1].states[0].stepping.get("step", kept["step"])
@@ -186,7 +189,7 @@ def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
         record.stage = last.stage
         record.accept(start)
     except BaseException:
-        record.segments.pop()                                # a mesh without a state: the path ends before it
+        record.segments.pop()                                # no state on the new mesh: the path ends before it
         raise
     if segment.problem.has_kinks:
         segment.curve.look_ahead(start)
@@ -197,8 +200,10 @@ def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 
 
 def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
-    """A new mesh and the first state on it: of sizes about the one that is asked for the first whose elements keep
-    their volumes well, or else the best."""
+    """Return a new mesh and its first state.
+
+    The first mesh with good J is taken, of several sizes near the requested one; else the best.
+    """
     low, high = remesh.volume_ratio
     found, why = [], ""
     for share in _SHARES:
@@ -226,7 +231,7 @@ def _ratios(record: Record, state: State) -> tuple[float, float]:
 
 
 def _look(record: Record, state: State, remesh: Remesh) -> None:
-    """End the run where a mesh is worn; note of a remeshed state what it changed."""
+    """End the run if its mesh needs renewal; record the changes of a remeshed state."""
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
         force = next((name for name in before if name.endswith("force")), None)
@@ -239,7 +244,7 @@ def _look(record: Record, state: State, remesh: Remesh) -> None:
 
 
 def _worn(record: Record, state: State, remesh: Remesh) -> bool:
-    """True if the mesh of a state is to be made again."""
+    """Return True if the mesh of a state needs renewal."""
     if state.kind in ("start", "remesh"):
         return False
     low, high = _ratios(record, state)
@@ -247,7 +252,7 @@ def _worn(record: Record, state: State, remesh: Remesh) -> bool:
 
 
 def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
-    """A new mesh of the last state's body, elements `share` of the size, and the body in balance there."""
+    """Return a new mesh of the last body, with elements of `share` times the size, and the equilibrium on it."""
     record, old, state = path.record, path.problem, path.last
     scene = old.scene
     outline = Outline(old.forms)
@@ -280,7 +285,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     for new, (_, before, _) in zip(problem.contacts, worn, strict=True):
         take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
-    x = x if setting.fading else _balanced(problem, curve, x, control)      # else the residual fades, too
+    x = x if setting.fading else _balanced(problem, curve, x, control)      # else fade the residual, too
     start = curve.resume(x, control)
     if start.slope * state.slope < 0:
         start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation
@@ -290,7 +295,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
 
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
-    """The state at the same control: by Newton's method, or as the unbalanced forces fade."""
+    """Return the equilibrium at the same control, by Newton's method or by fading the unbalanced forces."""
     first = problem.setting
     problem.x.array_w[:] = x
     try:
@@ -311,13 +316,16 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
         raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh: {error}; give Remesh another size, or"
                                f" a range of volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
-    problem.clock += time - problem.time_at(control)         # of a flow it is no part of the setting
+    problem.clock += time - problem.time_at(control)         # the step data of a flow stage exclude it
     return record.last.x
 
 
 def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
-    """An outline, shape (m, 3, 2), whose nodes between two that touch lie on the line between these, if within a depth
-    of it: where a side rolls onto a plate, a node between may stay behind in a crease."""
+    """Return the outline, shape (m, 3, 2), with shallow pockets closed.
+
+    A node between two contact nodes is moved onto their line if it is within `depth` of it. A side that rolls onto a
+    plate may leave such a node in a crease.
+    """
     nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
     close = 1e-6 * np.ptp(nodes, axis=0).max()
     on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
@@ -330,8 +338,10 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
 
 
 def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, np.ndarray]]) -> np.ndarray:
-    """Points of an outline, shape (n, 2), no deeper in tools than points that touched beside them: edges cut
-    corners."""
+    """Return outline points, shape (n, 2), moved out of tools to the depth of neighbouring contacts.
+
+    Straight edges cut corners of the body.
+    """
     for contact, before, by in worn:
         if contact.contact.on in names:
             near = contact.contact.tool.nearest(x - by)
@@ -340,7 +350,7 @@ def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, n
 
 
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Return the corners between two faces under tools, and the ends of the areas in contact, shape (k, 2)."""
+    """Return the corners between two faces under tools, and the ends of the contact areas, shape (k, 2)."""
     faces = {on for on, _ in touched}
     found = []
     press = np.zeros(len(edges), dtype=bool)

@@ -144,13 +144,10 @@ class Study(Sheet):
         return min(self.good, key=self._distance)
 
     def pareto(self, a: str, b: str) -> list[StudyRun]:
-        """Return the Pareto front of two measures, sorted by the first.
+        """Return the runs that no other run beats in both measures, sorted by the first.
 
         Args:
             a, b: names of the measures; each is optimised to its goal, without a goal to the largest value.
-
-        Returns:
-            Runs that no other run beats in both measures.
         """
         signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
         points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
@@ -159,16 +156,10 @@ class Study(Sheet):
         return sorted(front, key=lambda run: run.measures[a])
 
     def effects(self, measure: str) -> dict[str, dict[float, float]]:
-        """Return the main effects on a measure.
+        """Return the main effects on a measure: {variable: {level: mean over the runs at this level}}.
 
         After failures an additive model is fitted to the other runs by least squares. This keeps a level's mean
         independent of the failed combinations.
-
-        Args:
-            measure: name of the measure.
-
-        Returns:
-            {variable: {level: mean of the measure over the runs at this level}}.
         """
         self._known(measure)
         values = np.array([run.measures[measure] for run in self.good])
@@ -182,34 +173,15 @@ class Study(Sheet):
                 for (name, of), part, own in zip(levels.items(), parts, usual)}
 
     def plot_effects(self, measure: str) -> Any:
-        """Draw the main effects on a measure, and every run.
-
-        Args:
-            measure: name of the measure.
-
-        Returns:
-            The matplotlib figure.
-        """
+        """Draw the main effects on a measure, and every run; return the matplotlib figure."""
         return effects.main_effects(self.good, self.effects(measure), measure)
 
     def plot_pareto(self, a: str, b: str) -> Any:
-        """Draw two measures of all runs against each other, with the Pareto front.
-
-        Args:
-            a, b: names of the measures.
-
-        Returns:
-            The matplotlib figure.
-        """
+        """Draw two measures of all runs, with the Pareto front; return the matplotlib figure."""
         return effects.pareto(self.good, self.pareto(a, b), a, b)
 
     def report(self, file: Any, title: str = "Study") -> None:
-        """Write an HTML report: best run, main effects, Pareto fronts of the goals, all runs.
-
-        Args:
-            file: path of the file.
-            title: heading of the page.
-        """
+        """Write an HTML report: best run, main effects, Pareto fronts of the goals, all runs."""
         replace(file, lambda stream: stream.write(effects.page(self, title)))
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
