@@ -56,7 +56,7 @@ def explain(module: types.ModuleType) -> None:
 
 
 def _explain_class(cls: type) -> None:
-    """The public methods of a class and of its bases; those of what they return when they do."""
+    """Explain the public methods of a class and of its bases, and those of their results."""
     _seen.add(cls)
     for base in cls.__mro__:
         if base.__module__.startswith(_PACKAGE):
@@ -129,7 +129,7 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
 
 
 def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
-    """The names of arguments that a function does not take, with what was meant, as text; or ""."""
+    """Return the names of arguments that a function does not take, with what was meant, as text; or ""."""
     kinds = {p.kind for p in signature.parameters.values()}
     unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [n for n in given if n not in signature.parameters]
     close = {n: difflib.get_close_matches(n, [p for p in signature.parameters if p not in given], 1) for n in unknown}
@@ -187,7 +187,7 @@ def _is(value: Any, kind: Any) -> bool:
 
 
 def _either(kinds: Sequence[Any]) -> list[Any]:
-    """The kinds of a union, in which `ArrayLike`, a union too, is one."""
+    """Return the kinds of a union, in which `ArrayLike`, a union too, is one."""
     array = set(typing.get_args(ArrayLike))
     return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 
@@ -200,7 +200,7 @@ def _numbers(value: Any) -> bool:
 
 
 def _said(kind: Any) -> str:
-    """An annotation as text."""
+    """Return an annotation as text."""
     origin, of = typing.get_origin(kind) or kind, [k for k in typing.get_args(kind) if k is not Ellipsis]
     if kind is np.ndarray or kind == ArrayLike:
         return "numbers"

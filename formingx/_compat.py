@@ -27,12 +27,12 @@ _compiled: dict[str, Any] = {}
 
 
 def compile_form(form: Any) -> Any:
-    """A compiled form."""
+    """Return a compiled form."""
     return _looked_up_once(lambda: fem.form(form, jit_options=JIT_OPTIONS))
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
-    """A compiled expression at points of the reference cell.
+    """Return a compiled expression at points of the reference cell.
 
     Its variables are numbered from 0: with UFL's numbers, which count on in a process and are part of its signature, it
     would be compiled for every problem again.
@@ -105,7 +105,7 @@ def interpolation_points(space: Any) -> Any:
 
 
 def coordinate_map(mesh: Any) -> Any:
-    """The map from reference to physical coordinates of the cells."""
+    """Return the map from reference to physical coordinates of the cells."""
     geometry = mesh.geometry
     return geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
 
@@ -123,7 +123,7 @@ def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
 
 
 def adios4dolfinx() -> Any:
-    """The library that writes and reads checkpoints.
+    """Return the library that writes and reads checkpoints.
 
     Raises:
         InputError: it is not there, or cannot be used.

@@ -14,7 +14,7 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def imported() -> None:
-    """The import is complete: uncaught errors are shown as before it."""
+    """Complete the import: show uncaught errors as before it."""
     if sys.excepthook is _one_line:
         sys.excepthook = _usual
 

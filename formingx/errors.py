@@ -174,7 +174,8 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 
 
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
-    """A user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all are finite.
+    """Return a user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all
+    are finite.
 
     (One that `function` raises goes through.)
     """
@@ -202,7 +203,7 @@ def place(name: str, value: Any) -> Path:
 
 
 def known(kind: str, name: Any, names: Any) -> None:
-    """An InputError that lists the known names unless `name` is one of them."""
+    """Raise an InputError that lists the known names unless `name` is one of them."""
     if not isinstance(name, Hashable) or isinstance(name, bool) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 

@@ -6,5 +6,5 @@ import numpy as np
 
 
 def gathered(comm: Any, own: Any) -> np.ndarray:
-    """The rows of all ranks, one rank after the other, on each of them; collective."""
+    """Return the rows of all ranks, one rank after the other, on each of them; collective."""
     return np.concatenate(comm.allgather(own))

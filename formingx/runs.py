@@ -276,7 +276,7 @@ class Process:
         return path
 
     def _look_again(self, plan: Plan, stands: Callable[[int], float]) -> None:
-        """An InputError if the tools of a stage cannot move as it says, now that their travels are known."""
+        """Raise an InputError if the tools of a stage cannot move as it says, now that their travels are known."""
         contacts = {i: stands(i) for i, item in enumerate(self.scene.items) if item in self.scene.contacts}
         clearance.check(self.scene, [plan], contacts)
 
@@ -294,7 +294,8 @@ class Process:
 
 
 def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
-    """The path in a checkpoint, to look at or to continue from: `trace(scene, until=..., start=load("run", scene))`.
+    """Return the path in a checkpoint, to look at or to continue from: `trace(scene, until=..., start=load("run",
+    scene))`.
 
     Args:
         folder: what `trace(..., checkpoint=folder)` or `Path.save(folder)` wrote, on any number of ranks.
@@ -315,7 +316,7 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
 
 def _after_pilot(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                  run: Callable[[Scene, Any], Path]) -> Path:
-    """The path of a run on the mesh that a first run asks for."""
+    """Return the path of a run on the mesh that a first run asks for."""
     if start is not None or resume:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
                          f" start or resume"
@@ -346,7 +347,7 @@ def _after_pilot(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: 
 
 
 def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
-    """An InputError unless a process of these stages can continue from the state."""
+    """Raise an InputError unless a process of these stages can continue from the state."""
     number = state.setting.get("stage", -1)
     if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
         raise InputError("Process: start: must be a path of this process: its last state belongs to another scene or"
@@ -359,7 +360,7 @@ def _check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 
 def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
           found: list[Finding], timed: bool = False) -> Path:
-    """A path to be solved for by `curve`, that begins with the states of another, or with a state.
+    """Return a path to be solved for by `curve`, that begins with the states of another, or with a state.
 
     found: by the checks before the run, told now.
     """

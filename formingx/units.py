@@ -90,7 +90,7 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """The unit of what a whole body has."""
+        """Return the unit of what a whole body has."""
         return unit
 
     @property
@@ -109,7 +109,7 @@ class Units:
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
     def of(self, column: str) -> str:
-        """The unit of a column of results by its name, "" of numbers without one, or where it is not said."""
+        """Return the unit of a column of results by its name, "" of numbers without one, or where it is not said."""
         if column in _COORDINATES or column.startswith("u_"):
             return self.length or ""
         if column.endswith(("ratio", "stretch", "error")):
@@ -118,12 +118,12 @@ class Units:
         return {"temperature": ""}.get(kind, getattr(self, kind) or "") if kind else ""
 
     def label(self, column: str, words: str = "") -> str:
-        """A column's name as text, with its unit: "plug force, N"."""
+        """Return a column's name as text, with its unit: "plug force, N"."""
         unit = self.of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
 
     def heading(self, column: str) -> str:
-        """A column's name in a file, with its unit: "plug_force [N]"."""
+        """Return a column's name in a file, with its unit: "plug_force [N]"."""
         unit = self.of(column)
         return f"{column} [{unit}]" if unit else column
 

@@ -57,7 +57,7 @@ def _locking(sheet: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _layers(sheet: Body) -> Iterator[Finding]:
-    """A thick layer that one element spans cannot show how strain varies through it.
+    """Warn of one element through a thick layer, which cannot show how the strain varies.
 
     Nor can long elements how a soft one is sheared at a rim: hinged, 1000 times softer, it jumped by 66 % with elements
     of 2.5 thicknesses, by 30 % (at the corner, which is singular) with shorter ones, for any number through it.
@@ -92,7 +92,7 @@ def _layers(sheet: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _fillets(sheet: Body) -> Iterator[Finding]:
-    """Rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
+    """Warn of rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
     for contact in sheet.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -142,7 +142,7 @@ def _contact_penalties(sheet: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _volume_penalty(sheet: Body) -> Iterator[Finding]:
-    """The volume changes by about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
+    """Warn of volume changes of about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
     model = sheet.scene.model
     if not model.solid:
         return

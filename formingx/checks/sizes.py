@@ -71,7 +71,7 @@ class Body(Triangles):
                 self.aims.append(Aim(of, str(of.quantity), most, f"the table of {thing!r} in {stage.who}"))
 
     def say(self, value: float, kind: str) -> str:
-        """A number as text, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
+        """Return a number as text, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
         unit = self._units.of(kind)
         return f"{value:.4g}" + (f" {unit}" if unit else "")
 
@@ -84,7 +84,7 @@ class Body(Triangles):
         return [Aim(of, quantity, target.value, str(target))]
 
     def pressures(self) -> list[tuple[str, float]]:
-        """(what, value) of all pressures that act or are aimed at."""
+        """Return (what, value) of all pressures that act or are aimed at."""
         fixed = [(repr(load), load.value) for load in self.scene.loads
                  if load.quantity == "pressure" and not load.driven]
         return [*fixed, *((aim.text, aim.value) for aim in self.aims if aim.quantity == "pressure")]
@@ -138,7 +138,7 @@ class Pushed:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def left(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """The smallest pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the
+        """Return the smallest pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the
         peak."""
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -174,7 +174,7 @@ def _pressures(body: Body) -> Found:
 
 @register("scene")
 def _bears(body: Body) -> Found:
-    """A free sheet of an energy that does not stiffen has a largest pressure: no state lies above it."""
+    """Warn of pressures above the maximum of a free sheet whose energy does not stiffen."""
     for pushed in body.pushed:
         if body.scene.contacts or (peak := pushed.peak()) is None:
             continue
@@ -189,7 +189,7 @@ def _bears(body: Body) -> Found:
 
 @register("scene")
 def _blow_ratio(body: Body) -> Found:
-    """A tube whose pressure falls far behind its peak bulges at one place; what is blown first is thin in the end."""
+    """Warn of a tube whose pressure falls far behind its peak: it bulges at one place, which ends thin."""
     for pushed in body.pushed:
         if not (pushed.tools and pushed.tall and pushed.round):
             continue
@@ -213,7 +213,7 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _closing(body: Body) -> Found:
-    """A mould that leaves a way straight past it holds only what the sheet bears alone."""
+    """Warn of a mould that the sheet passes by: the free sheet alone bears the pressure."""
     for pushed in body.pushed:
         if not pushed.tools:
             continue
@@ -237,14 +237,14 @@ def _closing(body: Body) -> Found:
 
 
 def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
-    """The direction in which the pressure pushes points, on the mean."""
+    """Return the direction in which the pressure pushes points, on the mean."""
     away = points.mean(0) - pushed._line.mean(0)
     return np.array([0.0, np.sign(away[1])]) if not pushed.tall else np.array([1.0, 0.0])
 
 
 @register("start")
 def _mould_sizes(body: Body) -> Found:
-    """A sheet beside a mould that stays, many times wider or narrower than what it is to be formed into."""
+    """Warn of a sheet many times wider or narrower than its mould."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -264,7 +264,7 @@ def _mould_sizes(body: Body) -> Found:
 
 @register("start")
 def _ways(body: Body) -> Found:
-    """A tool that moves away from its face, or past it."""
+    """Warn of a tool that moves away from its face, or past it."""
     for i, tool in enumerate(body.scene.items):
         if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
             continue

@@ -50,7 +50,7 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
-    """The states of some that can show a touch: with a force on the tool, else all, as side walls bear none along Z."""
+    """Return the states that can show a touch: with a force on the tool, else all, as side walls bear none along Z."""
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
     touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]

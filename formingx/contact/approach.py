@@ -78,7 +78,7 @@ class Approach:
         self._foreseen = 0                                  # points that the step is going to bring, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
-        """True if a point touches the tool."""
+        """Return True if a point touches the tool."""
         return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
@@ -113,7 +113,7 @@ class Approach:
 
     def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
                 ends: bool) -> None:
-        """A step of this length is about to be taken: points arrive at times (arc length, `length`: not), at places.
+        """Prepare a step of this length: points touch at times (arc length, `length`: not), at places.
 
         guessed: which begin where their forces want them, shape (n,); None: none.
         ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
@@ -162,7 +162,7 @@ class Approach:
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """A length, or as much of it as changes the pressure of lagged friction by the tolerance."""
+        """Return a length, or as much of it as changes the pressure of lagged friction by the tolerance."""
         if not self.lags:
             return length
         law, touch = self.face.law, self.face.touch
@@ -183,7 +183,8 @@ class Approach:
         return float(change / (pressure + LIMITS.weak * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
-        """True if sticking points lifted off and sprang back in the step to a state while the gaps of others closed.
+        """Return True if sticking points lifted off and sprang back in the step to a state while the gaps of others
+        closed.
 
         Positions where gaps close depend on which points still stick: a long step gets them wrong.
         """
@@ -199,11 +200,12 @@ class Approach:
         return bool(np.all(found > 0))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """True if a point's straight way from one state to another, seen from the tool, leads through the tool."""
+        """Return True if a point's straight way from one state to another, seen from the tool, leads through the
+        tool."""
         return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
 
     def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """True if a straight way from positions a to b leads deeper than both ends by `StepLimits.cut_off`.
+        """Return True if a straight way from positions a to b leads deeper than both ends by `StepLimits.cut_off`.
 
         So much a point may cut off an edge that it slides over.
         """

@@ -84,7 +84,7 @@ class FaceContact:
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
     def take_temperature(self) -> None:
-        """The temperature has changed: friction follows it.
+        """Update the friction to a changed temperature.
 
         Raises:
             InputError: friction has no finite value at a temperature.
@@ -149,7 +149,7 @@ class FaceContact:
         self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
 
     def leave_out(self, points: np.ndarray) -> None:
-        """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
+        """Keep some points (a mask, shape (n,)) open until another increment begins."""
         law: Any = self.law                                  # see `ContactLaw`
         self.increment = Increment(law.without(points), self.touch)
 
@@ -167,7 +167,7 @@ class FaceContact:
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Derivative of the forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
+        """Return the derivative of the forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -197,7 +197,7 @@ class FaceContact:
             self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._way)))
 
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
-        """Derivative of the tractions by the positions, shape (n, components, components), stress/length."""
+        """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""
         if ahead:
             arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
             return self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
@@ -240,7 +240,7 @@ class FaceContact:
         self._start_at(self.points)
 
     def come_in(self, fields: np.ndarray, control: float) -> None:
-        """The tool comes in: nothing has touched it yet."""
+        """Activate the tool: nothing has touched it yet."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:

@@ -74,7 +74,7 @@ class Increment:
         return self._law.theta
 
     def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
+        """Return the forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
         return self._now[1].force[points], self._now[1].stiffness[points]
 
     def foretold(self, by: np.ndarray) -> Tractions:

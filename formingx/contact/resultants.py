@@ -17,7 +17,7 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Reference length of the face that is in touch; in three dimensions its area.
+    """Return the reference length of the face that is in touch; in three dimensions its area.
 
     The node on the axis bears hardly anything, and stands a little off where its neighbours stick: it counts with them.
     """
@@ -54,7 +54,7 @@ def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
-    """(reference points, shape (m, components), normal and tangential traction per reference area (m, 2)), by R.
+    """Return (reference points, shape (m, components), normal and tangential traction per reference area (m, 2)), by R.
 
     That is force over `lumped` area: their sum is the force. The node on the axis has none: its force counts to the
     middle of its facet, whose pressure it shows (pressure is even in R, tangential traction odd).
@@ -74,7 +74,7 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
 
 
 def _beside(points: np.ndarray, i: int) -> int:
-    """The point next to points[i]."""
+    """Return the point next to points[i]."""
     return int(np.argsort(np.linalg.norm(points - points[i], axis=1))[1])
 
 

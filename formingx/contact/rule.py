@@ -92,7 +92,8 @@ class Lobatto(Rule):
         return values
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """The mean of what the edges on both sides of a node say; on the axis the stretch is the same both ways."""
+        """Return the mean of what the edges on both sides of a node say; on the axis the stretch is the same both
+        ways."""
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
         ratio = np.linalg.norm(_along(now[edges]), axis=-1) / np.linalg.norm(_along(rest[edges]), axis=-1)
@@ -214,7 +215,7 @@ class Gauss(Rule):
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """A face that is as hot all over stays so to the last bit."""
+        """Return a face that is as hot all over stays so to the last bit."""
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:

@@ -128,7 +128,7 @@ class StepLimit:
                     for c in self.present], default=way.length)
 
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
-        """A step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
+        """Return a step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
 
         Returns the change of (x, control) at its end by predicted events, locally owned entries; None: zero.
         """
@@ -184,6 +184,6 @@ class StepLimit:
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
     def passes_through(self, old: Any, new: Any) -> bool:
-        """True if a contact point goes through its tool on the straight way from one state to another."""
+        """Return True if a contact point goes through its tool on the straight way from one state to another."""
         n = self._n
         return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.present])

@@ -79,7 +79,8 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
 def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
-    """A sheet laid on a tool at t = 0: temperatures of the sheet and of the tool, (len(times), len(x or depths)).
+    """Return a sheet laid on a tool at t = 0: temperatures of the sheet and of the tool, (len(times), len(x or
+    depths)).
 
     x counts from the touching face, where the sheet loses `conductance` (T - tool), to the other, which loses
     h (T - air); depths count into the tool, whose back is held at `tool_start`.
@@ -104,7 +105,7 @@ def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_star
 
 
 def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
-    """The inverse Laplace transform at a time, on Talbot's contour with n points; good to about 1e-9."""
+    """Return the inverse Laplace transform at a time, on Talbot's contour with n points; good to about 1e-9."""
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
     cot = 1 / np.tan(theta)

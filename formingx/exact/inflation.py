@@ -43,7 +43,7 @@ class MembraneState:
 
 def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
                        c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
-    """The inflated membrane whose stretch at the pole is `pole_stretch` (above 1).
+    """Return the inflated membrane whose stretch at the pole is `pole_stretch` (above 1).
 
     Args:
         c10: stress; a number, or a smooth function of R (length).
@@ -191,7 +191,7 @@ class ThickWallState:
         return -(self.radial + self.hoop + self.third) / 3
 
     def cauchy(self, direction: Any) -> np.ndarray:
-        """The Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
+        """Return the Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
 
         Args:
             direction: from the inside out in the (r, z) plane, of any length, shape (2,) or (n, 2): (1, 0) for a tube.
@@ -208,7 +208,8 @@ class ThickWallState:
 
 def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_radius: float, c10: float,
                c01: float = 0.0, R: Any = None) -> ThickWallState:
-    """The exact state of a thick "tube" (plane strain) or "sphere" whose inner face has the stretch `inner_stretch`.
+    """Return the exact state of a thick "tube" (plane strain) or "sphere" whose inner face has the stretch
+    `inner_stretch`.
 
     Args:
         inner_radius, outer_radius: A and B, of the unloaded wall, length.

@@ -46,7 +46,7 @@ class PlugState:
 
 def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thickness: float, c10: float,
                         c01: float = 0.0, friction: str = "stick") -> PlugState:
-    """The membrane, rim held, that a sharp-edged flat plug has pushed by `travel` (length, above 0).
+    """Return the membrane, rim held, that a sharp-edged flat plug has pushed by `travel` (length, above 0).
 
     Args:
         friction: on the plug, "stick" or "none".
@@ -111,7 +111,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 
 def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
             radius: float) -> Any:
-    """The boundary value problem at a depth, from a guess at a smaller one, step by step."""
+    """Return the boundary value problem at a depth, from a guess at a smaller one, step by step."""
     from scipy.integrate import solve_bvp
     while True:
         found = solve_bvp(slopes, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
@@ -143,7 +143,8 @@ class SlidingState:
 
 def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radius: float, fillet: float,
                                thickness: float, c10: float, mu: float) -> SlidingState:
-    """The neo-Hookean membrane, rim held, under a flat plug with a rounded edge and Coulomb friction, drawn so far.
+    """Return the neo-Hookean membrane, rim held, under a flat plug with a rounded edge and Coulomb friction, drawn
+    so far.
 
     Args:
         face_stretch: under the flat of the plug, above 1: it grows with the travel. mu: coefficient of friction.

@@ -99,7 +99,7 @@ def clamped_plate(n: int) -> float:
 
 
 def _last_root(f: Callable[[float], float], low: float) -> float:
-    """The root nearest to 1, from there down."""
+    """Return the root nearest to 1, from there down."""
     grid = 1 - np.geomspace(1e-5, 1 - low, 80)
     before = f(grid[0])
     for a, b in zip(grid, grid[1:]):

@@ -75,7 +75,8 @@ class Body:
         self.jump(brentq(lambda s: self._load(s, self._jumped(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
     def drive(self, path: Callable, times: Any) -> np.ndarray:
-        """Loads at times (ascending, above the present one) at which path(t) gives s and ds/dt; ends at the last."""
+        """Return the loads at times (ascending, above the present one) at which path(t) gives s and ds/dt; ends at
+        the last."""
         def rate(t, y):
             s, ds = path(t)
             return self._flow(s, ds, y.reshape(self.w.shape)).ravel()
@@ -86,7 +87,7 @@ class Body:
         return np.array([self._load(*state) for state in states])
 
     def hold(self, times: Any) -> np.ndarray:
-        """Loads at times at which s is what it is now."""
+        """Return the loads at times at which s is what it is now."""
         s = self.s
         return self.drive(lambda t: (s, 0.0), times)
 
@@ -102,7 +103,7 @@ class Body:
         return found[:, 0]
 
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
-        """(times at which s grows to the targets under the load of now, time at which no state follows).
+        """Return (times at which s grows to the targets under the load of now, time at which no state follows).
 
         A target that is passed already has the present time, one that is not met nan; the second is None if s reaches
         `end`. There must be no s up to `end` at which the body stays.
@@ -167,7 +168,7 @@ class Body:
 
 
 def block(mode: str, *, c10: float, branches: Any) -> Body:
-    """A block in a homogeneous test; s = ln l, its load is the nominal stress."""
+    """Return a block in a homogeneous test; s = ln l, its load is the nominal stress."""
     known("block: mode", mode, MODES)
     k = MODES[mode]
     return Body(c10, branches, np.array([1, k, -1 - k]), lambda s: (np.array([s]), np.ones(1)),
@@ -175,7 +176,7 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
 
 
 def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any, points: int = 40) -> Body:
-    """A thick "tube" or "sphere" under an inner pressure, its load; s = a^n - A^n, with a its inner radius."""
+    """Return a thick "tube" or "sphere" under an inner pressure, its load; s = a^n - A^n, with a its inner radius."""
     known("wall: kind", kind, ("tube", "sphere"))
     A, B, n = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius), 2 if kind == "tube" else 3
     if not A < B:
@@ -190,6 +191,6 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    """A thin spherical balloon; s = ln(r/R0), its load is p R0/H0."""
+    """Return a thin spherical balloon; s = ln(r/R0), its load is p R0/H0."""
     return Body(c10, branches, np.array([1, 1, -2.0]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([2 * math.exp(-3 * s)]), np.array([-6 * math.exp(-3 * s)])))

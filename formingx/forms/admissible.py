@@ -70,7 +70,7 @@ class Admissible:
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
     def least(self) -> Least:
-        """The smallest hoop stretch or in-plane determinant at the state last set; collective.
+        """Return the smallest hoop stretch or in-plane determinant at the state last set; collective.
 
         Of values that are not finite, the first.
         """
@@ -83,7 +83,8 @@ class Admissible:
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
     def furthest_volume_ratio(self) -> Least | None:
-        """The volume ratio J whose logarithm is largest at the state last set; None of a membrane; collective."""
+        """Return the volume ratio J whose logarithm is largest at the state last set; None of a membrane;
+        collective."""
         if not self._solid:
             return None
         found = Least("volume ratio", 1.0, (0.0, 0.0))
@@ -108,13 +109,13 @@ class Admissible:
         return float(np.sqrt(squares / total)) if total else 0.0
 
     def volume_ratios(self) -> tuple[float, float]:
-        """The least and the largest J at quadrature points of the energy, at the state last set; collective."""
+        """Return the least and the largest J at quadrature points of the energy, at the state last set; collective."""
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
         found = self._forms.comm.allgather((J.min(initial=np.inf), J.max(initial=-np.inf)))
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
-        """True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
+        """Return True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
 
         (Between its quadrature points an element that a sharp edge bends strongly may be inside out without harm to
         the solution: a coarse mesh under a plug. `least` tells.) All ranks, at the state last set; collective.

@@ -86,7 +86,8 @@ _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 /
 
 
 def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
-    """A UFL expression in this rank's own cells at places of the reference cell, shape (cells, places, components)."""
+    """Return a UFL expression in this rank's own cells at places of the reference cell, shape (cells, places,
+    components)."""
     cells = own_cells(domain)
     shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
     found = _compat.compile_expression(expression, where)
@@ -149,8 +150,8 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 
 def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3, 3);
-    collective."""
+    """Return the deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3,
+    3); collective."""
     F = forms.elastic_F
     expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
     found = (expression.eval(forms.domain, cells) if len(cells) else np.zeros(0)).reshape(-1, 3, 3)

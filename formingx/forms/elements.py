@@ -37,7 +37,7 @@ class Body(NamedTuple):
 
 
 def body(problem: Any, x: Any, control: float) -> Body | None:
-    """The elements of a solid at a state (None: a membrane has no elements across its thickness); collective."""
+    """Return the elements of a solid at a state (None: a membrane has no elements across its thickness); collective."""
     forms = problem.forms
     domain = forms.domain
     if domain.topology.dim != 2 or domain.geometry.dim != 2:

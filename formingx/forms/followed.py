@@ -34,7 +34,7 @@ class Followed:
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
     def take(self, temperatures: Iterable[np.ndarray]) -> None:
-        """The temperature has changed: in the cells of each part it is as `Temperature.now_and_before` gives it.
+        """Update to a changed temperature: in the cells of each part it is as `Temperature.now_and_before` gives it.
 
         Raises:
             InputError: f has no value at a temperature.

@@ -110,11 +110,11 @@ class Formulation(ABC):
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """The points of `mesh` that stand for points of the body, shape (n, 2)."""
+        """Return the points of `mesh` that stand for points of the body, shape (n, 2)."""
 
     @abstractmethod
     def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
-        """The integral (UFL) of a density over the reference volume of some layers."""
+        """Return the integral (UFL) of a density over the reference volume of some layers."""
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
@@ -122,11 +122,11 @@ class Formulation(ABC):
 
     @abstractmethod
     def _make_mesh(self) -> Any:
-        """The `Mesh` of the fields."""
+        """Return the `Mesh` of the fields."""
 
     @abstractmethod
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
-        """The scalar element of the displacement, and those of all fields."""
+        """Return the scalar element of the displacement, and those of all fields."""
 
     @abstractmethod
     def _groups(self) -> list[tuple[Any, list[str]]]:
@@ -163,7 +163,7 @@ class Formulation(ABC):
         self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
 
     def _take_supports(self, body: LoadedBody) -> None:
-        """The energies of elastic supports."""
+        """Add the energies of elastic supports."""
         self.elastic_supports: list[tuple[Any, fem.Constant]] = []
         for support in self.scene.supports:
             energy = body.stored(support)
@@ -174,12 +174,12 @@ class Formulation(ABC):
                                                for e in (self.potential, self.energy))
 
     def refresh(self) -> None:
-        """The fields or the time have changed: coefficients that depend on them follow."""
+        """Update the coefficients that depend on changed fields or time."""
         for past in self._pasts:
             past.refresh()
 
     def dissipated(self, factor: Any) -> Any:
-        """The integral (UFL) of a factor times the power that is dissipated per reference volume."""
+        """Return the integral (UFL) of a factor times the power that is dissipated per reference volume."""
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
                    for terms in self.terms if terms.internal)
 
@@ -192,7 +192,7 @@ class Formulation(ABC):
         return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 
     def take_temperature(self) -> None:
-        """The temperature has changed: constants follow it; scales stay as they are; collective.
+        """Update the constants to a changed temperature; scales stay as they are; collective.
 
         Raises:
             InputError: a constant has no value at a temperature.
@@ -201,7 +201,7 @@ class Formulation(ABC):
         together(self.comm, [entry.take_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
-        """The cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
+        """Return the cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
     def admissible(self) -> Any:
@@ -209,7 +209,7 @@ class Formulation(ABC):
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:
-        """The displacement at reference points (R, Z), shape (n, 2)."""
+        """Return the displacement at reference points (R, Z), shape (n, 2)."""
         return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
 
     def mean_row(self, held: Any) -> Any:
@@ -225,11 +225,11 @@ class Formulation(ABC):
         self.w.x.array[:] = 0
 
     def constant(self, value: float) -> fem.Constant:
-        """A number in a form that can be changed without compiling it again."""
+        """Return a number in a form that can be changed without compiling it again."""
         return fem.Constant(self.domain, PETSc.ScalarType(value))
 
     def compile(self, form: Any) -> Any:
-        """A compiled form."""
+        """Return a compiled form."""
         try:
             return _compat.compile_form(form)
         except TimeoutError as error:
@@ -239,7 +239,7 @@ class Formulation(ABC):
                 " .cache/fenics") from error
 
     def integral(self, form: Any) -> float:
-        """The value of a UFL integral over all ranks, compiled for this one use."""
+        """Return the value of a UFL integral over all ranks, compiled for this one use."""
         return float(self.comm.allreduce(fem.assemble_scalar(self.compile(form)), MPI.SUM))
 
     def test_function(self) -> Any:
@@ -287,7 +287,7 @@ class Formulation(ABC):
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
-        """Loads, elastic supports and process time as a `Setting` wants them."""
+        """Set loads, elastic supports and process time as in a `Setting`."""
         for support, present in self.elastic_supports:
             present.value = float(not any(self.scene.items[i] is support for i in setting.off))
         for i, (load, base, rate) in enumerate(self._loads):

@@ -15,7 +15,7 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 
 def formulate(scene: Any) -> Formulation:
-    """The forms of a scene."""
+    """Return the forms of a scene."""
     if (formulation := scene.kinematics.formulation) is not None:
         return formulation(scene)
     return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

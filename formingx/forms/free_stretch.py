@@ -38,5 +38,5 @@ class FreeStretch:
         self._followed.take(map(self._there, self._cells))
 
     def elastic(self, F: Any) -> Any:
-        """The elastic part of a deformation gradient F, shape (3, 3)."""
+        """Return the elastic part of a deformation gradient F, shape (3, 3)."""
         return F / self.stretch

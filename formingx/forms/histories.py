@@ -81,7 +81,7 @@ class Histories:
             history.put(remembered)
 
     def advance(self, x: np.ndarray, control: float) -> None:
-        """A state is accepted: what has a history takes it up. x: locally owned entries, shape (n,)."""
+        """Update the history variables for an accepted state. x: locally owned entries, shape (n,)."""
         if self.forms.histories:
             self.look_at(x, control)
         known = self._foretold[1] if self._foretold[0] is x else []

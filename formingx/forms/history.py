@@ -34,26 +34,29 @@ class History(Protocol):
         """Nothing has happened yet."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """The state that the forms hold now is accepted; x: its owned unknowns. It becomes the beginning of a step.
+        """Accept the state of the forms; x: its owned unknowns. It becomes the beginning of a step.
 
         start: the state at the beginning of the step that ends now, if there is one.
         """
 
     def get(self) -> Any:
-        """The memory now."""
+        """Return the memory now."""
 
     def put(self, memory: Any) -> None:
         """Go back, or on, to a memory."""
 
     def save(self, memory: Any) -> dict[str, Any]:
-        """A memory as JSON can hold it but for arrays, independent of ranks and the same on all of them; collective."""
+        """Return a memory as JSON can hold it but for arrays, independent of ranks and the same on all of them;
+        collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
-        """The memory, locally owned entries, of the result of `save`; an InputError if it does not fit this scene."""
+        """Return the memory, locally owned entries, of the result of `save`; an InputError if it does not fit this
+        scene."""
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Any:
-        """The memory, here, of what the same part remembers in a problem of the same body on another mesh; collective.
+        """Return the memory, here, of what the same part remembers in a problem of the same body on another mesh;
+        collective.
 
         Args:
             source: its history there; memory: of that. The problem there stands at the state that it belongs to.

@@ -20,7 +20,7 @@ class Face(NamedTuple):
     weight: Any
 
     def integral(self, integrand: Any) -> Any:
-        """The integral (UFL) over the reference area."""
+        """Return the integral (UFL) over the reference area."""
         return integrand * self.weight * self.measure
 
 
@@ -41,19 +41,20 @@ class LoadedBody:
         self.stress, self.length, self.volume = forms.stress, forms.length, forms.volume
 
     def integral(self, integrand: Any, layer: str | None = None) -> Any:
-        """The integral (UFL) over the reference volume, of all layers or of one; per unit depth in plane strain."""
+        """Return the integral (UFL) over the reference volume, of all layers or of one; per unit depth in plane
+        strain."""
         layers = self._forms.mesh.layers
         if layer is not None:
             known("body.integral: layer", layer, layers)
         return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:
-        """A boundary by its name (of a membrane its lower or its upper face)."""
+        """Return a boundary by its name (of a membrane its lower or its upper face)."""
         normal, measure = self._forms.face(on, quadrature_degree)
         return Face(normal, measure, self.kinematics.weight(self.X))
 
     def constant(self, value: float) -> fem.Constant:
-        """A number for a form, which is not compiled again when it changes."""
+        """Return a number for a form, which is not compiled again when it changes."""
         return self._forms.constant(value)
 
     def thickness(self, boundary: str) -> float:
@@ -61,7 +62,7 @@ class LoadedBody:
         return self._forms.thickness(boundary)
 
     def stored(self, support: Any) -> Any:
-        """The energy of a support or None, or an InputError unless it is a form without virtual displacement."""
+        """Return the energy of a support or None, or an InputError unless it is a form without virtual displacement."""
         form = support.stored_energy(self)
         if form is not None and (not isinstance(form, ufl.Form) or form.arguments()):
             raise InputError(f"{support!r}: stored_energy must return a UFL form without body.du, such as"
@@ -69,7 +70,7 @@ class LoadedBody:
         return form
 
     def work(self, load: Any, value: Any) -> Any:
-        """The virtual work of a load, or an InputError unless it is a form that is linear in `du`."""
+        """Return the virtual work of a load, or an InputError unless it is a form that is linear in `du`."""
         form = load.virtual_work(self, value)
         if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
             raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"
@@ -77,8 +78,8 @@ class LoadedBody:
         return form
 
     def unit(self, load: Any) -> float:
-        """The value at which the nodal forces of a load in the reference configuration add up to stress times volume
-        over length."""
+        """Return the value at which the nodal forces of a load in the reference configuration add up to stress times
+        volume over length."""
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
         vector = la.vector(index_map, 1)

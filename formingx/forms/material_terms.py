@@ -65,7 +65,7 @@ class MaterialTerms:
         return bool(self.internal or self.held)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
-        """A `Function` with a value of a shape at every quadrature point of the energy."""
+        """Return a `Function` with a value of a shape at every quadrature point of the energy."""
         element = basix.ufl.quadrature_element(self.forms.domain.basix_cell(), value_shape=shape, scheme="default",
                                                degree=self.forms.scene.quadrature_degree)
         return fem.Function(fem.functionspace(self.forms.domain, element))
@@ -89,7 +89,7 @@ class MaterialTerms:
         return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
     def take_temperature(self) -> None:
-        """The temperature has changed: constants follow it.
+        """Update the constants to a changed temperature.
 
         Raises:
             InputError: a constant has no finite value at a temperature.
@@ -99,20 +99,20 @@ class MaterialTerms:
             followed.take(there)
 
     def of_mesh(self, expression: Any) -> Any:
-        """A UFL scalar of the scene's mesh, where the fields live on it."""
+        """Return a UFL scalar of the scene's mesh, where the fields live on it."""
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
                              f" (R, Z)")
         return expression
 
     def step_energy(self, F: Any) -> Any:
-        """The potential of the step, per reference volume (UFL, stress)."""
+        """Return the potential of the step, per reference volume (UFL, stress)."""
         if not self.remembers:
             return self.material.strain_energy(F, **self.constants)
         return self.material.step_energy(F, self.internal | self.held, self._time_step, **self.constants)
 
     def stored_energy(self, F: Any) -> Any:
-        """The energy that is stored, per reference volume (UFL, stress)."""
+        """Return the energy that is stored, per reference volume (UFL, stress)."""
         if not self.remembers:
             return self.material.strain_energy(F, **self.constants)
         return self.material.stored_energy(F, self.internal | self.held, **self.constants)
@@ -128,7 +128,7 @@ class MaterialTerms:
         return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.held)
 
     def equilibrium_energy(self, F: Any) -> Any:
-        """The energy that is left when all has relaxed, per reference volume (UFL, stress), or None."""
+        """Return the energy that is left when all has relaxed, per reference volume (UFL, stress), or None."""
         return self.material.equilibrium_energy(F, **self.constants)
 
     def elastic_stretches(self, F: Any) -> list[Any]:
@@ -136,11 +136,11 @@ class MaterialTerms:
         return self.material.elastic_stretches(F, self.internal, **self.constants)
 
     def dissipation(self, F: Any) -> Any:
-        """The power that is dissipated, per reference volume (UFL, stress over time)."""
+        """Return the power that is dissipated, per reference volume (UFL, stress over time)."""
         return self.material.dissipation(F, self.internal, **self.constants)
 
     def damage_energy(self) -> Any:
-        """The energy that damage has cost, per reference volume (UFL, stress)."""
+        """Return the energy that damage has cost, per reference volume (UFL, stress)."""
         return self.material.damage_energy(self.internal, **self.constants)
 
     def updated(self, F: Any) -> dict[str, Any]:

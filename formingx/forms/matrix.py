@@ -59,7 +59,7 @@ class ExtendedMatrix:
                                   np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
-        """The matrix at the state that the form's functions hold now.
+        """Return the matrix at the state that the form's functions hold now.
 
         blocks: (local dofs (n, m), ghosts too, values (n, m, m)) to be added to K; dofs of a block must share a cell.
         """

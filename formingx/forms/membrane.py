@@ -50,7 +50,7 @@ class MidSurface(Formulation):
                          " MixedPressure()")
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """(normal of the mid-surface away from the loaded face, the whole mid-surface)."""
+        """Return (normal of the mid-surface away from the loaded face, the whole mid-surface)."""
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
         whole = len(nodes) and np.allclose([nodes[0, 0], nodes[-1, 0]], [self._R[0], self._R[-1]], rtol=0, atol=near)
@@ -62,7 +62,7 @@ class MidSurface(Formulation):
                          f" only")
 
     def constraints(self, support: Any) -> list[Any]:
-        """A mean over an end is the value at its point; a membrane is held at its ends only."""
+        """Return a mean over an end is the value at its point; a membrane is held at its ends only."""
         held = [Held(c.component, on=c.on) if not isinstance(c, Held) else c for c in support.constraints()]
         for item in held:
             if item.on is not None and item.on not in self.mesh.boundaries:
@@ -101,11 +101,11 @@ class MidSurface(Formulation):
         return MidSurfaceProbe(problem, points)
 
     def set_stiff(self) -> None:
-        """A small stretch in all directions."""
+        """Apply a small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:
-        """The line halfway between the two faces, with a node wherever the lower face has one."""
+        """Return the line halfway between the two faces, with a node wherever the lower face has one."""
         mesh = self.scene.mesh
         comm = mesh.comm
         if "bottom" not in mesh.boundaries:
@@ -147,7 +147,7 @@ class MidSurface(Formulation):
         return element, [basix.ufl.blocked_element(element, shape=(self.scene.kinematics.components,))]
 
     def _weight(self) -> Any:
-        """The kinematic weight times the thickness normal to the mid-surface; the faces are measured along Z."""
+        """Return the kinematic weight times the thickness normal to the mid-surface; the faces are measured along Z."""
         direction = ufl.Jacobian(self.domain)[:, 0]
         direction = direction / ufl.sqrt(ufl.inner(direction, direction))
         self._tangent = ufl.sign(direction[0]) * direction                     # towards growing R

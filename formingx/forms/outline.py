@@ -79,7 +79,8 @@ class Outline:
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
     def fold(self, edges: np.ndarray) -> np.ndarray | None:
-        """A place where the boundary goes through itself, of `edges()`, shape (2,), length; None if it does nowhere.
+        """Return a place where the boundary goes through itself, of `edges()`, shape (2,), length; None if it does
+        nowhere.
 
         Not in a crease: of edges that have a neighbour in common, where an element bends over a sharp edge.
         """
@@ -92,7 +93,7 @@ class Outline:
         return None
 
     def _near(self, i: int, j: int) -> bool:
-        """True if two edges are the same, neighbours, or neighbours of one."""
+        """Return True if two edges are the same, neighbours, or neighbours of one."""
         around = np.isin(self.ends, self.ends[i]).any(1)
         return bool(np.isin(self.ends[around], self.ends[j]).any())
 
@@ -108,7 +109,7 @@ def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
 
 
 def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """The two ends and the middle of an edge: no two of its nodes are further apart than the ends."""
+    """Return the two ends and the middle of an edge: no two of its nodes are further apart than the ends."""
     away = np.linalg.norm(X[nodes][:, None] - X[nodes][None], axis=-1)
     i, j = np.unravel_index(np.argmax(away), (3, 3))
     return nodes[[i, j, 3 - i - j]]

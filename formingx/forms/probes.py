@@ -184,7 +184,8 @@ def _normal(tangents: np.ndarray) -> np.ndarray:
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
-    """The scalar basis of an element, or its derivative on an interval, at m points of its cell, shape (m, dim)."""
+    """Return the scalar basis of an element, or its derivative on an interval, at m points of its cell, shape (m,
+    dim)."""
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)

@@ -52,7 +52,7 @@ class Setting:
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:
-        """The part of a load's amplitude that acts: none of one that takes no part, all once the change did."""
+        """Return the part of a load's amplitude that acts: none of one that takes no part, all once the change did."""
         there = float(number not in self.off)
         if self.fading and number in self.changed:
             there = control if there else 1 - control
@@ -63,7 +63,7 @@ class Setting:
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:
-        """(the same setting, the same control) where the user's values over the amplitudes are `now`."""
+        """Return (the same setting, the same control) where the user's values over the amplitudes are `now`."""
         ratio = [b / n for b, n in zip(before, now, strict=True)]
         of_control = 1.0 if self.leading is None else ratio[self.leading]
         return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],

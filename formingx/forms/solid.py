@@ -28,7 +28,7 @@ class Solid(Formulation):
     """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """The measure of a named boundary."""
+        """Return the measure of a named boundary."""
         return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -98,7 +98,8 @@ class Solid(Formulation):
         return scene.mesh
 
     def mode_space(self) -> fem.FunctionSpace:
-        """The space of modes: displacement amplitudes, shape (3,), and pressures, on the elements of the fields."""
+        """Return the space of modes: displacement amplitudes, shape (3,), and pressures, on the elements of the
+        fields."""
         return fem.functionspace(self.domain, basix.ufl.mixed_element(self._elements(self.domain.basix_cell(), 3)[1]))
 
     def _elements(self, cell: Any, components: int = 2) -> tuple[Any, list[Any]]:

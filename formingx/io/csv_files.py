@@ -33,7 +33,7 @@ class Table(NamedTuple):
     kinds: list[str] | None = None
 
     def take(self, column: str, wanted: float | str | None = None) -> np.ndarray:
-        """A column times a factor (a number), or in a unit (its name; the header must state its own).
+        """Return a column times a factor (a number), or in a unit (its name; the header must state its own).
 
         Raises:
             InputError: there is no such column, a cell was empty or not a number, a unit is not known or not stated.
@@ -75,7 +75,8 @@ def conversion(unit: str, wanted: str) -> float:
 
 
 def read(file: Any) -> Table:
-    """A CSV file: a header of column names, each with its unit in brackets if it has one ("pressure [psi]"), then rows.
+    """Return a CSV file: a header of column names, each with its unit in brackets if it has one ("pressure [psi]"),
+    then rows.
 
     Raises:
         InputError: as `records`; the file has no header, a row of another length, or fewer than two rows.
@@ -140,7 +141,7 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """[(number, line)] without empty lines and those that begin with #, other than inside quotes."""
+    """Return [(number, line)] without empty lines and those that begin with #, other than inside quotes."""
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):
@@ -150,7 +151,7 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
-    """A table of arrays, all of one length of at least 2."""
+    """Return a table of arrays, all of one length of at least 2."""
     arrays = {}
     for key, values in columns.items():
         try:

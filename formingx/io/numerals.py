@@ -8,19 +8,19 @@ _NUMBER = re.compile(rf"(?:{_WHOLE}(?:\.[0-9]*)?|[+-]?\.[0-9]+)(?:[eE]{_WHOLE})?
 
 
 def is_number(word: str) -> bool:
-    """True if a word is a number, "nan" and "inf" among them."""
+    """Return True if a word is a number, "nan" and "inf" among them."""
     return _NUMBER.fullmatch(word) is not None
 
 
 def number(word: str) -> float:
-    """The number; a ValueError unless the word is one."""
+    """Return the number; a ValueError unless the word is one."""
     if not is_number(word):
         raise ValueError(f"{word[:40]!r} is not a number")
     return float(word)
 
 
 def whole(word: str) -> int:
-    """The whole number; a ValueError unless the word is one, of at most 18 digits."""
+    """Return the whole number; a ValueError unless the word is one, of at most 18 digits."""
     if not re.fullmatch(r"[+-]?[0-9]{1,18}", word):
         raise ValueError(f"{word[:40]!r} is not a whole number")
     return int(word)

@@ -59,7 +59,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
-    """(times, stretches) of a test as arrays of shape (n,), or an InputError that begins with `name`."""
+    """Return (times, stretches) of a test as arrays of shape (n,), or an InputError that begins with `name`."""
     known(f"{name}: mode", mode, MODES)
     known(f"{name}: between", between, BETWEEN)
     try:

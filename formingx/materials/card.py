@@ -48,7 +48,7 @@ def _shift(material: Any, temperature: float) -> float:
 
 
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
-    """(what, value) at one temperature."""
+    """Return (what, value) at one temperature."""
     def said(value: float, of: str = "") -> str:
         return f"{value:.4g} {of}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []
@@ -74,7 +74,7 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """True stress against stretch in the three tests, as an image for a page."""
+    """Return the true stress against stretch in the three tests, as an image for a page."""
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):
         for k, (name, material, shift) in enumerate(cases):

@@ -38,7 +38,7 @@ class Varying(ABC):
 
     @abstractmethod
     def values(self, sample: Sample) -> np.ndarray:
-        """The values at the points of a sample, shape (n,): for checks, moduli and scales.
+        """Return the values at the points of a sample, shape (n,): for checks, moduli and scales.
 
         Raises:
             InputError: it cannot be evaluated there.
@@ -46,7 +46,7 @@ class Varying(ABC):
 
     @abstractmethod
     def expression(self, fields: Any) -> Any:
-        """The constant in a form (UFL scalar).
+        """Return the constant in a form (UFL scalar).
 
         Args:
             fields: what it may depend on: `fields.X`, the reference position (UFL, shape (2,)), and
@@ -88,7 +88,7 @@ class OfTemperature(FunctionOfTemperature, Varying):
 
 
 def of_temperature(function: Callable) -> OfTemperature:
-    """A constant of a material, or a coefficient of friction, that depends on the temperature of the scene.
+    """Return a constant of a material, or a coefficient of friction, that depends on the temperature of the scene.
 
     Args:
         function: f(T), called with an array of temperatures, shape (n,), in the unit that the scene's are given in.
@@ -102,7 +102,7 @@ def of_temperature(function: Callable) -> OfTemperature:
 
 
 def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
-    """A modulus in proportion to the absolute temperature, as of a network of flexible chains (Treloar 1975).
+    """Return a modulus in proportion to the absolute temperature, as of a network of flexible chains (Treloar 1975).
 
     Args:
         value: at the temperature `reference`. unit: of temperatures, "C" or "K".
@@ -141,7 +141,7 @@ class OfMesh(Varying):
 
 
 def varying(value: Any) -> Varying | None:
-    """A constant as `Varying`, or None if it does not vary."""
+    """Return a constant as `Varying`, or None if it does not vary."""
     if isinstance(value, Varying):
         return value
     if isinstance(value, ufl.core.expr.Expr):

@@ -170,7 +170,7 @@ class _Program:
 
     @np.errstate(all="ignore")
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
-        """The outputs, shape (number of outputs, n)."""
+        """Return the outputs, shape (number of outputs, n)."""
         values = [*stretches, *constants]
         for operation, operands in self._steps:
             values.append(operation(*[values[i] for i in operands]))

@@ -12,7 +12,7 @@ from .material import Material
 
 
 def checked_shift(name: str, shift: Any) -> Callable:
-    """A law by which relaxation times depend on the temperature, or an InputError."""
+    """Return a law by which relaxation times depend on the temperature, or an InputError."""
     if not callable(shift):
         raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
     return shift

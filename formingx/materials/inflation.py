@@ -34,7 +34,8 @@ class Inflated:
         self._radius = radius
 
     def tube(self, hoop: np.ndarray) -> np.ndarray:
-        """The pressure in a long tube with closed ends, free to grow longer, at hoop stretches, shape (n,), stress.
+        """Return the pressure in a long tube with closed ends, free to grow longer, at hoop stretches, shape (n,),
+        stress.
 
         The Cauchy stress along it is half of that around: P2 lz = P1 lh / 2 gives its stretch lz, and p = P1 h0 / (R
         lh lz). Infinity where a material cannot be stretched so far.
@@ -49,7 +50,7 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def disc(self, stretch: np.ndarray) -> np.ndarray:
-        """The pressure on a disc blown to a cap of a sphere that is stretched evenly, shape (n,), stress.
+        """Return the pressure on a disc blown to a cap of a sphere that is stretched evenly, shape (n,), stress.
 
         With the height s a the area ratio is l^2 = 1 + s^2, and p = 4 s (P h0 / l) / (a (1 + s^2)). The largest is
         2 to 3 % below that of a hinged neo-Hookean disc.
@@ -59,13 +60,13 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def _forces(self, stretches: np.ndarray) -> np.ndarray:
-        """Forces per length in the reference configuration, shape (2, n)."""
+        """Return the forces per length in the reference configuration, shape (2, n)."""
         each = [h * material.response.stress(stretches, constants) for material, constants, h in self._layers]
         return np.sum(each, axis=0)
 
 
 def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
-    """The first maximum of a pressure over stretches from 1 to 20; None: it only grows."""
+    """Return the first maximum of a pressure over stretches from 1 to 20; None: it only grows."""
     stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
     found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to what can be stretched

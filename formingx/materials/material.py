@@ -80,7 +80,8 @@ class Material:
         return ()
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """The potential of a step, per reference volume: its derivative by F is the stress at the end of the step."""
+        """Return the potential of a step, per reference volume: its derivative by F is the stress at the end of the
+        step."""
         return self.strain_energy(F, **constants)
 
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
@@ -88,11 +89,12 @@ class Material:
         return {}
 
     def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """The energy per reference volume that is stored at F, with the internal variables as they are then."""
+        """Return the energy per reference volume that is stored at F, with the internal variables as they are then."""
         return self.strain_energy(F, **constants)
 
     def equilibrium_energy(self, F: Any, **constants: Any) -> Any:
-        """The energy per reference volume that is left at F when all has relaxed; None: none is left, or not known."""
+        """Return the energy per reference volume that is left at F when all has relaxed; None: none is left, or not
+        known."""
         return None if self.internal else self.strain_energy(F, **constants)
 
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
@@ -103,11 +105,11 @@ class Material:
         return []
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """The power per reference volume that is dissipated there, stress over time; 0 without a history."""
+        """Return the power per reference volume that is dissipated there, stress over time; 0 without a history."""
         return ufl.as_ufl(0.0)
 
     def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
-        """The energy per reference volume that damage has cost, with the internal variables as they are then."""
+        """Return the energy per reference volume that damage has cost, with the internal variables as they are then."""
         return ufl.as_ufl(0.0)
 
     @property
@@ -120,14 +122,14 @@ class Material:
         return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
 
     def _numbers(self) -> list[float]:
-        """The constants' values, in order; an InputError if they vary."""
+        """Return the constants' values, in order; an InputError if they vary."""
         if self.varies:
             raise InputError(f"{self}: its constants vary over the body: use with_constants([...]) for the material at"
                              f" one point of it")
         return list(self.parameters.values())
 
     def _sampled(self, sample: Sample) -> np.ndarray:
-        """The different sets of values that the constants have over a sample, shape (constants, n)."""
+        """Return the different sets of values that the constants have over a sample, shape (constants, n)."""
         found = [value.values(sample) if isinstance(value, Varying) else float(value)
                  for value in self.constants().values()]
         columns = np.stack(np.broadcast_arrays(np.zeros(len(sample.points)), *found)[1:])
@@ -152,7 +154,8 @@ class Material:
         return self._moduli(values, values.shape[1])[1]
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
-        """The smallest and the largest modulus of small strains along the axes, for n sets of constants, (2, n)."""
+        """Return the smallest and the largest modulus of small strains along the axes, for n sets of constants, (2,
+        n)."""
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
         half = np.hypot((a - b) / 2, (H[0, 0] - H[1, 1]) / math.sqrt(12))
@@ -198,7 +201,7 @@ class Material:
         return (P * flat if true else P).reshape(l.shape)[()]
 
     def largest_stretch(self, mode: str) -> float:
-        """The stretch of a test at which the energy is infinite."""
+        """Return the stretch of a test at which the energy is infinite."""
         known(f"{self}: largest_stretch: mode", mode, MODES)
         if not math.isfinite(self.largest_I1):
             return math.inf
@@ -296,11 +299,11 @@ class Material:
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
     def constants_at(self, coordinates: Sequence[float] | np.ndarray) -> list[float]:
-        """The constants at coordinates."""
+        """Return the constants at coordinates."""
         return list(coordinates)
 
     def with_constants(self, constants: Sequence[Any]) -> Material:
-        """The same kind of material with other constants, in the order of `parameters`."""
+        """Return the same kind of material with other constants, in the order of `parameters`."""
         if len(constants) != len(self.parameters):
             raise InputError(f"{self}: with_constants: {len(constants)} numbers for {', '.join(self.parameters)}")
         other = copy.copy(self)                             # with its `response`, which holds for any constants
@@ -309,7 +312,7 @@ class Material:
         return other
 
     def at_temperature(self, temperature: float) -> Material:
-        """The material at one temperature: constants that depend on it are numbers there.
+        """Return the material at one temperature: constants that depend on it are numbers there.
 
         Raises:
             InputError: a constant depends on the position, or has no value at this temperature.
@@ -321,7 +324,7 @@ class Material:
         return self.with_constants(found)
 
     def _check_isotropic(self) -> None:
-        """Turning the stretches round must turn the stresses round."""
+        """Raise an InputError unless permuted stretches give permuted stresses."""
         l = np.array([1.02, 0.99, 1 / 1.02 / 0.99])
         g = self.response.derivatives(np.stack([l, np.roll(l, 1)], axis=1), self._numbers())[0]
         if np.any(np.abs(np.roll(g[:, 0], 1) - g[:, 1]) > 1e-8 * np.abs(g).max()):
@@ -343,5 +346,5 @@ class Material:
 
 
 def brief(value: Any) -> str:
-    """A constant for people: a number with six digits."""
+    """Return a constant for people: a number with six digits."""
     return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

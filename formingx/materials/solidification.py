@@ -137,7 +137,7 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """(A and phi at the beginning of the step, phi as it will be at its end)."""
+        """Return (A and phi at the beginning of the step, phi as it will be at its end)."""
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))

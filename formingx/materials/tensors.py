@@ -20,12 +20,12 @@ def entries(vector: Any) -> Entries:
 
 
 def plus(A: Entries, B: Entries, factor: Any) -> Entries:
-    """A + factor B."""
+    """Return a + factor B."""
     return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
 
 
 def inner(A: Entries, B: Entries) -> Any:
-    """A : B."""
+    """Return a : B."""
     return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
 
 
@@ -35,7 +35,7 @@ def determinant(A: Entries) -> Any:
 
 
 def cofactor(A: Entries) -> Entries:
-    """The inverse, where the determinant is 1."""
+    """Return the inverse, where the determinant is 1."""
     return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
 
 

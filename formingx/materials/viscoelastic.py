@@ -103,7 +103,7 @@ class RelaxingMaterial(Relaxing):
         return found
 
     def strain_energy(self, F, **constants):
-        """The energy of F before anything has flowed."""
+        """Return the energy of F before anything has flowed."""
         mu = sum(mu for _, mu, _ in self._branches(constants))
         return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
 
@@ -121,7 +121,7 @@ class RelaxingMaterial(Relaxing):
                    for k, mu, tau in self._branches(constants))
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """A UFL scalar whose derivative by F is the stress at the end of a step that began with `internal`.
+        """Return a UFL scalar whose derivative by F is the stress at the end of a step that began with `internal`.
 
         Args:
             F: deformation gradient at the end, shape (3, 3).
@@ -216,7 +216,7 @@ class RelaxingMaterial(Relaxing):
         return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
 
     def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
-        """(number, mu, tau) of every branch."""
+        """Return (number, mu, tau) of every branch."""
         k = 0
         while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]

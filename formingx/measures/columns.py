@@ -81,7 +81,7 @@ class _Own(_Recorded):
 
 
 def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
-    """The user's columns.
+    """Return the user's columns.
 
     Raises:
         InputError: a name that is taken or no word, or a measure that is neither a target nor a function.
@@ -103,7 +103,7 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
 
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
-    """The measures that every run records, by column name.
+    """Return the measures that every run records, by column name.
 
     Energies, volumes, areas and forces are those of the whole part, of the whole tool and of the whole support, also
     where a half or a quarter is modelled (`Scene.symmetry_factor`); in plane strain they are per unit depth.

@@ -12,7 +12,8 @@ from .targets import Bound, OfWholePart, Target
 
 
 def resisting(contact: Any) -> np.ndarray:
-    """Unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if it stays."""
+    """Return the unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if
+    it stays."""
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
 
@@ -31,7 +32,7 @@ def support_factor(scene: Any, support: Any) -> int:
 
 
 def force(value: float, *, of: str | None = None) -> Target:
-    """The force on the controlled quantity, or on what is called `of`, reaches `value` (stress length^2).
+    """Return the target: the force on the control, or on the item called `of`, reaches `value` (stress length^2).
 
     Of the body: on a driven support along its component; on a tool against its travel, positive when it resists. It is
     the force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`); in

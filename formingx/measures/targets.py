@@ -25,7 +25,7 @@ class Bound:
     smooth = True
 
     def value(self, x: Any, control: float) -> float:
-        """The measure at a state, in the user's units."""
+        """Return the measure at a state, in the user's units."""
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
@@ -184,7 +184,7 @@ class Target(NamedTuple):
 
 
 def pressure(value: float, *, of: str | None = None) -> Target:
-    """The driven pressure, or the one called `of`, reaches `value` (stress).
+    """Return the target: the controlled pressure, or the one called `of`, reaches `value` (stress).
 
     >>> round(float(path.at(fx.pressure(0.02)).measures["pole_height"]), 3)
     4.795
@@ -193,7 +193,7 @@ def pressure(value: float, *, of: str | None = None) -> Target:
 
 
 def travel(value: float, *, of: str | None = None) -> Target:
-    """The driven support or tool, or the one called `of`, has moved by `value` (a length).
+    """Return the target: the controlled support or tool, or the one called `of`, has moved by `value` (a length).
 
     >>> fx.travel(6.0, of="plug").name
     'plug_travel'
@@ -202,7 +202,7 @@ def travel(value: float, *, of: str | None = None) -> Target:
 
 
 def process_time(value: float) -> Target:
-    """The time of a process, as its tables give it, reaches `value`.
+    """Return the target: the process time reaches `value`.
 
     >>> blow = fx.Stage("blow", amplitudes={scene.driven: [(0.0, 0.0), (2.0, 0.02)]}, until=fx.process_time(1.0))
     """
@@ -232,7 +232,7 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
 
 
 def pole_height(value: float) -> Target:
-    """The displacement u_z of the mid-thickness point on the axis reaches `value` (a length).
+    """Return the target: u_z of the mid-thickness point on the axis reaches `value` (a length).
 
     >>> round(float(path.at(fx.pole_height(6.0)).measures["pressure"]), 4)
     0.0289
@@ -241,8 +241,9 @@ def pole_height(value: float) -> Target:
 
 
 def pole_stretch(value: float) -> Target:
-    """The stretch at the pole reaches `value`: (thickness/original)^(-1/2), which is that along the sheet in a solid
-    of revolution; in plane strain, where the sheet is stretched one way only, (thickness/original)^(-1).
+    """Return the target: the stretch at the pole reaches `value`: (thickness/original)^(-1/2), which is that along
+    the sheet in a solid of revolution; in plane strain, where the sheet is stretched one way only,
+    (thickness/original)^(-1).
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
 
@@ -253,7 +254,7 @@ def pole_stretch(value: float) -> Target:
 
 
 def enclosed_volume(value: float) -> Target:
-    """The volume that the driven face has swept reaches `value` (length^3; per depth in plane strain).
+    """Return the target: the volume swept by the loaded face reaches `value` (length^3; per depth in plane strain).
 
     It lies between the face in the reference configuration and now; where an end of the face has moved, straight
     lines close it. Where a half or a quarter is modelled it is that of the whole part (`Scene.symmetry_factor`).
@@ -265,7 +266,8 @@ def enclosed_volume(value: float) -> Target:
 
 
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
-    """The displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches `value` (a length).
+    """Return the target: the displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches
+    `value` (a length).
 
     Of a sheet in three dimensions "x", "y" or "z", `at` = (x, y).
 
@@ -284,7 +286,7 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
 
 def sag(value: float) -> Target:
-    """The largest downward displacement (along -Z) of the body reaches `value` (a length above 0).
+    """Return the target: the largest downward displacement (along -Z) of the body reaches `value` (a length above 0).
 
     >>> fx.Stage("heat", duration=60.0, until=fx.sag(30.0))                              # until it hangs 30 mm
     Stage('heat')
@@ -352,5 +354,5 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    """True if a value of the target's measure is the target's, to round-off. size: see `Bound`."""
+    """Return True if a value of the target's measure is the target's, to round-off. size: see `Bound`."""
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

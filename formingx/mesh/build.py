@@ -34,7 +34,7 @@ length}, linear between its points."""
 def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
          elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
          inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
+    """Return a disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
 
     Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
 
@@ -114,7 +114,7 @@ def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[
 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
-    """Ends of `along` elements from low to high, shape (along + 1,), with relative `sizes` at some radii."""
+    """Return the ends of `along` elements from low to high, shape (along + 1,), with relative `sizes` at some radii."""
     at, small = np.array(list(sizes)), np.array(list(sizes.values()))
     ends = np.unique([low, *at, high])
     if along < len(ends) - 1:
@@ -136,7 +136,7 @@ def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]
 
 def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], elements: tuple = (16, 8),
            grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """The upper half of a hollow sphere about the origin of the (R, Z) plane: a quarter of an annulus.
+    """Return the upper half of a hollow sphere about the origin of the (R, Z) plane: a quarter of an annulus.
 
     Boundaries: `axis` (R = 0), `equator` (Z = 0), `inner`, `outer`. All nodes, those on edges too, lie where polar
     coordinates put them: second-order geometry.
@@ -166,7 +166,8 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
 
 def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
             elements: tuple = (60, 2), grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube from Z = 0 up.
+    """Return a closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube from Z =
+    0 up.
 
     Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All nodes of the bottom, those on edges too, lie
     where polar coordinates put them: second-order geometry.
@@ -211,7 +212,8 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A body from its outline: what lies between two lines through points, each point opposite that of the other line.
+    """Return a body from its outline: what lies between two lines through points, each point opposite that of the
+    other line.
 
     Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
 
@@ -316,7 +318,7 @@ def _grading(kind: str, grading: Any) -> float:
 
 
 def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
-    """Number of elements along the sheet, and the ends of those through each layer, on [0, 1]."""
+    """Return the number of elements along the sheet, and the ends of those through each layer, on [0, 1]."""
     if not _is_row(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
@@ -333,7 +335,7 @@ def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int
 
 
 def _ends(kind: str, given: Any) -> np.ndarray:
-    """Ends of the elements through a layer on [0, 1], of their number or their relative sizes."""
+    """Return the ends of the elements through a layer on [0, 1], of their number or their relative sizes."""
     if not _is_row(given):
         n = count(f"{kind}: elements through a layer", given)
         if n > _MOST:
@@ -352,14 +354,15 @@ def _is_row(values: Any) -> bool:
 
 
 def _graded(along: int, grading: float) -> np.ndarray:
-    """Ends of `along` elements on [0, 1] whose sizes grow by one ratio, the last `grading` times the first."""
+    """Return the ends of `along` elements on [0, 1] whose sizes grow by one ratio, the last `grading` times the
+    first."""
     sizes = grading ** (np.arange(along) / max(along - 1, 1))
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
     return ends / ends[-1]
 
 
 def _with_middles(joints: np.ndarray) -> np.ndarray:
-    """Ends of elements and the middles between them, shape (2 n + 1,)."""
+    """Return the ends of elements and the middles between them, shape (2 n + 1,)."""
     both = np.empty(2 * len(joints) - 1)
     both[::2], both[1::2] = joints, (joints[1:] + joints[:-1]) / 2
     return both

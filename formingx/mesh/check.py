@@ -55,7 +55,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """A number of the piece that each element is of, 0 for that of the first node, shape (m,)."""
+    """Return a number of the piece that each element is of, 0 for that of the first node, shape (m,)."""
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:
@@ -67,7 +67,7 @@ def _pieces(triangles: np.ndarray) -> np.ndarray:
 
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """An InputError unless each edge has one middle, and each middle one edge and no corner on it."""
+    """Raise an InputError unless each edge has one middle, and each middle one edge and no corner on it."""
     if triangles.shape[1] != 6:
         return
     rows = np.concatenate([np.column_stack([np.sort(triangles[:, [i, j]], axis=1), triangles[:, k]])
@@ -85,7 +85,8 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
-    """True for triangles, shape (m, 3 or 6, 2), whose curved map changes its sign from node to node, shape (m,)."""
+    """Return True for triangles, shape (m, 3 or 6, 2), whose curved map changes its sign from node to node, shape
+    (m,)."""
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
     a, b, c, ab, bc, ac = (nodes[:, i] for i in range(6))
@@ -100,7 +101,8 @@ def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
 
 
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
-    """The edges of one element only, shape (k, 2); an error if two elements lie on the same side of their edge."""
+    """Return the edges of one element only, shape (k, 2); an error if two elements lie on the same side of their
+    edge."""
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     ahead = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)       # side of the edge that its element is on
     edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -114,7 +116,7 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """A place where edges touch or cross each other other than at nodes that they share, shape (2,), or None."""
+    """Return a place where edges touch or cross each other other than at nodes that they share, shape (2,), or None."""
     pairs = next(crossings(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
 

@@ -12,7 +12,7 @@ from .mesh import Mesh
 
 
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """A mesh of triangles from a file.
+    """Return a mesh of triangles from a file.
 
     A gmsh mesh (MSH 2.2 or 4.1, text or binary): physical groups name the layers (2-D) and the boundaries (1-D). A name
     that ends in .txt: the text format of `formingx.mesh.text`. Nothing in a file is run: a gmsh script is refused.

@@ -39,7 +39,7 @@ class Grid(NamedTuple):
 
 
 def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
+    """Return the triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
     triangles = np.array(triangles)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
@@ -48,7 +48,7 @@ def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def to_grid(mesh: Mesh) -> Grid:
-    """The mesh as plain arrays (serial only); node i of the mesh has the number i + 1.
+    """Return the mesh as plain arrays (serial only); node i of the mesh has the number i + 1.
 
     >>> fx.mesh.to_grid(sheet).points.max(0).tolist()
     [10.0, 0.3]
@@ -59,7 +59,7 @@ def to_grid(mesh: Mesh) -> Grid:
 
 
 def gathered(mesh: Mesh) -> Grid:
-    """The whole mesh as plain arrays, the same on all ranks; collective."""
+    """Return the whole mesh as plain arrays, the same on all ranks; collective."""
     domain, comm = mesh.domain, mesh.comm
     own, X = len(own_cells(domain)), domain.geometry.x
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
@@ -85,7 +85,7 @@ def gathered(mesh: Mesh) -> Grid:
 
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
-    """The distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
+    """Return the distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
 
     Raises:
         InputError: on all ranks, the error of `make`, or what is wrong with the elements of `what`.
@@ -148,7 +148,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    """{the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
+    """Return {the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
@@ -158,7 +158,7 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 
 def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                  points: np.ndarray) -> list[list[int]]:
-    """The edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
+    """Return the edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
 
     A curve that is no part of the body (of a tool in the same file) leaves its boundary empty.
     """

@@ -91,7 +91,7 @@ class Mesh:
         return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
 
     def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:
-        """The mesh with one more boundary: the facets of a boundary between two coordinates.
+        """Return the mesh with one more boundary: the facets of a boundary between two coordinates.
 
         They belong to both boundaries from then on: a load or contact on the whole acts on the part too.
 
@@ -142,7 +142,7 @@ class Mesh:
                        columns=self._columns_with((low, high), axis, near, (name, of, within, along)))
 
     def _columns_with(self, limits: tuple, axis: int, near: float, part: tuple) -> Columns | None:
-        """The columns of the mesh with one more part, which ends between two of them."""
+        """Return the columns of the mesh with one more part, which ends between two of them."""
         if self.columns is None:
             return None
         columns, make = self.columns, self.columns.make
@@ -164,7 +164,8 @@ class Mesh:
         return points[np.lexsort((points[:, 1], points[:, 0]))]
 
     def line_of(self, boundary: str) -> np.ndarray:
-        """Ends and middles of the edges of a boundary one after the other, from its end of smaller R (of smaller Z).
+        """Return ends and middles of the edges of a boundary one after the other, from its end of smaller R (of
+        smaller Z).
 
         Shape (2 n + 1, 2) for n edges, the ends at even rows; same on all ranks.
 

@@ -87,7 +87,7 @@ def content(file: str | os.PathLike) -> Content:
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """The grid in a mesh file: physical groups name the layers (2-D) and the boundaries (1-D).
+    """Return the grid in a mesh file: physical groups name the layers (2-D) and the boundaries (1-D).
 
     Raises:
         InputError: as `content`; no physical group of dimension 2, elements other than triangles, a body that is not
@@ -230,7 +230,7 @@ class _Numbers:
         return self._binary
 
     def line(self) -> int:
-        """The count on a line of text, as the old binary format has it."""
+        """Return the count on a line of text, as the old binary format has it."""
         end = self._body.find(b"\n", self._at)
         word = self._body[self._at:end].strip()
         if end < 0 or not word.isdigit() or len(word) > 15:
@@ -239,11 +239,11 @@ class _Numbers:
         return int(word)
 
     def reals(self, n: int) -> np.ndarray:
-        """The next n real numbers."""
+        """Return the next n real numbers."""
         return self._take(n, "f8")
 
     def ints(self, n: int) -> np.ndarray:
-        """The next n whole numbers of four bytes."""
+        """Return the next n whole numbers of four bytes."""
         return self.whole(self._take(n, "i4"))
 
     def few(self, n: int) -> list[int]:
@@ -251,18 +251,18 @@ class _Numbers:
         return [int(value) for value in self.ints(n)]
 
     def sizes(self, n: int) -> np.ndarray:
-        """The next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
+        """Return the next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
         return self.whole(self._take(n, f"u{self._width}"))
 
     def end(self) -> None:
-        """An InputError unless all of the section was read: the part beyond its counts would be lost."""
+        """Raise an InputError unless all of the section was read: the part beyond its counts would be lost."""
         left = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
         if left:
             raise InputError(f"{self.where}: {left} more {'bytes' if self._binary else 'numbers'} follow what its"
                              f" counts announce")
 
     def records(self, n: int, fields: list) -> np.ndarray:
-        """The next n records of a binary section."""
+        """Return the next n records of a binary section."""
         return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
 
     def _take(self, n: int, kind: str) -> np.ndarray:
@@ -281,7 +281,7 @@ class _Numbers:
         return found
 
     def whole(self, values: np.ndarray) -> np.ndarray:
-        """The values as whole numbers; an InputError unless they are."""
+        """Return the values as whole numbers; an InputError unless they are."""
         with np.errstate(invalid="ignore"):
             whole = np.abs(values) < 2.0**53
             found = np.where(whole, values, 0).astype(np.int64)
@@ -373,7 +373,7 @@ def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _total(section: _Numbers, what: str, total: int, parts: list[np.ndarray]) -> None:
-    """The section ends, and its parts are as many as its first line says."""
+    """Raise an InputError unless the section ends and has as many parts as its first line says."""
     section.end()
     if (found := sum(map(len, parts))) != total:
         raise InputError(f"{section.where}: {found} {what}, but its first line says {total}")

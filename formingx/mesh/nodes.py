@@ -23,7 +23,7 @@ def own_cells(domain: Any) -> np.ndarray:
 
 
 def of_mesh(domain: Any) -> np.ndarray:
-    """This rank's nodes in the reference configuration, shape (n, COORDINATES)."""
+    """Return this rank's nodes in the reference configuration, shape (n, COORDINATES)."""
     return domain.geometry.x[:, :COORDINATES]
 
 
@@ -51,7 +51,7 @@ def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """The rows of `geometry.x` for that, shape (facets, 2 or 3)."""
+    """Return the rows of `geometry.x` for that, shape (facets, 2 or 3)."""
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

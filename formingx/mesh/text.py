@@ -64,7 +64,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """The grid in a text file (see the module); clockwise elements are turned.
+    """Return the grid in a text file (see the module); clockwise elements are turned.
 
     Raises:
         InputError: the file is not there or not in this format; the message names the line.
@@ -118,7 +118,7 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
-    """A boundary edge that is no edge of an element would be lost without a word."""
+    """Raise an InputError for a boundary edge that is no edge of an element."""
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
     for name, rows in boundaries.items():

@@ -28,7 +28,8 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """A point, shape (2,), in three dimensions (x, y), the same on all ranks, with the nearest boundary; collective."""
+    """Return a point, shape (2,), in three dimensions (x, y), the same on all ranks, with the nearest boundary;
+    collective."""
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)[:, :2]
@@ -76,5 +77,5 @@ class Triangles:
         self.thickness = float(self.area.sum()) / self.length
 
     def place(self, number: int) -> Place:
-        """The middle of a triangle."""
+        """Return the middle of a triangle."""
         return place(self._mesh, self.corners[number].mean(0), str(self.layer[number]))

@@ -169,7 +169,8 @@ class Contact(Part):
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
-        """The shear stress at which n points slide under a pressure, shape (n,), and its derivative: Coulomb's mu p.
+        """Return the shear stress at which n points slide under a pressure, shape (n,), and its derivative:
+        Coulomb's mu p.
 
         A law of one's own gives another: 0 without pressure, and never less under more of it. Not asked for stick.
         """
@@ -264,7 +265,7 @@ class Law(NormalLaw):
         self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
-        """The same law with other coefficients of friction."""
+        """Return the same law with other coefficients of friction."""
         law = self._with()
         law._set_friction(mu)
         return law
@@ -291,7 +292,7 @@ class Law(NormalLaw):
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
-        """The distance at which the normal traction is a pressure, stress."""
+        """Return the distance at which the normal traction is a pressure, stress."""
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
 
@@ -381,7 +382,7 @@ class Law(NormalLaw):
                 np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """Derivative of the traction round the axis by the motion there, shape (n,), stress/length.
+        """Return the derivative of the traction round the axis by the motion there, shape (n,), stress/length.
 
         That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and the stiffness of a sticking
         point; nothing holds one that slides.
@@ -399,7 +400,8 @@ class Law(NormalLaw):
         return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """The stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into the ramp.
+        """Return the stiffness with points that have just touched (`arrived`), or are about to, pressed halfway into
+        the ramp.
 
         At the outer edge of the ramp they have none, and the tangent of the path would let them slip where they will
         stick.

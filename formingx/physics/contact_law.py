@@ -137,7 +137,8 @@ class ContactLaw(Protocol):
         iteration before."""
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """Derivative of the tractions beyond a state, shape (n, c, c), stress/length; `arrived`: just now."""
+        """Return the derivative of the tractions beyond a state, shape (n, c, c), stress/length; `arrived`: just
+        now."""
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the circumferential traction by the circumferential motion, shape (n,),
@@ -150,19 +151,19 @@ class ContactLaw(Protocol):
         """`PlaneTool.nearest`, with these distances."""
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Normal traction over the penalty at distances d, and its derivative."""
+        """Return the normal traction over the penalty at distances d, and its derivative."""
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
         """Return the energy of the normal tractions per unit reference area, shape (n,), stress length."""
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
-        """The law of some of the points."""
+        """Return the law of some of the points."""
 
     def without(self, points: np.ndarray) -> ContactLaw:
-        """The same law, of which some points (a mask, shape (n,)) touch nothing."""
+        """Return the same law, of which some points (a mask, shape (n,)) touch nothing."""
 
     def with_friction(self, mu: np.ndarray | float) -> ContactLaw:
-        """The same law with other coefficients of friction."""
+        """Return the same law with other coefficients of friction."""
 
 
 class NormalLaw:
@@ -186,7 +187,7 @@ class NormalLaw:
         raise NotImplementedError
 
     def stored(self, d: np.ndarray) -> np.ndarray:
-        """The integral of the ramp over the distance, 0 where there is no contact, shape (n,), length^2."""
+        """Return the integral of the ramp over the distance, 0 where there is no contact, shape (n,), length^2."""
         raise NotImplementedError
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
@@ -242,12 +243,12 @@ class NormalLaw:
         return self
 
     def _with(self, **other: Any) -> Self:
-        """The same law with other attributes."""
+        """Return the same law with other attributes."""
         law = copy.copy(self)
         vars(law).update(other, _near=None)
         return law
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a b^T of n vectors, shape (n, c, c)."""
+    """Return a b^T of n vectors, shape (n, c, c)."""
     return a[:, :, None] * b[:, None, :]

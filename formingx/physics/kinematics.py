@@ -60,7 +60,7 @@ class Kinematics:
         raise NotImplementedError
 
     def weight(self, X: Any) -> Any:
-        """Reference volume per unit area of the plane, and reference area per unit length of a line."""
+        """Return the reference volume per unit area of the plane, and reference area per unit length of a line."""
         raise NotImplementedError
 
     def area_vector(self, u: Any, X: Any, N: Any) -> Any:
@@ -153,7 +153,7 @@ class PlaneStrain(Kinematics):
         return _rows(ufl.grad(mode), [-number * mode[0], -number * mode[1], number * mode[2]])
 
     def rigid_modes(self, number):
-        """Translations and the rotation in the plane, of a mode that is the same all along."""
+        """Return the translations and the rotation in the plane, of a mode that is the same all along."""
         plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
         return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]
 
@@ -172,7 +172,7 @@ class ThreeD(Kinematics):
     components = 3
 
     def in_axes(self, support, items):
-        """A hinge holds all nodes of its rim, along y too."""
+        """Constrain all nodes of the rim of a hinge, along y too."""
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
         return [Held(self.axes.index(NAMES[h.component].replace("r", "x")), on=h.on, driven=h.driven) for h in items]
@@ -205,7 +205,8 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """True if F has the block structure of this module; modes alone have none, and write their F entry by entry."""
+    """Return True if F has the block structure of this module; modes alone have none, and write their F entry by
+    entry."""
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 

@@ -34,7 +34,8 @@ class Load(Part):
         return self.value is None
 
     def virtual_work(self, body: Any, value: Any) -> Any:
-        """The virtual work of the load at a value, which may be a UFL expression: a UFL form, linear in `body.du`.
+        """Return the virtual work of the load at a value, which may be a UFL expression: a UFL form, linear in
+        `body.du`.
 
         Args:
             body: a `formingx.forms.formulation.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
@@ -53,7 +54,7 @@ class Load(Part):
                          f" mode_work(body, value) that returns a form, or None if it does not")
 
     def unit(self, body: Any) -> float:
-        """The value at which a driven load counts as one: a run takes its steps in parts of it.
+        """Return the value at which a driven load counts as one: a run takes its steps in parts of it.
 
         By default the forces in the reference configuration then add up to shear modulus times volume over length of
         the body.
@@ -162,5 +163,5 @@ def _density(caller: str, given: Any) -> dict[str | None, float]:
 
 
 def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:
-    """The integral (UFL) of density times an integrand."""
+    """Return the integral (UFL) of density times an integrand."""
     return sum(body.integral(body.constant(rho) * integrand, layer) for layer, rho in density.items())

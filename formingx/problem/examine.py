@@ -122,8 +122,8 @@ def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
-    """The residual by field, over the support forces of the state; the place and the node of its largest displacement
-    entry."""
+    """Return the residual by field, over the support forces of the state; the place and the node of its largest
+    displacement entry."""
     out, comm, space = x.duplicate(), problem.comm, problem.forms.space
     problem.residual(x, control, out)
     values, n = out.array_r.copy(), space.dofmap.index_map.size_local

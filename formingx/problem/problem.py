@@ -160,7 +160,7 @@ class Problem(Histories, Units):
         return Examination(self, last, attempt)
 
     def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
-        """An item of the scene is going to take part, and remembers nothing. x: locally owned entries.
+        """Activate an item of the scene, without history. x: locally owned entries.
 
         Raises:
             InputError: a tool comes in where the body is.
@@ -238,13 +238,12 @@ class Problem(Histories, Units):
         return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
-        """Internal less external forces at (x, control), which supports carry; owned part of the fields, shape (n,)."""
+        """Return the internal less external forces at (x, control), carried by supports; owned, shape (n,)."""
         self.set_state(x, control)
         return self._forces(x.array_r[: self._n], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
-        """`forces` without those of contact: what supports and tools do to the body. x: locally owned entries; shape
-        (n,)."""
+        """Return `forces` without contact: reactions of supports and tools. x: locally owned; shape (n,)."""
         self.look_at(x, control)
         return self.assemble(self._residual)
 
@@ -259,14 +258,14 @@ class Problem(Histories, Units):
         return None if self._stage.left is None else self._stage.left[: self._n]
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """`forces` at the state last set."""
+        """Return `forces` at the state last set."""
         values = self.assemble(self._residual)
         for contact in self.present:
             contact.add_residual(values, fields, control)
         return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """True if the body has no shape: a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
+        """Return True if a hoop stretch or an in-plane determinant is not positive (`Admissible`)."""
         self.set_state(x, control)
         return not self.admissible.holds()
 
@@ -340,7 +339,7 @@ class Problem(Histories, Units):
             out.array_w += self._stage.left
 
     def take_temperature(self) -> None:
-        """The temperature has changed: constants and friction follow it; collective.
+        """Update constants and friction to a changed temperature; collective.
 
         Raises:
             InputError: a constant or friction has no value at a temperature.
@@ -348,7 +347,7 @@ class Problem(Histories, Units):
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
 
     def motion(self, control: float) -> np.ndarray:
-        """The held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
+        """Return the held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
         values = np.zeros(self.x.getLocalSize())
         values[self.held] = self._stage.place + self._stage.rate * control
         return values
@@ -385,7 +384,7 @@ class Problem(Histories, Units):
         self.fill(out, self.forms.w.x.array[: self._n])
 
     def assemble(self, form: Any) -> np.ndarray:
-        """A compiled linear form at the state last set, owned part, shape (n,)."""
+        """Return a compiled linear form at the state last set, owned part, shape (n,)."""
         array = self._buffer.array
         array[:] = 0
         fem.assemble_vector(array, form)
@@ -393,7 +392,7 @@ class Problem(Histories, Units):
         return array[: self._n].copy()
 
     def assemble_scalar(self, form: Any) -> float:
-        """A compiled scalar form at the state last set, all ranks."""
+        """Return a compiled scalar form at the state last set, all ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:

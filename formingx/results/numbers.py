@@ -10,7 +10,7 @@ from ..units import Units
 
 
 def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
-    """A point's coordinates, 0 where they are 1e-12 or less of the extent of points, shape (n, coordinates)."""
+    """Return a point's coordinates, 0 where they are 1e-12 or less of the extent of points, shape (n, coordinates)."""
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 

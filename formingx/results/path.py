@@ -97,7 +97,7 @@ class Path(States):
         fields.to_vtx(self, folder, states)
 
     def to_xdmf(self, file: Any, states: Any = None) -> None:
-        """The same fields as `to_vtx`, for programs that do not read VTX; the name ends in .xdmf."""
+        """Write the same fields as `to_vtx`, for programs that do not read VTX; the name ends in .xdmf."""
         from .files import fields
         fields.to_xdmf(self, file, states)
 
@@ -154,7 +154,7 @@ class Path(States):
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
-        """The wall of the part at a state (default: the last), place by place: to_csv, to_excel.
+        """Return the wall of the part at a state (default: the last), place by place: to_csv, to_excel.
 
         A `Wall`, from the axis to the rim; in three dimensions a `WallInSpace`, triangle by triangle.
         """
@@ -162,7 +162,7 @@ class Path(States):
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
              units: Units | None = None) -> Any:
-        """The formed part in numbers (`Part`): volume, weight, area, minimum wall and where, evenness; print it.
+        """Return the formed part in numbers (`Part`): volume, weight, area, minimum wall and where, evenness; print it.
 
         They are those of the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
 
@@ -181,7 +181,8 @@ class Path(States):
         return self._reader.part(state or self.last, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:
-        """The gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill it.
+        """Return the gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill
+        it.
 
         Args:
             tool: its name, the `Tool` or the `Contact`; may be left out where there is one.
@@ -217,7 +218,8 @@ class Path(States):
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
-        """The energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth: length^2).
+        """Return the energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth:
+        length^2).
 
         It is that of the whole part, with the tools of all its images where a half or a quarter is modelled.
 

@@ -121,11 +121,11 @@ class States:
         return self.record.last
 
     def met(self, target: Target) -> State | None:
-        """The state that hit a target of the run, or None."""
+        """Return the state that hit a target of the run, or None."""
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
     def value(self, measure: str | Bound, state: State) -> float:
-        """A column, by its name, or a measure bound to the state's problem (`Target.bind`), at a state."""
+        """Return a column, by its name, or a measure bound to the state's problem (`Target.bind`), at a state."""
         segment = self.segment(state)
         if isinstance(measure, str):
             self._check(measure)
@@ -134,7 +134,8 @@ class States:
             return measure.value(problem.x, state.control)
 
     def state(self, stage: str | None = None, time: float | None = None) -> State:
-        """The last state (of a stage), or the one at a process time (in a stage): solved for where none lies there.
+        """Return the last state (of a stage), or the one at a process time (in a stage): solved for where none lies
+        there.
 
         Raises:
             InputError: there is no such stage, or it does not pass that time.
@@ -158,7 +159,8 @@ class States:
         return exact or self.at(process_time(time), after=there[0])
 
     def at(self, target: Target, after: State | None = None) -> State:
-        """The first state of the path that meets the target: solved for, not interpolated; the path stays as it is.
+        """Return the first state of the path that meets the target: solved for, not interpolated; the path stays as
+        it is.
 
         A value just beyond the path's last state, as one written with six digits may lie, is solved for there.
 
@@ -208,7 +210,7 @@ class States:
             f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """The state between two neighbours that meets a target; the problem stands at the first."""
+        """Return the state between two neighbours that meets a target; the problem stands at the first."""
         if segment.problem.has_history:                      # what lies between depends on how it is reach
             found = self._run_to(segment, left, right, target, bound)
         else:
@@ -219,7 +221,7 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """The state that a run would reach that continues from `left` to the target."""
+        """Return the state that a run would reach that continues from `left` to the target."""
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
                              f" measure: none can be solved for there afterwards; run with intermediate=[...]"
@@ -241,7 +243,7 @@ class States:
         return record.last
 
     def between(self, a: State, b: State, fraction: float) -> State:
-        """A body on the smooth (cubic) path from a state to the next; for drawing: it is no solution."""
+        """Return a body on the smooth (cubic) path from a state to the next; for drawing: it is no solution."""
         if a.setting != b.setting:                           # a stage begins
             return b
         x, control = self.segment(b).curve.interpolate(a, b, fraction)
@@ -285,7 +287,7 @@ class States:
         return rows
 
     def describe(self, state: State) -> str:
-        """A state's main numbers in one line."""
+        """Return a state's main numbers in one line."""
         return self.record.describe(state)
 
     def _check(self, *names: str) -> None:
@@ -342,13 +344,14 @@ class States:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def segment(self, state: State | None = None) -> Segment:
-        """The segment that a state (None: the last) is of, or lies in."""
+        """Return the segment that a state (None: the last) is of, or lies in."""
         mesh = (state or self.last).setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
     def alone(self, state: State) -> Any:
-        """The part of the path on the mesh that a state is on: all of it, unless the mesh was made again on the way."""
+        """Return the part of the path on the mesh that a state is on: all of it, unless the mesh was made again on
+        the way."""
         if len(self.segments) == 1:
             return self
         segment = self.segment(state)

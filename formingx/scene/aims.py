@@ -17,7 +17,7 @@ _ROOMY = 1.05, 1.005   # the amount by which its volume by them may be wrong, ov
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
-    """An InputError if one of these targets cannot be met, see `unreachable`."""
+    """Raise an InputError if one of these targets cannot be met, see `unreachable`."""
     for target in targets:
         why = unreachable(scene, target, off)
         if why is not None:
@@ -78,7 +78,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """The support that holds what a `displacement` target (u_r_at_R_Z) wants to move, or None."""
+    """Return the support that holds what a `displacement` target (u_r_at_R_Z) wants to move, or None."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
@@ -91,7 +91,8 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
 
 
 def _beyond(scene: Scene, contact: Any, height: float) -> bool:
-    """True if the contact's face, moved to a pole height, has its pole deeper in the tool than the body is thick."""
+    """Return True if the contact's face, moved to a pole height, has its pole deeper in the tool than the body is
+    thick."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):

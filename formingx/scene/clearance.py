@@ -14,7 +14,7 @@ _MOST = 1000           # points of a tool in three dimensions that are looked at
 
 
 def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
-    """An InputError if tools of a stage overlap, or one goes through a boundary that is held.
+    """Raise an InputError if tools of a stage overlap, or one goes through a boundary that is held.
 
     Returns the plans to check once more when their turn comes: a travel at their beginning is not known yet.
 

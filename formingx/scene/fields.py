@@ -19,7 +19,7 @@ _WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what 
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """A field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
+    """Return a field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
 
     Args:
         field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
@@ -78,7 +78,8 @@ class PointReader:
                          else np.zeros((0, element.dim)))
 
     def read(self, array: np.ndarray) -> np.ndarray:
-        """The values of a function with these coefficients (ghosts included), shape (n,), all ranks; collective."""
+        """Return the values of a function with these coefficients (ghosts included), shape (n,), all ranks;
+        collective."""
         values = np.zeros(self._n)
         values[self._mine] = (self._weights * array[self._dofs]).sum(1)
         return self._comm.allreduce(values)
@@ -132,6 +133,6 @@ def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> Non
 
 
 def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """The first point that is not fine, as text."""
+    """Return the first point that is not fine, as text."""
     first, second = points[np.argmin(fine)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

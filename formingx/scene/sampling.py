@@ -14,7 +14,8 @@ from .temperature import GivenTemperature
 
 
 def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
-    """The quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their numbers."""
+    """Return the quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their
+    numbers."""
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
     cells = np.sort(cells[cells < len(own_cells(domain))])

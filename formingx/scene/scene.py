@@ -152,7 +152,7 @@ class Scene:
         return self if self.preformed is None else self.preformed.before[0].scene.first
 
     def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
-        """The same scene on another mesh of the body, with the same names of layers and boundaries.
+        """Return the same scene on another mesh of the body, with the same names of layers and boundaries.
 
         temperature: of the body there, where it is not the one that was given.
         """
@@ -202,7 +202,7 @@ class Scene:
         return self.driven
 
     def number(self, caller: str, item: Any) -> int:
-        """The place in `things` of an item, given as itself or by its name; an InputError if it is not there."""
+        """Return the place in `things` of an item, given as itself or by its name; an InputError if it is not there."""
         for i, known_thing in enumerate(self.items):
             if item is known_thing or isinstance(item, str) and item == known_thing.name:
                 return i
@@ -222,7 +222,7 @@ class Scene:
             self._check_rigid_body(supports)
 
     def check_driven(self, supports: Sequence[Any]) -> None:
-        """An InputError if what one of these supports drives is held by another."""
+        """Raise an InputError if what one of these supports drives is held by another."""
         held = [(support, h) for support in supports for h in support.constraints()]
         for mine, driven in held:
             for other, h in held if driven.driven else ():
@@ -287,7 +287,7 @@ class Scene:
         return dict(laws)
 
     def sample(self, layer: str) -> Sample:
-        """The quadrature points of the energy in a layer, as they are on the first mesh."""
+        """Return the quadrature points of the energy in a layer, as they are on the first mesh."""
         known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         return found if self.preformed is None else found._replace(points=self.preformed.first_places(found.points))
@@ -307,7 +307,7 @@ class Scene:
                 raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
-        """The body starts outside the tool, the face looks at it, and the pressure does not push away from it.
+        """Raise an InputError unless the body starts outside the tool and its face looks at the tool.
 
         Friction has a value at the temperature of the face.
         """
@@ -346,7 +346,7 @@ class Scene:
         tool_width.check(mesh, contact, self.kinematics.axisymmetric)
 
     def check_travel(self, contact: Contact, travel: float) -> None:
-        """An InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
+        """Raise an InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
         moves = contact.way
         for support in self.supports:
             for held in self.kinematics.in_axes(support, support.constraints()):
@@ -378,7 +378,7 @@ class Scene:
                          f" Symmetry of one of {list(self.mesh.boundaries)}")
 
     def _check_rigid_body(self, supports: Sequence[Any]) -> None:
-        """The supports must hold every rigid motion that the kinematics allows."""
+        """Raise an InputError unless the supports prevent every rigid motion of the kinematics."""
         names, modes = zip(*self.kinematics.rigid_motions().items())
         gram = np.zeros((len(modes), len(modes)))
         size = max(self.extent)
@@ -442,7 +442,7 @@ class Scene:
 
 
 def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
-    """A list of items of one kind, or an InputError."""
+    """Return a list of items of one kind, or an InputError."""
     scene_items = several(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

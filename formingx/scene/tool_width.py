@@ -23,7 +23,7 @@ _MOVES = 200
 
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
-    """An InputError if a tool would not be felt, or only when it is deep in the face."""
+    """Raise an InputError if a tool would not be felt, or only when it is deep in the face."""
     ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
         _check_width(contact, ends, axisymmetric)
@@ -31,7 +31,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
-    """A closed tool is wider than the way between contact points, where it is next to the face: else it passes."""
+    """Raise an InputError if a closed tool next to the face is narrower than the distance of contact points."""
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])
@@ -47,7 +47,7 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
-    """A tool that reaches the face as it is in equilibrium meets a contact point before it is deep in it elsewhere.
+    """Raise an InputError if a tool is deep in the undeformed face before it meets a contact point.
 
     It moves by its distance to the nearest point, again and again (sphere tracing): so it passes none. One that stays
     is thought to come straight to the middle of an edge.

@@ -52,7 +52,7 @@ class Curve:
         return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
     def start(self) -> State:
-        """The body at control 0, in equilibrium with all other loads on it, and the tangent there.
+        """Return the body at control 0, in equilibrium with all other loads on it, and the tangent there.
 
         Raises:
             Failure: Newton's method does not find it from the unloaded state.
@@ -97,7 +97,7 @@ class Curve:
         return spent
 
     def resume(self, x: Array, control: float) -> State:
-        """A state once more, under the setting that the problem has taken, and the tangent there."""
+        """Return a state once more, under the setting that the problem has taken, and the tangent there."""
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
         if not self.newton.tangent(self._x, control):
@@ -106,7 +106,8 @@ class Curve:
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
-        """The solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see `BorderedNewton`."""
+        """Return the solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see
+        `BorderedNewton`."""
         self._x.array_w[:] = x
         self._found = None
         try:
@@ -122,7 +123,7 @@ class Curve:
         return self._found
 
     def look_ahead(self, state: State) -> None:
-        """The tangent of an accepted state once more: the problem remembers the state now.
+        """Make the tangent of an accepted state again: the history variables include it now.
 
         The factors of its last iteration serve, unless many contact points differ or materials have advanced; or
         arrivals are predicted with them, as they have to be from a checkpoint, too.
@@ -148,13 +149,13 @@ class Curve:
         return True
 
     def plane_normal(self, state: State) -> Array:
-        """Derivative by x, locally owned entries, of the plane in which steps from a state end."""
+        """Return the derivative by x, locally owned entries, of the plane in which steps from a state end."""
         self._a.array_w[:] = state.direction
         self.problem.metric_times(self._a, self._b)
         return self._b.array_r.copy()
 
     def guess_from_rest(self, rest: State, control: float) -> Array:
-        """A guess of the state at a control, to correct at that control: rest, with the constraints moved.
+        """Return a guess of the state at a control, to correct at that control: rest, with the constraints moved.
 
         Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
         """
@@ -217,7 +218,7 @@ class Curve:
         return self.solve(new.x, new.control, constraint, kind, old)
 
     def _runs_along_control(self, slope: float) -> bool:
-        """True if the control makes the greater part of a path of this slope, whose fold is then not near."""
+        """Return True if the control makes the greater part of a path of this slope, whose fold is then not near."""
         return slope**2 * self.control_weight > 0.5
 
     def unit_slope(self, state: State) -> float:
@@ -229,7 +230,7 @@ class Curve:
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
     def turned_at(self, old: State, new: State) -> bool:
-        """True if a run went back from a state: the way to the next one leads against its tangent."""
+        """Return True if a run went back from a state: the way to the next one leads against its tangent."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control) < 0
 
     def work_ahead(self, state: State) -> float:
@@ -256,7 +257,7 @@ class Curve:
         return done
 
     def value(self, bound: Measure, x: Array, control: float) -> float:
-        """A bound measure at (x, control)."""
+        """Return a bound measure at (x, control)."""
         self._b.array_w[:] = x
         return float(bound.value(self._b, control))
 
@@ -278,7 +279,8 @@ class Curve:
         return x, control
 
     def between(self, a: State, b: State, bound: Measure, target: float) -> State:
-        """The state between two where a measure has a target value that lies between theirs; raises `Failure`."""
+        """Return the state between two where a measure has a target value that lies between theirs; raises
+        `Failure`."""
         low, high = 0.0, 1.0
         sign = self.value(bound, a.x, a.control) - target
         for _ in range(40):
@@ -290,7 +292,7 @@ class Curve:
         return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """The state at a fraction of the way between two, in the plane normal to the tangent of the first."""
+        """Return the state at a fraction of the way between two, in the plane normal to the tangent of the first."""
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
@@ -303,7 +305,7 @@ class Curve:
                                    f" {failure.reason}; run with intermediate=[...] to have one") from None
 
     def limit_point(self, a: State, b: State) -> State:
-        """The state between two where the control is stationary; raises `Failure`.
+        """Return the state between two where the control is stationary; raises `Failure`.
 
         The root of the derivative of the cubic through both ends, solved for and repeated on the smaller bracket until
         the control differs from its extremum by less than 1e-12 of itself, as slope and curvature tell.
@@ -319,7 +321,7 @@ class Curve:
         return found
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """The states after `old`, the first of them solved for again with points that came into a tool in three
+        """Return the states after `old`, the first of them solved for again with points that came into a tool in three
         dimensions in the step.
 
         That is held from where it met the tool: at a target, one of (target, its measure), all points are; in any other
@@ -353,7 +355,8 @@ class Curve:
         return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
 
     def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
-        """The state at (self._x, control); its tangent, from the last factorisation, points away from `before`."""
+        """Return the state at (self._x, control); its tangent, from the last factorisation, points away from
+        `before`."""
         b = self.newton.b
         size = self._length_of(b)
         state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind,
@@ -379,7 +382,7 @@ class Curve:
         return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
-        """The plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
+        """Return the plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
             self._a.array_w[:] = old.direction
             self.problem.metric_times(self._a, gradient)

@@ -192,7 +192,8 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 
 def limits_passed(problem: Equations, states: Sequence[State]) -> str:
-    """A sentence, with a space before it, that tells at which controls limit points were passed; "" without any."""
+    """Return a sentence, with a space before it, that tells at which controls limit points were passed; "" without
+    any."""
     shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
     if not shown:
         return ""
@@ -246,7 +247,7 @@ def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
 
 
 def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
-    """The sign of the determinant of the tangent at a state, 0 if it has no factors."""
+    """Return the sign of the determinant of the tangent at a state, 0 if it has no factors."""
     problem = curve.problem
 
     def sign(state: State) -> int:
@@ -318,7 +319,7 @@ def _changes(states: Sequence[State], usable: Sequence[State],
 
 @register("failure")
 def _of_material(failure: Failure) -> Iterator[Finding]:
-    """A material near the end of its domain."""
+    """Return a material near the end of its domain."""
     facts = failure.facts
     if (facts.get("I1") or 0) > _LIMITS.material:
         yield Finding("serious", "material",
@@ -330,7 +331,7 @@ def _of_material(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_elements(failure: Failure) -> Iterator[Finding]:
-    """An element that turns inside out."""
+    """Return an element that turns inside out."""
     facts = failure.facts
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
@@ -348,7 +349,7 @@ def _of_elements(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_compression(failure: Failure) -> Iterator[Finding]:
-    """A sheet in contact that is compressed along its section: it buckles."""
+    """Return a sheet in contact that is compressed along its section: it buckles."""
     if _buckles(failure.facts):
         stretch, first, last = failure.facts["shortened"]
         yield Finding("serious", "wall",
@@ -361,13 +362,13 @@ def _of_compression(failure: Failure) -> Iterator[Finding]:
 
 
 def _buckles(facts: dict[str, Any]) -> bool:
-    """True if a piece of a sheet in contact is compressed along its section."""
+    """Return True if a piece of a sheet in contact is compressed along its section."""
     return bool(facts.get("shortened") and facts["touching"])
 
 
 @register("failure")
 def _of_limits(failure: Failure) -> Iterator[Finding]:
-    """A limit point before the target."""
+    """Return a limit point before the target."""
     facts, target = failure.facts, failure.target
     if _buckles(facts):                                      # then the limit point is no more than its effect
         return
@@ -416,7 +417,7 @@ def _of_branches(failure: Failure) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """True if the tangent is near a singular one: its condition has grown from state to state."""
+    """Return True if the tangent is near a singular one: its condition has grown from state to state."""
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
 

@@ -45,7 +45,7 @@ class Measure(Protocol):
         """Return the value at a state, in the user's units."""
 
     def equation(self, target: float) -> Constraint:
-        """The constraint measure = target."""
+        """Return the constraint measure = target."""
 
 
 class Standing(Protocol):
@@ -89,7 +89,7 @@ class Increment(Protocol):
         """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:
-        """Forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
+        """Return the forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
 
     def foretold(self, by: Array) -> Tractions:
         """Law at the points after a motion, shape (n, 2), length."""
@@ -102,7 +102,7 @@ class Increment(Protocol):
         through it, shape (m, 2), length, 0 where no friction grows in it."""
 
     def expect(self, points: Array, sense: Array) -> None:
-        """The next iteration takes this sense of sliding for the points in a mask, shape (n,)."""
+        """Set this sense of sliding in the next iteration for the points in a mask, shape (n,)."""
 
 
 class ContactFace(Protocol):
@@ -122,7 +122,7 @@ class ContactFace(Protocol):
         """Add forces at the points, shape (n, 2), to locally owned rows of F."""
 
     def leave_out(self, points: Array) -> None:
-        """Some points (a mask, shape (n,)) touch nothing, until another increment begins."""
+        """Keep some points (a mask, shape (n,)) open until another increment begins."""
 
     def moved(self, dx: Array, step: float) -> Array:
         """Return the motion of the points relative to the tool by a correction of x (locally owned) and the control;
@@ -157,7 +157,7 @@ class Examined(Protocol):
     facts: dict[str, Any]
 
     def draw(self, file: str | PathLike[str], title: str) -> None:
-        """A picture of the last good state (rank 0 draws).
+        """Draw the last good state (on rank 0).
 
         Raises:
             InputError: there is nothing to draw.
@@ -198,7 +198,7 @@ class Residual(Protocol):
         """out with inner(a, b) = out . b."""
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """True if (x, control) is no state though F may vanish there: an element is inside out."""
+        """Return True if (x, control) is no state though F may vanish there: an element is inside out."""
         return False
 
     def viscosity(self) -> Viscosity:
@@ -283,7 +283,7 @@ class Histories(Protocol):
         return False
 
     def advance(self, x: Array, control: float) -> None:
-        """A state is accepted: the histories take it up. x: locally owned entries."""
+        """Update the history variables for an accepted state. x: locally owned entries."""
 
     def time_at(self, control: float) -> float:
         """Process time at a control."""
@@ -315,7 +315,7 @@ class Stages(Protocol):
         """Stand at a state, its x and control too, and come back on leaving."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
-        """An item (its number in the setting) is going to take part, and remembers nothing.
+        """Activate an item (its number in the setting), without history.
 
         Raises:
             InputError: a tool comes in where the body is.

@@ -46,7 +46,7 @@ class FixedControl:
         return bool(self._snes.getConvergedReason() > 0)
 
     def correction(self) -> Array:
-        """The last correction of x, locally owned entries, shape (n,)."""
+        """Return the last correction of x, locally owned entries, shape (n,)."""
         return np.negative(self._snes.getSolutionUpdate().array_r)
 
     def destroy(self) -> None:
@@ -92,11 +92,11 @@ class FixedControlCurve(Curve):
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """The same, to where an equation for the control holds."""
+        """Return the same, to where an equation for the control holds."""
         return self._correct(old, length, kind)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """The state at a fraction of the way between two, by the control; raises `Failure`."""
+        """Return the state at a fraction of the way between two, by the control; raises `Failure`."""
         control = a.control + fraction * (b.control - a.control)
         if self._at_rest(a):                                 # a slack body has no cubic from there
             return self._correct(a, (control - a.control) / a.slope, "step")
@@ -141,7 +141,7 @@ class FixedControlCurve(Curve):
 
 
 def _at(value: float) -> Constraint:
-    """The constraint that the control has a value."""
+    """Return the constraint that the control has a value."""
     def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0.0)
         return control - value, 1.0

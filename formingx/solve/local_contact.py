@@ -136,8 +136,8 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
 
 def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
-    """Unit forces at locally owned points of contacts in F, locally owned rows, shape (n, m): point by point of all
-    ranks."""
+    """Return the unit forces at locally owned points of contacts in F, locally owned rows, shape (n, m): point by
+    point of all ranks."""
     unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
     own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
     units = []
@@ -233,11 +233,11 @@ class _Points:
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _taken(self) -> tuple[Array, Array]:
-        """Forces, flat, and stiffnesses that the iteration has taken."""
+        """Return the forces, flat, and stiffnesses that the iteration has taken."""
         return self._forces([c.increment.taken(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Forces, flat, and stiffnesses of the law, linearised where the points would be."""
+        """Return the forces, flat, and stiffnesses of the law, linearised where the points would be."""
         return self._forces([(there.force, there.stiffness) for there in self._each(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:

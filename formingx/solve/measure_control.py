@@ -72,7 +72,7 @@ class Flow(Run):
         super()._accept(state)
 
     def _next(self, old: State) -> list[State]:
-        """The next state in time, or one before it that meets a target."""
+        """Return the next state in time, or one before it that meets a target."""
         event = self._next_event(old.time)
         while True:
             left = event - old.time
@@ -99,12 +99,12 @@ class Flow(Run):
                                   f" {failure.reason}", failure.attempt)
 
     def _next_event(self, time: float) -> float:
-        """The next time that must be hit: a corner of the course, or a target."""
+        """Return the next time that must be hit: a corner of the course, or a target."""
         times = [*self._times, *(t.value for t, _ in self.aim.open if t.name == "process_time")]
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
-        """The state at a time, one step from `old`; raises `Failure`."""
+        """Return the state at a time, one step from `old`; raises `Failure`."""
         problem, problem.clock = self.problem, time
         value = float(self._course(time))
         x, control = self._predicted(old, time, value)
@@ -121,8 +121,8 @@ class Flow(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """The state between two in time at which the controlled quantity has a maximum or a minimum, if it has; else
-        the second.
+        """Return the state between two in time at which the controlled quantity has a maximum or a minimum, if it
+        has; else the second.
 
         Not where the course turns, or where the controlled quantity stands still but for round-off.
         """
@@ -172,7 +172,7 @@ class Flow(Run):
         return old.x, old.control
 
     def _met_before(self, old: State, new: State) -> State:
-        """The state between two in time that meets a target, the first if there are several; else the second."""
+        """Return the state between two in time that meets a target, the first if there are several; else the second."""
         problem, best = self.problem, new
         for target, bound in self.aim.open:
             if target.name == "process_time":
@@ -190,7 +190,7 @@ class Flow(Run):
         return best
 
     def _meeting(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
-        """The state, one step from `old`, at the time between two when a measure has its target value."""
+        """Return the state, one step from `old`, at the time between two when a measure has its target value."""
         found: dict[float, State] = {}
 
         def off(time: float) -> float:

@@ -56,7 +56,7 @@ class Newton:
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
-    """A norm of forces over that of the support forces, at the residual last computed."""
+    """Return a norm of forces over that of the support forces, at the residual last computed."""
     return float(forces / (equations.force_scale + floor))
 
 
@@ -148,7 +148,7 @@ class Tolerances:
         count("Tolerances: settling", self.settling)
 
     def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
-        """True if a state with these corrections behind it, and these residuals (its own last), has converged.
+        """Return True if a state with these corrections behind it, and these residuals (its own last), has converged.
 
         `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is predicted
         from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an iteration
@@ -203,12 +203,12 @@ class _ModifiedNewton:
         self._fall = self._before if self._setting is setting else 1.0
 
     def keeps(self, residual: float, wanted: float) -> bool:
-        """True if the tangent is kept for the next iteration, from this residual to the one wanted."""
+        """Return True if the tangent is kept for the next iteration, from this residual to the one wanted."""
         ahead = residual * self._fall**self._settings.chords
         return self._allowed and self._fall < self._settings.slow and ahead < wanted
 
     def took(self, chord: bool, fall: float) -> None:
-        """An iteration, with a tangent that was kept or not, made the residual fall by a factor."""
+        """Note the factor of the residual in an iteration, with an old tangent or a new one."""
         if self._allowed and self._first:
             self._before = fall if chord else self._before / 2
         self._fall, self._first = fall, False
@@ -409,7 +409,7 @@ class BorderedNewton:
 
 
 def fixed(target: float) -> Constraint:
-    """The constraint control = target."""
+    """Return the constraint control = target."""
     def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0)
         return control - target, 1.0

@@ -202,7 +202,7 @@ class Run:
                            accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
-        """The next states: one at a target within reach, or one step ahead, and what lies on the way to it.
+        """Return the next states: one at a target within reach, or one step ahead, and what lies on the way to it.
 
         A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
         snap-through near there found no rest, and from a first state with a history, only if the shortest fails.
@@ -245,12 +245,12 @@ class Run:
                                   failure.attempt)
 
     def _failed(self, why: str, length: float) -> None:
-        """A step was not taken; `length` is tried next."""
+        """Note a rejected step; `length` is tried next."""
         self.record.counts.failures += 1
         self._limited(why, length)
 
     def _limited(self, why: str, length: float) -> None:
-        """A step is made shorter, or was not taken; `length` is tried next."""
+        """Note a shortened or rejected step; `length` is tried next."""
         self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
@@ -317,7 +317,7 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """The state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
+        """Return the state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
         onward = self._sense * (self._limit_rule == "continue_volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
@@ -332,7 +332,7 @@ class Run:
             return []
 
     def _jump(self, old: State, length: float, step: float = 0.0, onward: float = 0.0) -> State:
-        """The state that the body snaps to from a step of this length ahead, or from where it is; raises `Failure`.
+        """Return the state after a snap-through from a step of this length ahead; raise `Failure`.
 
         step: the length of the last step that went well; onward: see `snap_through`.
 
@@ -362,7 +362,7 @@ class Run:
         return new
 
     def _found_no_rest_near(self, old: State) -> bool:
-        """True if a jump from about the control of a state, which costs most, reached rest nowhere."""
+        """Return True if a jump from about the control of a state, which costs most, reached rest nowhere."""
         return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
@@ -384,7 +384,7 @@ class Run:
             self._give_up(why)
 
     def _sorted_into(self, old: State, new: State) -> list[State]:
-        """The states from old to new in order: a limit point and targets inside the step, then new itself.
+        """Return the states from old to new in order: a limit point and targets inside the step, then new itself.
 
         Raises `Failure` if one of them cannot be solved for.
         """

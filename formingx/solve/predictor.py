@@ -13,7 +13,8 @@ CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a
 
 
 def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """The last states, at most this number of, on whose polynomial a time lies ahead: in order, from the last jump on.
+    """Return the last states, at most this number of, on whose polynomial a time lies ahead: in order, from the last
+    jump on.
 
     Those closer than the part `close` of the step ahead are not told apart: what they are not exact in would be
     magnified.
@@ -28,7 +29,8 @@ def before(states: Sequence[State], time: float, most: int, close: float = 0.1) 
 
 
 def behind(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
-    """An earlier state that gives, with the last one and its tangent, a parabola for a step of a length; None: none.
+    """Return an earlier state that gives, with the last one and its tangent, a parabola for a step of a length;
+    None: none.
 
     It is one of the last few, at least half the step away, with no jump since.
     """

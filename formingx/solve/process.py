@@ -89,7 +89,7 @@ class Execution:
                 break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
-        """The targets of a stage and their measures; where it drives one item, or waits, the last is `until`."""
+        """Return the targets of a stage and their measures; where it drives one item, or waits, the last is `until`."""
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
         self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
@@ -105,14 +105,14 @@ class Execution:
         return found
 
     def _left_to_meet(self) -> _Targets:
-        """The targets of the stage, but those on its way that were met on meshes before."""
+        """Return the targets of the stage, but those on its way that were met on meshes before."""
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
         return [(target, bound) for target, bound in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
     def _standing(self) -> tuple[Setting, Array, float]:
-        """The setting, the unknowns and the control where the process stands now."""
+        """Return the setting, the unknowns and the control where the process stands now."""
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
@@ -207,7 +207,8 @@ class Execution:
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
-        """(a target of the measure, the measure at a time, the times of its corners) of a flow that begins now."""
+        """Return (a target of the measure, the measure at a time, the times of its corners) of a flow that begins
+        now."""
         stage, end = self._stage, self._stage.until
         if stage.constant and stage.duration:
             value = stage.constant.value
@@ -283,7 +284,7 @@ class Execution:
 
 
 def is_done(record: Record, plans: list[Plan]) -> bool:
-    """True if the last state is the end of the last stage."""
+    """Return True if the last state is the end of the last stage."""
     last, plan = record.last, plans[-1]
     if last.setting["stage"] < len(plans) - 1:
         return False
@@ -299,7 +300,8 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
 
 def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """(base, rate, control now) of a setting that makes the amplitude of one item, by its numbers, the control."""
+    """Return (base, rate, control now) of a setting that makes the amplitude of one item, by its numbers, the
+    control."""
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
     for number in numbers:
@@ -318,7 +320,7 @@ def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int]
 
 def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
-    """(base, rate) of a setting between two times where tables are straight; the control is the time, scaled."""
+    """Return (base, rate) of a setting between two times where tables are straight; the control is the time, scaled."""
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
         first, value = table[0]
@@ -334,18 +336,18 @@ def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tupl
 
 
 def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
-    """The time at which a stage that follows tables, or waits, ends."""
+    """Return the time at which a stage that follows tables, or waits, ends."""
     return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
         table[-1, 0] for _, table in tables)
 
 
 def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
-    """The first time after now at which tables have a corner, or the end."""
+    """Return the first time after now at which tables have a corner, or the end."""
     return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])
 
 
 def begin(curve: Curve) -> State:
-    """The first state of a path: the body at control 0, in equilibrium with all other loads on it.
+    """Return the first state of a path: the body at control 0, in equilibrium with all other loads on it.
 
     Fixed loads for which Newton's method finds no equilibrium from the unloaded state are brought in gradually.
 
@@ -372,7 +374,7 @@ def begin(curve: Curve) -> State:
 
 
 def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
-    """The error of a body for which no first state was found."""
+    """Return the error of a body for which no first state was found."""
     loads = curve.problem.fixed_loads
     words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
         "", "a tool touches the body at rest: give its Contact a smaller ramp")

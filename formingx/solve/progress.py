@@ -40,7 +40,7 @@ class Aim:
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:
-        """True until the last target, or the one that is wanted, is met."""
+        """Return the true until the last target, or the one that is wanted, is met."""
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
@@ -54,13 +54,13 @@ class Aim:
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
-        """A state is accepted: close the targets that it meets."""
+        """Close the targets that an accepted state meets."""
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
 
     def met_by(self, state: State) -> Target | None:
-        """The first open target that holds at a state, to round-off."""
+        """Return the first open target that holds at a state, to round-off."""
         return next((target for target, bound in self.open
                      if is_met(target, bound.size, self._curve.value(bound, state.x, state.control))), None)
 
@@ -80,7 +80,7 @@ class Aim:
         return best
 
     def facing(self, start: State, first: bool = False) -> State:
-        """The start, its tangent turned if the target lies the other way.
+        """Return the start, its tangent turned if the target lies the other way.
 
         (At rest, `first`, a target that does not change sign with the control may be reached both ways.)
         """
@@ -92,7 +92,7 @@ class Aim:
         return start
 
     def short_of_targets(self, old: State, by: float) -> float:
-        """A change of the control in a jump, or as much of it as does not pass a target."""
+        """Return a change of the control in a jump, or as much of it as does not pass a target."""
         for target, bound in self.open:
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self._curve.value(bound, old.x, c) - target.value
@@ -103,7 +103,7 @@ class Aim:
     # why a run should give up, as text; "" if nothing speaks against going on
 
     def turned_back(self) -> str:
-        """The target is further away than half of what had been gained.
+        """Return True if the target is further away than half of the progress.
 
         (A control may fall again after a limit point, but not below where it started.)
         """
@@ -118,7 +118,7 @@ class Aim:
         return ""
 
     def jumped_past(self, state: State) -> str:
-        """The body has snapped to a state beyond the target."""
+        """Return the error of a body that has snapped to a state beyond the target."""
         if state.kind == "jump" and self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
@@ -167,7 +167,7 @@ class Progress:
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
-        """A step is complete: part of the way, from 0 to 1, in this number of states; length: of the next step."""
+        """Show a completed step: part of the way, from 0 to 1, in this number of states; length: of the next step."""
         self._gained, self._states, self._length = gained, states, length
         if not self._bar.disable:
             self._bar.n = min(max(gained, 0.0), 1.0)
@@ -176,13 +176,13 @@ class Progress:
         self._speak()
 
     def limited(self, by: str, length: float) -> None:
-        """A step was made shorter, or failed, for a reason; length: what is tried next."""
+        """Show a shortened or failed step and its reason; length: of the next attempt."""
         self._limits[by] += 1
         self._length = length
         self._speak()
 
     def close(self) -> None:
-        """The run is over."""
+        """Close the bar."""
         self._bar.close()
 
     def _speak(self) -> None:
@@ -201,7 +201,7 @@ class Progress:
 
 
 def _in_words(seconds: float) -> str:
-    """A duration to two digits."""
+    """Return a duration to two digits."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}"

@@ -149,14 +149,15 @@ class Record:
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **more: Any) -> None:
-        """A step is complete: note in the last state how the run continues from it, with more that the run knows."""
+        """Complete a step: store in the last state the data with which the run continues."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
         for listener in self.on_step:
             listener()
 
     def describe(self, state: State) -> str:
-        """A state's main numbers in one line, without what no body has (the pole stretch of a wall not above 0)."""
+        """Return a state's main numbers in one line, without what no body has (the pole stretch of a wall not above
+        0)."""
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)

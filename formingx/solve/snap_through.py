@@ -136,7 +136,7 @@ class _Motion:
         self._wait = False                                  # eta may not fall after the next solution
 
     def goes_on(self, eta: float) -> bool:
-        """True while neither eta nor the body has left its bounds."""
+        """Return True while neither eta nor the body has left its bounds."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
         return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
@@ -179,8 +179,8 @@ class _Motion:
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:
-        """The state in the reference configuration, if there is one near; raises `Failure` if the body, without a
-        history, rests at none."""
+        """Return the state in the reference configuration, if there is one near; raises `Failure` if the body,
+        without a history, rests at none."""
         try:
             with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
@@ -201,7 +201,7 @@ class _Motion:
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """True if the driven load does negative work from a to b though it must not."""
+        """Return True if the driven load does negative work from a to b though it must not."""
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
@@ -225,7 +225,7 @@ class _Motion:
 def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
-    """The state that the body reaches from `old` when the control goes on; of kind "jump".
+    """Return the state that the body reaches from `old` when the control goes on; of kind "jump".
 
     Args:
         by: change of the control, dimensionless; its sign is the way that the process drives.
@@ -285,7 +285,8 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
 
 
 def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at first.
+    """Return True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at
+    first.
 
     (Right behind the maximum of a pressure that of the volume may follow.)
     """
@@ -296,7 +297,7 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
-    """True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back.
+    """Return True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back.
 
     (After a jump it may: then the body is another.)
     """
@@ -313,8 +314,8 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 
 
 def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """A new state at the same control, without points in tension at tools in three dimensions; by `jump` where the body
-    snaps off.
+    """Return a new state at the same control, without points in tension at tools in three dimensions; by `jump`
+    where the body snaps off.
 
     Raises:
         Failure: no such state was found.

@@ -129,7 +129,8 @@ class Stage:
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
-        """(what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a course."""
+        """Return (what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a
+        course."""
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
                              f" [(time,"
@@ -191,7 +192,7 @@ class Plan(NamedTuple):
 
 
 def plan(scene: Scene, stage: Stage) -> Plan:
-    """A stage by the numbers of the items of its scene.
+    """Return a stage by the numbers of the items of its scene.
 
     Raises:
         InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what

@@ -63,7 +63,7 @@ class StepControl:
         self.length = min(self.length, self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
-        """A full step converged in this number of iterations with a tangent of their own; error: in time, over the
+        """Adapt the length after a full step with this number of new tangents; error: in time, over the
         tolerance."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
@@ -76,7 +76,7 @@ class StepControl:
 
 
 def allowed(caller: str, accuracy: str | float) -> float:
-    """The error promised by a word or a number, or an InputError."""
+    """Return the error promised by a word or a number, or an InputError."""
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
             raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"

@@ -60,7 +60,7 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
 
 
 def piece_through(points: np.ndarray, name: str) -> Line | Arc:
-    """The line or the arc on which all points lie, in their order, shape (n, 2)."""
+    """Return the line or the arc on which all points lie, in their order, shape (n, 2)."""
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")
     n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
@@ -101,7 +101,7 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 
 
 def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
-    """The arc from p with the unit tangent t to q; a line if it is one; None if it is neither."""
+    """Return the arc from p with the unit tangent t to q; a line if it is one; None if it is neither."""
     w = q - p
     across, ahead, length = t[0] * w[1] - t[1] * w[0], float(t @ w), math.hypot(*w)
     if not length > 0:

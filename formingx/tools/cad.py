@@ -27,7 +27,7 @@ _BUSY = 20                      # times as long by the clock: the machine may be
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """{number: what makes its pieces, or raises the error of one that is no tool's}; `kind`: "step" or "brep".
+    """Return {number: what makes its pieces, or raises the error of one that is no tool's}; `kind`: "step" or "brep".
 
     Raises:
         InputError: the file cannot be read.
@@ -115,7 +115,8 @@ def _raise(error: InputError) -> list[Line | Arc]:
 
 
 def _check_references(file: str) -> None:
-    """An InputError unless a STEP file ends, and defines once every item that it refers to: else parts are left out."""
+    """Raise an InputError unless a STEP file ends, and defines once every item that it refers to: else parts are
+    left out."""
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")
@@ -138,7 +139,7 @@ def _check_references(file: str) -> None:
 
 
 def _names_twice(record: str) -> bool:
-    """True if a record of several parts, #1 = ( A(...) B(...) ), has one of them twice."""
+    """Return True if a record of several parts, #1 = ( A(...) B(...) ), has one of them twice."""
     parts = re.search(r"=\s*\((.*)\)\s*$", record, re.DOTALL)
     names, more = (parts[1] if parts else ""), 1
     while more:

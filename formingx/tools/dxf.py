@@ -16,7 +16,7 @@ from .profile import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """{number: what makes its pieces} of the curves of a drawing's model space, counted from 1 in its order.
+    """Return {number: what makes its pieces} of the curves of a drawing's model space, counted from 1 in its order.
 
     Texts, dimensions, hatches and points count as nothing, nor does what cannot be seen. Ellipses and splines become
     arcs within `tolerance` (length).
@@ -148,7 +148,7 @@ def _is_seen(entity: Any, drawing: Any) -> bool:
 
 
 def unit(file: str) -> str | None:
-    """The unit of length that a drawing states, $INSUNITS; None if it states none."""
+    """Return the unit of length that a drawing states, $INSUNITS; None if it states none."""
     import ezdxf
     try:
         code = ezdxf.readfile(file).header.get("$INSUNITS", 0)

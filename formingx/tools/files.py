@@ -24,7 +24,7 @@ _Curves = dict[int, Callable[[], list[Line | Arc]]]
 
 def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
          tolerance: float | None = None, body: Any = None, units: str | float | Units | None = None) -> Tool:
-    """A tool from curves of a file.
+    """Return a tool from curves of a file.
 
     A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes. The ending
     says what a file is: .step or .stp, .brep, .dxf, .msh, or .geo. A .geo file is a script, which is not run: it may
@@ -84,7 +84,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
 
 
 def _beside(tool: Tool, body: Any, file: str) -> Tool:
-    """The tool, or the tool reversed: the one that the body is outside of."""
+    """Return the tool, or the tool reversed: the one that the body is outside of."""
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
     else:

@@ -35,7 +35,7 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 
 
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
-    """{number: the line or the arc, or the kind of another curve} of the curves of a .geo file.
+    """Return {number: the line or the arc, or the kind of another curve} of the curves of a .geo file.
 
     Raises:
         InputError: it cannot be read, or holds a statement that is not a drawing's; the message names the line.
@@ -128,7 +128,7 @@ class _Drawing:
         return int(number)
 
     def _number(self, text: str) -> float:
-        """The value of an expression of numbers, names and + - * / ^."""
+        """Return the value of an expression of numbers, names and + - * / ^."""
         words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
         if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
                 is_number(word.removesuffix("e").removesuffix("E")) for word in words):

@@ -130,7 +130,7 @@ class Tool:
 
     @classmethod
     def of_pieces(cls, pieces: Sequence[Line | Arc], closed: bool = False) -> Tool:
-        """A tool from lines and arcs that follow one another; joints need not be smooth.
+        """Return a tool from lines and arcs that follow one another; joints need not be smooth.
 
         Raises:
             InputError: a piece that is neither, is not finite or has no length, pieces that do not follow one another,
@@ -180,27 +180,27 @@ class Tool:
         return Nearest(d[i, best], self._left.T[best] + curvature[:, None] * rel, curvature)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
-        """The tool shifted by (r, z), lengths."""
+        """Return the tool shifted by (r, z), lengths."""
         by = np.array([finite("Tool.moved: r", r), finite("Tool.moved: z", z)])
         return self._with([Line(p.a + by, p.b + by) if isinstance(p, Line) else p._replace(centre=p.centre + by)
                            for p in self.pieces])
 
     def turned(self, angle: float) -> Tool:
-        """The tool turned about the origin, counter-clockwise, degrees (plane strain)."""
+        """Return the tool turned about the origin, counter-clockwise, degrees (plane strain)."""
         a = math.radians(finite("Tool.turned: angle", angle))
         Q = np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]])
         return self._with([Line(Q @ p.a, Q @ p.b) if isinstance(p, Line)
                            else p._replace(centre=Q @ p.centre, start=p.start + a) for p in self.pieces])
 
     def mirrored(self) -> Tool:
-        """The tool upside down: Z becomes -Z."""
+        """Return the tool upside down: Z becomes -Z."""
         flip = np.array([1.0, -1.0])
         return self._with([Line(p.b * flip, p.a * flip) if isinstance(p, Line)
                            else Arc(p.centre * flip, p.radius, -p.start - p.sweep, p.sweep)
                            for p in reversed(self.pieces)])
 
     def reversed(self) -> Tool:
-        """The tool whose solid is on the other side of the profile."""
+        """Return the tool whose solid is on the other side of the profile."""
         return self._with([p.backwards for p in reversed(self.pieces)])
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
@@ -337,7 +337,7 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -
 
 
 def _fillet(corner: np.ndarray, radius: float, cut: float, come: float, turn: float, first: bool, second: bool) -> Arc:
-    """The arc that rounds a corner, which takes `cut` of its edges; at an open end only one half of it."""
+    """Return the arc that rounds a corner, which takes `cut` of its edges; at an open end only one half of it."""
     left = math.copysign(1.0, turn)
     start = corner - cut * np.array([math.cos(come), math.sin(come)])
     centre = start + left * radius * np.array([-math.sin(come), math.cos(come)])
@@ -357,7 +357,7 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 
 
 def _checked(piece: Line | Arc, i: int) -> Line | Arc:
-    """A piece of a profile, its numbers as floats."""
+    """Return a piece of a profile, its numbers as floats."""
     caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)

@@ -25,7 +25,7 @@ def plane(z: float = 0.0) -> Tool:
 
 def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, fillet: float = 0.0,
         lip: float = 0.0) -> Tool:
-    """A female mould that opens downwards: a round cup, or half of a box section in plane strain.
+    """Return a female mould that opens downwards: a round cup, or half of a box section in plane strain.
 
     Args:
         radius: of the mouth (half the width of a box section), length; depth: from the mouth up to the floor.
@@ -49,7 +49,7 @@ def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, 
 
 def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0, fillet: float = 0.0,
          foot: float = 0.0) -> Tool:
-    """A male mould that points up, over which a sheet is draped.
+    """Return a male mould that points up, over which a sheet is draped.
 
     Args:
         radius: of the flat top, length; height: from the base plate up to the top.
@@ -70,7 +70,7 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
 
 def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_height: float, base: float = 0.0,
            fillet: float = 0.0, shoulder_fillet: float = 0.0) -> Tool:
-    """A bottle-like mould around a parison, open at the neck (up).
+    """Return a bottle-like mould around a parison, open at the neck (up).
 
     Args:
         radius, height: of the body, lengths; shoulder: height of the cone between body and neck.
@@ -94,7 +94,7 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 
 
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
-    """A flat-ended plug that points down, its face at Z = z.
+    """Return a flat-ended plug that points down, its face at Z = z.
 
     >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
     >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
@@ -106,7 +106,7 @@ def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
 
 
 def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1.0) -> Tool:
-    """A cone that points down.
+    """Return a cone that points down.
 
     Args:
         half_angle: between its surface and the Z axis, degrees, from 0.01 to below 90.
@@ -129,7 +129,7 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
 
 
 def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
-    """A ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z).
+    """Return a ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z).
 
     >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
     [-1.0, 1.0]
@@ -147,7 +147,7 @@ class Pot(NamedTuple):
 
 
 def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, height: float | None = None) -> Tool:
-    """A ring that a sheet lies under, its flat face at Z = z and its inner edges rounded: half a grip.
+    """Return a ring that a sheet lies under, its flat face at Z = z and its inner edges rounded: half a grip.
 
     The other half is `clamp_ring(...).mirrored()`. Between the two a sheet may grow thin, and it leaves them over their
     edges: a clamp without a singular corner. Hold the sheet's rim, between the rings, by `SimplySupported`.

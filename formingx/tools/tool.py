@@ -32,4 +32,4 @@ class PlaneTool(RigidTool, Protocol):
     """A rigid tool of a section: smooth up to its corners, so its distance has derivatives."""
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """The signed distance of points x, shape (n, 2), its gradient and its curvature."""
+        """Return the signed distance of points x, shape (n, 2), its gradient and its curvature."""

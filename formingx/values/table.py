@@ -32,7 +32,7 @@ class Table:
         self.limits = float(self.x[0]), float(self.x[-1])
 
     def __call__(self, x: Any) -> Any:
-        """The values at x: numbers, or an expression for an expression.
+        """Return the values at x: numbers, or an expression for an expression.
 
         Raises:
             InputError: a number outside the table.
@@ -43,7 +43,7 @@ class Table:
         return self._curve(np.clip(x, self.x[0], self.x[-1]))
 
     def check(self, x: Any, name: str = "x") -> None:
-        """An InputError unless all numbers x lie in the table; `name`: its name in it."""
+        """Raise an InputError unless all numbers x lie in the table; `name`: its name in it."""
         x = np.asarray(x, dtype=float)
         near = 1e-9 * (self.x[-1] - self.x[0])
         outside = ~((x >= self.x[0] - near) & (x <= self.x[-1] + near))
@@ -77,7 +77,8 @@ class Table:
 
 
 def table(points: Mapping[float, float]) -> Table:
-    """A curve through points {x: y}, for a constant that depends on temperature, or a temperature that does on R.
+    """Return a curve through points {x: y}, for a constant that depends on temperature, or a temperature that does
+    on R.
 
     Between two points it is a cubic that neither overshoots nor turns (Fritsch and Butland 1984).
 

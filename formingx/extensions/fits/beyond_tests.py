@@ -64,7 +64,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
 
 
 def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
-    """The nearest mode and how far it was tested, as text."""
+    """Return the nearest mode and how far it was tested, as text."""
     mode = mode_of(largest, middle)
     found = tested.ranges.get(mode.replace(" ", "_"))
     if found is not None:

@@ -171,7 +171,7 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
 
 
 def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
-    """(the material, the uncertainty of its constants)."""
+    """Return (the material, the uncertainty of its constants)."""
     from scipy.optimize import least_squares
     guesses = _guesses(material, points, terms)
     response, n, measured = guesses[0].response, len(guesses[0].parameters), points.measured

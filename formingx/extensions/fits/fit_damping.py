@@ -80,7 +80,7 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
 
 def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
-    """(the material, its constants of damping, the tests, their uncertainty); see `fit`."""
+    """Return (the material, its constants of damping, the tests, their uncertainty); see `fit`."""
     from scipy.optimize import least_squares
     if not isinstance(material, KBKZ) or material.damping is None or not material.damping.bounds:
         raise InputError("fit: KBKZ: give a card with a spectrum and a damping to begin with, such as"

@@ -48,7 +48,7 @@ class TimedTest(NamedTuple):
 
     @classmethod
     def relaxation(cls, mode: str, stretch: float, times: Any, stress: Any) -> TimedTest:
-        """A stretch put on at once at time 0 and held; stress (nominal) at times above 0, rising, shape (n,)."""
+        """Return a stretch put on at once at time 0 and held; stress (nominal) at times above 0, rising, shape (n,)."""
         t = np.append(0.0, np.asarray(times, float))
         return cls(mode, t, np.full(len(t), stretch), np.append(np.nan, stress))
 
@@ -63,7 +63,7 @@ class TimedTest(NamedTuple):
 def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
                    weights: list[float], within: Any
                    ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
-    """(the material, its constants, the tests, their uncertainty); see `fit`."""
+    """Return (the material, its constants, the tests, their uncertainty); see `fit`."""
     data = _Data(checked_tests(tests, within), material if isinstance(material, type) else type(material), relative,
                  weights)
     if isinstance(material, RelaxingMaterial):
@@ -84,7 +84,7 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """The tests as arrays; stresses at stretches that are not within are not numbers."""
+    """Return the tests as arrays; stresses at stretches that are not within are not numbers."""
     found = []
     for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         if not isinstance(test, TimedTest):
@@ -146,7 +146,8 @@ class _Data:
 
 
 def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
-    """(the material with its constants and this number of branches fitted, root mean square of the scaled misfit)."""
+    """Return (the material with its constants and this number of branches fitted, root mean square of the scaled
+    misfit)."""
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
         raise InputError(f"fit: {len(data.stress)} points cannot fix the {needed} constants of"
@@ -179,7 +180,7 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
 
 
 def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
-    """Starts with this number of branches: the material's own, and two from the best spectrum."""
+    """Return starts with this number of branches: the material's own, and two from the best spectrum."""
     from scipy.optimize import nnls
     rest = material.equilibrium
     shape = data.relaxed(rest)[:, None] / data.sizes[:, None]
@@ -199,7 +200,7 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """A material of this kind with its modulus times a factor, for data up to this I1."""
+    """Return a material of this kind with its modulus times a factor, for data up to this I1."""
     if material is None:
         return None
     try:

@@ -50,7 +50,7 @@ def _biaxial(material: Any, columns: Any, panel: Any) -> None:
 
 
 def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
-    """Tests that are held on the first panel, against a logarithmic time; the others on the last."""
+    """Draw tests at constant stretch on the first panel, against a logarithmic time; the others on the last."""
     for i, (test, still) in enumerate(zip(tests, held), 1):
         panel = panels[0] if still else panels[-1]
         t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
@@ -62,5 +62,5 @@ def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
 
 
 def _rate(times: np.ndarray, stretches: np.ndarray) -> str:
-    """The mean Hencky rate, for a legend."""
+    """Return the mean Hencky rate, for a legend."""
     return f"rate {abs(np.log(stretches[-1] / stretches[0])) / (times[-1] - times[0]):.3g}"

@@ -66,7 +66,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
-    """Derivative of the scaled stresses by constant i, shape (n,); 0 where no change of it can be seen."""
+    """Return the derivative of the scaled stresses by constant i, shape (n,); 0 where no change of it can be seen."""
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf                    # further, a power that does not matter would reach
     for _ in range(50):

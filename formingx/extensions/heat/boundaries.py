@@ -70,7 +70,7 @@ class _Boundary:
                 raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """An InputError unless temperatures are above absolute zero and tables cover the boundary."""
+        """Raise an InputError unless temperatures are above absolute zero and tables cover the boundary."""
         for name, value in self.parameters.items():
             if name in self.temperatures:
                 self._between(name, absolute_zero)

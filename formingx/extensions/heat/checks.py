@@ -32,7 +32,7 @@ _WEAK = 2.0
 
 
 def error_of_layers(layers: float, biot: float) -> float:
-    """Return the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
+    """Find the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
 
     Args:
         layers: wall over the thickness of the elements at the face. biot: conductance times wall over conductivity.
@@ -41,7 +41,7 @@ def error_of_layers(layers: float, biot: float) -> float:
 
 
 def layers_needed(biot: float) -> int:
-    """Return the number of equal layers of elements for which `error_of_layers` is 1 %."""
+    """Find the number of equal layers of elements for which `error_of_layers` is 1 %."""
     return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
 
 
@@ -77,7 +77,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def springs_back(body: Any) -> Iterator[Finding]:
-    """A modulus that rises as a stretched body cools pulls it back: it says nothing of the solidified part.
+    """Find a modulus that rises as a stretched body cools pulls it back: it says nothing of the solidified part.
 
     (A film that was drawn into a mould, its table of stiffness on the equilibrium energy, came off it again and went
     back to a third of its height.)

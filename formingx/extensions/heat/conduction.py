@@ -90,19 +90,19 @@ class Conduction:
         self.update()
 
     def constant(self, value: float) -> fem.Constant:
-        """A number in a form that can be changed without compiling it again."""
+        """Return a number in a form that can be changed without compiling it again."""
         return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
 
     def start(self) -> list[np.ndarray]:
-        """The state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
+        """Return the state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
         return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
 
     def held(self, T: np.ndarray) -> np.ndarray:
-        """A temperature, owned part, with the faces that are held at theirs."""
+        """Return a temperature, owned part, with the faces that are held at theirs."""
         return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
-        """The displacement or the contact has changed: update where faces are and how large they are."""
+        """Update the position and size of faces to a changed displacement or contact."""
         self._factored_for = None
         for touch, area in zip(self.touches, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
@@ -300,7 +300,7 @@ class Conduction:
         return points if u is None else points + u
 
     def _face_line(self, boundary: str) -> np.ndarray:
-        """The deformed nodes of a boundary one after the other, shape (k, 2), all ranks."""
+        """Return the deformed nodes of a boundary one after the other, shape (k, 2), all ranks."""
         line = self.mesh.line_of(boundary)
         u = self.displacements()
         if u is None:
@@ -312,7 +312,7 @@ class Conduction:
         return line + u[cKDTree(X).query(line)[1]]
 
     def source(self, make: Any) -> Any:
-        """A compiled form for `assembled`: make(v) is an integral (UFL) of heat per time, times v."""
+        """Return a compiled form for `assembled`: make(v) is an integral (UFL) of heat per time, times v."""
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
@@ -344,7 +344,7 @@ class Conduction:
         return self._assemble(self._mass_form)
 
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """The tangent M - c R' at the T last set, points in contact included; one with the same c, unless `afresh`."""
+        """Assemble the tangent M - c R' at the last T, with contact; reuse one with the same c unless `afresh`."""
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c

@@ -90,7 +90,7 @@ class ContactWithTool:
         self.tool = tool if isinstance(tool, ConductingTool) else finite(f"ContactWithTool({on!r}): tool", tool)
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """An InputError unless the tool is above absolute zero."""
+        """Raise an InputError unless the tool is above absolute zero."""
         tool = self.tool
         for value in (tool.back, tool.start) if isinstance(tool, ConductingTool) else (tool,):
             if value < absolute_zero:
@@ -144,7 +144,7 @@ class Touch:
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """The lines at first, shape (n, m)."""
+        """Return the lines at first, shape (n, m)."""
         return np.full((len(self.dofs), len(self._M)), self._above)
 
     def face(self, lines: np.ndarray) -> np.ndarray:

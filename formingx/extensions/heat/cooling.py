@@ -50,7 +50,7 @@ class ToolHeat(NamedTuple):
 
     @classmethod
     def of(cls, name: str, given: Any) -> ToolHeat:
-        """A pair that a user gave for a contact; raises `InputError` if it is none."""
+        """Return a pair that a user gave for a contact; raises `InputError` if it is none."""
         try:
             return cls(*given)
         except TypeError:
@@ -96,7 +96,7 @@ class Cooling:
         return f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r}{more})"
 
     def check(self, scene: Any) -> None:
-        """An InputError unless it fits a scene."""
+        """Raise an InputError unless it fits a scene."""
         if scene.temperature is None:
             raise InputError("Scene: heat: the body needs a temperature to begin with: temperature=...")
         if not scene.model.solid:
@@ -109,7 +109,7 @@ class Cooling:
         checked_boundaries(scene.mesh, [*self.boundaries, *self._touches(scene)], zero)
 
     def without_tools(self, mesh: Any, thickness: float, boundaries: Any) -> Cooling:
-        """The same cooling without tools, with other laws at the faces of a body.
+        """Return the same cooling without tools, with other laws at the faces of a body.
 
         A face that takes on another temperature at once changes the stress by a finite amount in any step, however
         short. So a fixed temperature acts through a large conductance (`_CONTINUOUS`).
@@ -151,7 +151,7 @@ class Cooling:
         return {on: value for on, value in found.items() if value}
 
     def conducts(self, contact: Any) -> bool:
-        """True if heat flows through a contact of the scene."""
+        """Return True if heat flows through a contact of the scene."""
         return contact.name in self.tools
 
     def _touches(self, scene: Any) -> list[ContactWithTool]:
@@ -206,7 +206,8 @@ class CoolingHistory:
                 for touch, contact in zip(body.touches, contacts, strict=True)]
 
     def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
-        """The largest errors of temperatures in states that are due to the mesh, estimated, degrees; collective."""
+        """Return the largest errors of temperatures in states that are due to the mesh, estimated, degrees;
+        collective."""
         finer, power, found = self._conduction(degree=3), self._body.power, []
         estimate, touches = SpaceError(self._body, finer), self._touching(finer)
         try:
@@ -280,7 +281,7 @@ class CoolingHistory:
         self._take()
 
     def _go(self, until: float) -> None:
-        """Steps of the heat equation, the body standing still."""
+        """Take steps of the heat equation with the body at a fixed position."""
         dt, tolerance = self._dt or 1e-3 * (until - self._time), self._cooling.tolerance
         for _ in range(_MOST_STEPS):
             trial = stepping.fitted(dt, until - self._time)
@@ -339,7 +340,7 @@ class CoolingHistory:
                       before and (before[0], to_body(before[1])))
 
     def _take(self) -> None:
-        """The temperature of the problem, and what depends on it."""
+        """Set the temperature of the problem and its dependent coefficients."""
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
         if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
@@ -375,7 +376,7 @@ def _such_as(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """True if two (time, temperature, before) are the same."""
+    """Return True if two (time, temperature, before) are the same."""
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 

@@ -25,7 +25,8 @@ _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """The mesh, its elements cut into layers below faces; the mesh itself where they are thin enough, or too curved.
+    """Return the mesh, its elements cut into layers below faces; the mesh itself where they are thin enough, or too
+    curved.
 
     Collective.
 
@@ -70,7 +71,7 @@ def _along(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """{ends of an edge, that of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
+    """Return {ends of an edge, that of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
 
     points: where nodes are, for depths, shape (n, 2).
     """
@@ -132,14 +133,14 @@ class _Nodes:
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
-        """The node in the middle of an edge; `point`: where, for the first that asks."""
+        """Return the node in the middle of an edge; `point`: where, for the first that asks."""
         key = min(a, b), max(a, b)
         if key not in self._middles:
             self._middles[key] = self._new(point)
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """The middle of an edge that is not cut stays."""
+        """Keep the middle of an edge that is not cut."""
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
@@ -156,7 +157,7 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The point of a triangle, 3 or 6 nodes, at area coordinates x, shape (3,)."""
+    """Return the point of a triangle, 3 or 6 nodes, at area coordinates x, shape (3,)."""
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
@@ -183,7 +184,7 @@ def _rows(table: np.ndarray) -> list[list[int]]:
 
 
 def _parts(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """The triangles that one is cut into."""
+    """Return the triangles that one is cut into."""
     element, at = grid.points[row], {row[k]: np.eye(3)[k] for k in range(3)}      # area coordinates of nodes
     sides = {}
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):

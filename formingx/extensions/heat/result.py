@@ -87,7 +87,7 @@ class HeatRun:
         return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)
 
     def temperature(self, time: float | None = None) -> fem.Function:
-        """The temperature at a time (default: the end) as a P2 Function on the mesh."""
+        """Return the temperature at a time (default: the end) as a P2 Function on the mesh."""
         T = fem.Function(self._body.space, name="temperature")
         T.x.array[: len(self._body.points)] = self._at(time)[0]
         T.x.scatter_forward()
@@ -122,11 +122,11 @@ class HeatRun:
         return T @ (weights / weights.sum())
 
     def hottest(self, time: float | None = None) -> Spot:
-        """The hottest node at a time (default: the end)."""
+        """Return the hottest node at a time (default: the end)."""
         return self._extreme(self._at(time)[0], 1)
 
     def coldest(self, time: float | None = None) -> Spot:
-        """The coldest node at a time (default: the end)."""
+        """Return the coldest node at a time (default: the end)."""
         return self._extreme(self._at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
@@ -211,7 +211,7 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _at(self, time: float | None) -> list[np.ndarray]:
-        """The state at a time: a step's own, or Hermite's cubic with slopes of parabolas through three steps."""
+        """Return the state at a time: a step's own, or Hermite's cubic with slopes of parabolas through three steps."""
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -244,7 +244,7 @@ class HeatRun:
         return Spot(float(sign * value), R, Z)
 
     def _first(self, out: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """The first time at which `out` is not above 0, found between steps."""
+        """Return the first time at which `out` is not above 0, found between steps."""
         from scipy.optimize import brentq
         before = from_time
         for t in times:

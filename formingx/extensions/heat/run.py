@@ -117,7 +117,7 @@ class _Displaced:
                                          for part in self._parts])
 
     def on(self, mesh: Mesh) -> fem.Function:
-        """The displacement as a P2 Function on another mesh."""
+        """Return the displacement as a P2 Function on another mesh."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
         points = of_space(u.function_space)
         u.x.array[:] = (self(points) - points).ravel()
@@ -189,7 +189,7 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
-    """The laws of the faces that a user gave, or an InputError."""
+    """Return the laws of the faces that a user gave, or an InputError."""
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     held = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:

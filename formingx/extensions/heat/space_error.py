@@ -20,7 +20,7 @@ class SpaceError:
         self._values, self._raised_values = fem.Function(body.space), fem.Function(finer.space)
 
     def of(self, state: list[np.ndarray], time: float) -> float:
-        """The largest estimated error of a state that was reached after a time, degrees; collective.
+        """Return the largest estimated error of a state that was reached after a time, degrees; collective.
 
         The faces of tools are as hot as they are; their lines do answer to the correction.
         """
@@ -45,7 +45,7 @@ class SpaceError:
         return found
 
     def _raised(self, own: np.ndarray) -> np.ndarray:
-        """A P2 function, owned part, in the finer space, owned part."""
+        """Return a P2 function, owned part, in the finer space, owned part."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._raised_values.interpolate(self._values)

@@ -51,11 +51,11 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
 
 
 def next_length(dt: float, error: float, tolerance: float) -> float:
-    """The step that would just meet the tolerance, with some safety; not more than five times as long."""
+    """Return the step that would just meet the tolerance, with some safety; not more than five times as long."""
     return dt * float(np.clip(0.9 * (tolerance / max(error, 1e-300)) ** (1 / 3), 0.1, 5.0))
 
 
 def fitted(dt: float, left: float) -> float:
-    """A step of about dt that does not leave a sliver before a time that must be hit, `left` away."""
+    """Return a step of about dt that does not leave a sliver before a time that must be hit, `left` away."""
     return left if dt >= left * (1 - 1e-9) else min(dt, left / 2)
 

@@ -120,7 +120,7 @@ class Integral:
         return S, np.einsum("kin,kjn->ijn", inverse, by), T
 
     def potential(self, C: Any, held: dict[str, Any], time_step: Any) -> Any:
-        """A UFL scalar whose derivative by F is the stress, but for the unsymmetric part of dS/dC; `held`: see
+        """Return a UFL scalar whose derivative by F is the stress, but for the unsymmetric part of dS/dC; `held`: see
         `coefficients`; C: entries of Cbar."""
         S, D, T, change = held["past_S"], held["past_D"], held["past_T"], _change(C, held)
         linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
@@ -148,7 +148,7 @@ def _mean_decay(x: np.ndarray) -> np.ndarray:
 
 
 def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
-    """Derivative of (1 - e^-x)/x."""
+    """Return the derivative of (1 - e^-x)/x."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = -1 / 2 + x / 3 - x**2 / 8 + x**3 / 30 - x**4 / 144
@@ -166,7 +166,7 @@ def _parabola(s: Any) -> tuple[Any, Any, Any]:
 
 
 def _parabola_slopes(s: Any) -> tuple[Any, Any]:
-    """Derivatives of the latter two."""
+    """Return the derivatives of the latter two."""
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
     return slope, slope * s / (1 + s) + share / (1 + s) ** 2

@@ -76,7 +76,7 @@ class KBKZ(Relaxing):
 
     @classmethod
     def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **more: Any) -> KBKZ:
-        """The same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
+        """Return the same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
         return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
                    *args, **more)
 
@@ -96,7 +96,7 @@ class KBKZ(Relaxing):
         return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """A UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
+        """Return a UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
         return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
@@ -172,7 +172,8 @@ class KBKZ(Relaxing):
         return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
 
     def rupture_stretch(self, mode: str) -> float:
-        """The stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up to 100.
+        """Return the stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up
+        to 100.
 
         Put on at once, no more stress is to be had beyond: a damped melt that is stretched faster than it relaxes thins
         there without end.
@@ -223,7 +224,7 @@ class KBKZ(Relaxing):
 
 
 def _between(at: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
-    """The stretches of a history at these times."""
+    """Return the stretches of a history at these times."""
     if between == "stretch":
         return np.interp(at, times, stretches)
     return np.exp(np.interp(at, times, np.log(stretches)))

@@ -100,7 +100,7 @@ def to_msh(path: Path, file: Any, state: State | None = None) -> None:
 
 
 def _of_size(problem: Any, state: Any, size: float) -> Mesh:
-    """The deformed outline, with new elements inside."""
+    """Return the deformed outline, with new elements inside."""
     from ..remeshing.remeshed import remeshed
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:

@@ -9,7 +9,7 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
-    """The elements of a mesh that lie next to the first pieces of a line through it; collective.
+    """Return the elements of a mesh that lie next to the first pieces of a line through it; collective.
 
     A boundary of which nothing is left, such as the rim, is now where it was cut (one called "trim", if none is gone).
 
@@ -28,7 +28,7 @@ def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
 
 
 def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Number of the piece of a line, shape (n, 2), next to each point."""
+    """Return the number of the piece of a line, shape (n, 2), next to each point."""
     a, along = line[:-1], np.diff(line, axis=0)
     away = points[:, None] - a
     share = np.clip(np.einsum("mij,ij->mi", away, along) / np.einsum("ij,ij->i", along, along), 0, 1)
@@ -52,7 +52,7 @@ def _kept(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 
 def _outline(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
-    """{ends of an edge: first, last, middle} of the edges of one triangle alone."""
+    """Return {ends of an edge: first, last, middle} of the edges of one triangle alone."""
     found: dict[frozenset[int], list[list[int]]] = {}
     for row in ([int(node) for node in nodes] for nodes in triangles):
         for k, (i, j) in enumerate(_EDGES):

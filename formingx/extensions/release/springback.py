@@ -195,7 +195,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
-    """The part alone: held on its planes and lines of symmetry, and against rigid motion."""
+    """Return the part alone: held on its planes and lines of symmetry, and against rigid motion."""
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
     held = {s.component for s in symmetries}
@@ -222,7 +222,7 @@ class _Still(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """(the mesh up to the line of nodes next to where it is trimmed, radius there now)."""
+    """Return (the mesh up to the line of nodes next to where it is trimmed, radius there now)."""
     kept = float(strips_within(wall, trim).sum())                                 # edges have two parts
     last = int(np.clip(round(kept / 2), 1, (len(wall.r) - 1) // 2))
     middle = (wall.profile.rest_bottom + wall.profile.rest_top)[::2] / 2
@@ -230,8 +230,8 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
 
 
 def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """The unknowns of the part, locally owned entries; its histories remember the same as the histories of the whole
-    body."""
+    """Return the unknowns of the part, locally owned entries; its histories remember the same as the histories of
+    the whole body."""
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]

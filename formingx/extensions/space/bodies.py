@@ -13,7 +13,7 @@ from ...io.stl import volume
 
 
 def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Groups of triangles: bodies whose boxes do not overlap, each with the hollows in it.
+    """Return the groups of triangles: bodies whose boxes do not overlap, each with the hollows in it.
 
     Raises:
         InputError: a body is inside out: a hollow that is in no other body.

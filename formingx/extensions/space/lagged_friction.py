@@ -157,7 +157,7 @@ class LaggedFriction(LaggedStick):
         return self.tractions(x, old).stiffness
 
     def _near(self, x: np.ndarray) -> Near:
-        """The tool at points, kept for the same points."""
+        """Return the tool at points, kept for the same points."""
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.tool.near(x)
         return self._last[1]

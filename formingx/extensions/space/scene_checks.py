@@ -64,7 +64,7 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """An InputError for what is not proven in three dimensions."""
+    """Raise an InputError for what is not proven in three dimensions."""
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
                          f" available yet")
@@ -82,7 +82,7 @@ def refuse(scene: Any, heat: Any) -> None:
 
 
 def check_contact(scene: Any, contact: Any) -> None:
-    """The sheet starts outside the tool, on which it sticks, in the same unit of length; collective."""
+    """Raise an InputError unless the sheet starts outside the tool, in the same unit of length; collective."""
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
         raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")

@@ -58,7 +58,7 @@ class Edge(NamedTuple):
 
 
 def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "whole") -> list[Edge]:
-    """The outline of a rectangle about (0, 0), for `sheet`.
+    """Return the outline of a rectangle about (0, 0), for `sheet`.
 
     Args:
         width, height: along x and y, of the whole, length; corner: radius of its corners.
@@ -101,7 +101,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
 
 
 def circle(radius: float, *, part: str = "whole") -> list[Edge]:
-    """The outline of a circle about (0, 0), for `sheet`; see `rectangle`.
+    """Return the outline of a circle about (0, 0), for `sheet`; see `rectangle`.
 
     >>> fx.mesh.circle(100.0, part="quarter")[0].name
     'rim'
@@ -111,7 +111,7 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
           layers: Sequence[str] = ("sheet",), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
-    """A flat sheet within an outline, of triangles of a size, by gmsh.
+    """Return a flat sheet within an outline, of triangles of a size, by gmsh.
 
     Args:
         outline: `rectangle(...)`, `circle(...)`, or the corners (x, y) of a polygon, length.
@@ -219,7 +219,7 @@ class _Size:
 
 
 def _grid(edges: list[Edge], size: _Size) -> Grid:
-    """The triangles, on one rank."""
+    """Return the triangles, on one rank."""
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeExtendFromBoundary": 0.0}
     if size.everywhere:
         options |= {"Mesh.MeshSizeMin": size.everywhere, "Mesh.MeshSizeMax": size.everywhere}

@@ -29,7 +29,7 @@ _LARGEST_TOOL = 20_000
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
-    """The part of a state, whole where it was modelled in part, coloured by its wall, as PNG (rank 0 draws).
+    """Draw the part of a state, whole where it was modelled in part, coloured by its wall, as PNG (rank 0 draws).
 
     grid: size of the squares that were printed on the flat sheet, length; None: not drawn.
 
@@ -155,7 +155,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """The triangles of the sheet, drawn state by drawn state, and the tools, as `report.js` takes them."""
+    """Return the triangles of the sheet, drawn state by drawn state, and the tools, as `report.js` takes them."""
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}

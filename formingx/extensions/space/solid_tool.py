@@ -49,7 +49,7 @@ class SolidTool:
         return points + self.shift, triangles
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        """The tool, moved."""
+        """Return the tool, moved."""
         import copy
         found = copy.copy(self)
         found.shift = tuple(a + b for a, b in zip(self.shift, triple("moved", (x, y, z))))
@@ -150,7 +150,7 @@ class Swept(SolidTool):
         write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The surface over points (r, z) of a profile."""
+        """Return the surface over points (r, z) of a profile."""
         rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]
         row = np.arange(m * n).reshape(m, n)
@@ -158,7 +158,7 @@ class Swept(SolidTool):
         return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
 
     def _ring(self, r: float) -> np.ndarray:
-        """The curve at r, shape (n, 2)."""
+        """Return the curve at r, shape (n, 2)."""
         turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2
@@ -236,7 +236,7 @@ class Triangulated(SolidTool):
 
 
 def revolved(profile: Tool) -> Swept:
-    """A profile turned about the axis x = y = 0.
+    """Return a profile turned about the axis x = y = 0.
 
     >>> ball = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=0.0))
     >>> ball.bounds.round(6).tolist()
@@ -246,7 +246,7 @@ def revolved(profile: Tool) -> Swept:
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
-    """A profile (r, z) drawn along y, r being x; or along x, r being y.
+    """Return a profile (r, z) drawn along y, r being x; or along x, r being y.
 
     >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
     [-1.0]
@@ -257,7 +257,7 @@ def extruded(profile: Tool, along: str = "y") -> Swept:
 
 def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet: float = 0.0, lip: float = 0.0,
         draft: float = 0.0, mouth: float = 0.0, plug: bool = False) -> Swept:
-    """A mould that is a box with rounded corners, open upwards, about x = y = 0; or the plug that fits it.
+    """Return a mould that is a box with rounded corners, open upwards, about x = y = 0; or the plug that fits it.
 
     Args:
         half: half widths along x and y at the mouth (of a plug: at its upper end), length.
@@ -288,7 +288,7 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
 
 
 def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False) -> Triangulated:
-    """A tool from an STL file, binary or text: one or more closed surfaces.
+    """Return a tool from an STL file, binary or text: one or more closed surfaces.
 
     Args:
         scale: the sheet's unit of length over the file's is 1/scale: 25.4 for inches and a sheet in mm.
@@ -349,7 +349,7 @@ def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """An InputError unless each edge has two triangles that go along it opposite ways."""
+    """Raise an InputError unless each edge has two triangles that go along it opposite ways."""
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     sense = np.zeros(len(edges))

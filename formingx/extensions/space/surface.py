@@ -42,7 +42,8 @@ class Surface(Formulation):
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """(normal in the reference configuration, the whole surface): "top" looks along +z, "bottom" along -z."""
+        """Return (normal in the reference configuration, the whole surface): "top" looks along +z, "bottom" along
+        -z."""
         return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
 
     def refresh(self) -> None:
@@ -82,11 +83,11 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """A surface cannot be inside out: J > 0."""
+        """Return a surface cannot be inside out: J > 0."""
         return _Always()
 
     def set_stiff(self) -> None:
-        """A small stretch in all directions."""
+        """Apply a small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
@@ -144,7 +145,7 @@ class _Always:
 
 
 def relaxed(F: Any) -> Any:
-    """The deformation gradient, in principal axes where it wrinkles, whose energy is the relaxed one of F."""
+    """Return the deformation gradient, in principal axes where it wrinkles, whose energy is the relaxed one of F."""
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
     squared = ((C11 - C22) / 2) ** 2 + C12**2

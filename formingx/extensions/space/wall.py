@@ -94,7 +94,7 @@ class WallInSpace(Sheet):
                 **(each if len(each) > 1 else {})}
 
     def at(self, x: float, y: float) -> float:
-        """The wall at the node that was nearest to a place of the flat sheet, length."""
+        """Return the wall at the node that was nearest to a place of the flat sheet, length."""
         away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
@@ -110,7 +110,7 @@ class WallInSpace(Sheet):
         return float(np.average(self.ratio[near], weights=self.area_at_rest[near]))
 
     def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
-        """The wall along a plane cut: {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, from end to end.
+        """Return the wall along a plane cut: {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, from end to end.
 
         Where the cut has several pieces, their arc lengths follow one another.
 
@@ -180,7 +180,7 @@ class WallInSpace(Sheet):
 
 
 def wall_of(path: Any, state: Any) -> WallInSpace:
-    """The wall in a state, nodes and triangles in an order that does not depend on ranks; collective."""
+    """Return the wall in a state, nodes and triangles in an order that does not depend on ranks; collective."""
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
     own = own_cells(domain)

@@ -65,7 +65,7 @@ class ContactFace:
             self._rest_tangents = _tangents(self.rest[self._edges])
 
     def of(self, state: Any) -> ContactTable:
-        """The face in a state; of a tool that takes no part, without pressure."""
+        """Return the face in a state; of a tool that takes no part, without pressure."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
@@ -100,14 +100,15 @@ class ContactFace:
         return rows[:, :n], rows[:, n:]
 
     def _edge_points(self) -> np.ndarray:
-        """The two ends and the middle of every edge of the face, shape (m, 3, 2); same on all ranks, ghosts twice."""
+        """Return the two ends and the middle of every edge of the face, shape (m, 3, 2); same on all ranks, ghosts
+        twice."""
         mesh = self._path.problem.scene.mesh
         X = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(self._contact.contact.on)))
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
-    """The contacts (`FaceContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
+    """Return the contacts (`FaceContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]

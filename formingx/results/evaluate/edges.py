@@ -25,7 +25,8 @@ class Edge(NamedTuple):
 
 
 def coarsest(path: Any, state: Any) -> Edge | None:
-    """The edge in a state on which contact points are the furthest apart; None if nothing slides over one; collective.
+    """Return the edge in a state on which contact points are the furthest apart; None if nothing slides over one;
+    collective.
 
     Neighbours are next to each other in the order of R, then Z. What a support holds does not slide.
     """

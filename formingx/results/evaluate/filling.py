@@ -50,7 +50,7 @@ class Filling(Sheet):
         return next(iter(self.control.values()))
 
     def pressure_at(self, gap: float, corner: int | None = None) -> float:
-        """The pressure beyond which no more than a gap is left, linear between states.
+        """Return the pressure beyond which no more than a gap is left, linear between states.
 
         Args:
             corner: its number in `corners`; None: in all of them.
@@ -94,7 +94,8 @@ def filling(path: Any, contact: Any) -> Filling:
 
 
 def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
-    """The corners of a tool that open towards the body, each with points on it, shape (m, 2): arcs and sharp turns."""
+    """Return the corners of a tool that open towards the body, each with points on it, shape (m, 2): arcs and sharp
+    turns."""
     found = []
     pieces = list(tool.pieces)
     for i, piece in enumerate(pieces):

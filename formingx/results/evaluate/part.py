@@ -119,7 +119,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """The volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
+    """Return the volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside

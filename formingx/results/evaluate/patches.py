@@ -71,7 +71,7 @@ class Patches:
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, some: slice, points: np.ndarray) -> np.ndarray:
-        """The monomials at points (cells, ..., 2), shape (cells, ..., 10)."""
+        """Return the monomials at points (cells, ..., 2), shape (cells, ..., 10)."""
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[some][between]) / self._size[some][between]
         powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)

@@ -105,7 +105,7 @@ class Profiles:
         self._probe: Probe | None = None
 
     def of(self, state: Any) -> Profile:
-        """The profile of a state (collective)."""
+        """Return the profile of a state (collective)."""
         self._probe = at = self._probe or self._make_probe()
         deformed = at.points + at.displacement_in(state)
         n = len(at.points) // 2

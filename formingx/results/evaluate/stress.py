@@ -189,7 +189,7 @@ class StressField:
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
-        """The largest principal Cauchy stress, and whether the mesh resolves it; collective.
+        """Return the largest principal Cauchy stress, and whether the mesh resolves it; collective.
 
         Logs a warning if it does not (`StressPeak.converged`).
 
@@ -232,7 +232,7 @@ class Stresses:
         self._located: dict[str, tuple[np.ndarray, Place]] = {}
 
     def of(self, state: Any) -> StressField:
-        """The stresses of a state (collective)."""
+        """Return the stresses of a state (collective)."""
         if not self._ready:
             self._prepare()
             self._ready = True
@@ -248,7 +248,7 @@ class Stresses:
         return before[1]
 
     def layer(self, name: str | None) -> str:
-        """A layer's name, checked."""
+        """Return a layer's name, checked."""
         if name is None:
             if len(self.cells) > 1:
                 raise InputError(f"stress: which layer? known: {', '.join(map(repr, self.cells))}")
@@ -301,7 +301,8 @@ class Stresses:
         return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """The largest sigma_1 of sigma* at the corners of this rank's cells, (m,), and the corner (R, Z), (m, 2)."""
+        """Return the largest sigma_1 of sigma* at the corners of this rank's cells, (m,), and the corner (R, Z), (m,
+        2)."""
         own = own_cells(self.problem.forms.domain)
         X = of_cells(self.problem.forms.domain, own)[:, :3]
         assert self._patches is not None
@@ -315,7 +316,7 @@ class Stresses:
         return np.isin(own, self.cells[self.layer(name)]) if name is not None else np.ones(len(own), dtype=bool)
 
     def _owned(self, layer: str) -> np.ndarray:
-        """This rank's own cells of a layer."""
+        """Return this rank's own cells of a layer."""
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -408,7 +409,7 @@ class Stresses:
 
 
 def _det(F: np.ndarray) -> np.ndarray:
-    """Determinant in the plane, of gradients (n, 3, 3), shape (n,)."""
+    """Return the determinant in the plane, of gradients (n, 3, 3), shape (n,)."""
     return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]
 
 

@@ -69,7 +69,8 @@ class StressPeak(NamedTuple):
 
     @classmethod
     def among(cls, sigma: np.ndarray, at: np.ndarray, error: np.ndarray) -> StressPeak:
-        """The peak of n cells: largest sigma_1, shape (n,), the corner where it is, (n, 2), largest error, (n,)."""
+        """Return the peak of n cells: largest sigma_1, shape (n,), the corner where it is, (n, 2), largest error,
+        (n,)."""
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
         there = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
         return cls(float(sigma[top]), at[top], float(error[there].max()), float(sigma[worst]), at[worst],

@@ -80,7 +80,7 @@ class Tension:
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
-    """(number of the first state of a path in which a membrane is compressed, where) or None; collective."""
+    """Return (number of the first state of a path in which a membrane is compressed, where) or None; collective."""
     k = 0
     for segment in path.segments:
         scene = segment.problem.scene

@@ -164,8 +164,8 @@ class Verdict:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
-        """The contact point of each tool in three dimensions that is deepest, over the tolerance (length), if it is
-        too deep."""
+        """Return the contact point of each tool in three dimensions that is deepest, over the tolerance (length), if
+        it is too deep."""
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
@@ -205,7 +205,7 @@ def _most_inside(contact: Any) -> np.ndarray:
 
 
 def _off(contact: Any, state: State, images: int) -> float:
-    """the amount by which penetration changes the force F on a tool, relative; collective.
+    """Return the amount by which penetration changes the force F on a tool, relative; collective.
 
     What the tool gains on the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
     presses: it is as large as that. images: of the body in the part, whose energy the state tells.
@@ -229,7 +229,7 @@ def _harder(contact: Any, off: float) -> str:
 
 
 def _pulled(contact: Any, state: State) -> bool:
-    """True if a tool without friction, from which the body separates, is pulled along its travel; collective."""
+    """Return True if a tool without friction, from which the body separates, is pulled along its travel; collective."""
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False

@@ -76,7 +76,7 @@ class Wall(Sheet):
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}
 
     def at_height(self, height: float) -> float:
-        """The wall where the part's middle line passes a height (the least, if it does more than once), length.
+        """Return the wall where the part's middle line passes a height (the least, if it does more than once), length.
 
         Raises:
             InputError: it does not pass that height.
@@ -98,7 +98,7 @@ class Walls:
         self._lines: tuple[list[str], Any] | None = None
 
     def of(self, state: Any) -> Wall:
-        """The wall in a state (collective)."""
+        """Return the wall in a state (collective)."""
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}

@@ -45,7 +45,7 @@ class _Line(NamedTuple):
         return sum(c * s**k for k, c in enumerate(self.coefficients))
 
     def slope(self, s: float) -> Any:
-        """Derivative."""
+        """Return the derivative."""
         return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
 
 
@@ -96,7 +96,7 @@ class Ledger:
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
-        """{what: what is added in each state to what was there before, shape (states,)}."""
+        """Return {what: what is added in each state to what was there before, shape (states,)}."""
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._between(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
@@ -142,7 +142,7 @@ class Ledger:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """True of a step whose time does not follow the control."""
+        """Return the true of a step whose time does not follow the control."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
@@ -152,7 +152,7 @@ class Ledger:
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _of_body(self, a: Any, b: Any) -> dict[str, float]:
-        """The same of the body as modelled, without what jumps lose."""
+        """Return the same of the body as modelled, without what jumps lose."""
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
@@ -245,7 +245,7 @@ class Ledger:
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _kinked(self, state: Any) -> bool:
-        """True if a point of the body is where a tool begins to resist."""
+        """Return True if a point of the body is where a tool begins to resist."""
         with self._problem.state_context(state) as at:
             x, control = state.x[: at.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
@@ -267,7 +267,8 @@ class Ledger:
         return lost
 
     def _warmed(self, a: Any, b: Any) -> float:
-        """Stored energy that comes with the temperature, by the trapezium rule: the body as it was, and as it is."""
+        """Return the stored energy that comes with the temperature, by the trapezium rule: the body as it was, and
+        as it is."""
         cold, warm = a.memory[-1], b.memory[-1]        # that of the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
@@ -276,7 +277,7 @@ class Ledger:
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:
-        """Stored energy at a state."""
+        """Return the stored energy at a state."""
         with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 

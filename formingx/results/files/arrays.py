@@ -8,7 +8,7 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 
 
 def pack(data: Any) -> tuple[Any, bytes]:
-    """Data as JSON can hold it, and all arrays in it one after the other, little-endian.
+    """Return the data as JSON can hold it, and all arrays in it one after the other, little-endian.
 
     An array stands there as {"array": [its first byte, its type, its shape]}.
     """

@@ -161,7 +161,7 @@ class Checkpoint:
 
 
 def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
-    """The record of the run in a checkpoint; see `formingx.load`."""
+    """Return the record of the run in a checkpoint; see `formingx.load`."""
     folder, problem = place("load: folder", folder), Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
 
@@ -205,13 +205,13 @@ def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Proble
 
 
 def holds_states(folder: Any, comm: Any) -> bool:
-    """True if a folder is a checkpoint with a state in it; collective."""
+    """Return True if a folder is a checkpoint with a state in it; collective."""
     folder = place("checkpoint", folder)
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(_states(folder)))
 
 
 def begun(folder: Any) -> bool:
-    """False while a run may still begin to write to a folder: it is not there, is empty, or holds no state.
+    """Return False while a run may still begin to write to a folder: it is not there, is empty, or holds no state.
 
     Raises:
         InputError: it holds something else.
@@ -255,7 +255,7 @@ def ended(folder: Any) -> dict[str, Any] | None:
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """(what scene.json says, with how it "ended"; what each state.json says) of a checkpoint; no scene is needed.
+    """Return the data of scene.json, with its end, and of each state.json of a checkpoint, without a scene.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -270,7 +270,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def _read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
-    """The data of the first states; a bar on rank 0 of `comm`, not collective."""
+    """Return the data of the first states; a bar on rank 0 of `comm`, not collective."""
     found = []
     with progress(comm, f"{folder}: {count} states") as done:
         for k in range(count):
@@ -358,7 +358,7 @@ def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
-    """The outline and the thickness of a sheet, so that a report needs no scene; None where there is no sheet."""
+    """Return outline and thickness of a sheet for a report without the scene; None: there is no sheet."""
     try:
         profile = path.profile(state)
     except InputError:
@@ -371,7 +371,7 @@ def _name(number: int) -> str:
 
 
 def _states(folder: FilePath) -> list[FilePath]:
-    """The complete states in order."""
+    """Return the complete states in order."""
     names = (entry for entry in folder.iterdir() if entry.name.isascii() and entry.name.isdigit())
     found = sorted(names, key=lambda entry: int(entry.name))
     for k, entry in enumerate(found):
@@ -443,7 +443,7 @@ def _checksums(data: dict, content: dict[str, bytes]) -> dict[str, int]:
 
 
 def _plainly(action: Callable[[], Any], folder: FilePath, what: str) -> Any:
-    """The action's result; its OSError says which checkpoint and what."""
+    """Return the action's result; its OSError says which checkpoint and what."""
     try:
         return action()
     except OSError as error:

@@ -105,7 +105,8 @@ class Fields:
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
-        """Normal traction per deformed area at the faces that tools meet, zero elsewhere, shape (cells, nodes)."""
+        """Return the normal traction per deformed area at the faces that tools meet, zero elsewhere, shape (cells,
+        nodes)."""
         from scipy.spatial import cKDTree
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
@@ -166,7 +167,7 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
-    """[(number, state)]; a state that is not on the path (of `Path.at`) gets the next number."""
+    """Return [(number, state)]; a state that is not on the path (of `Path.at`) gets the next number."""
     if isinstance(states, str):
         if states != "all":
             raise InputError(f"states = {states!r}: must be states of the path, or 'all'")
@@ -234,7 +235,8 @@ def _xdmf(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
 
 
 def _check_replaceable(file: FilePath) -> None:
-    """An InputError unless there is nothing of this name, a regular file, or a folder that an earlier run wrote."""
+    """Raise an InputError unless there is nothing of this name, a regular file, or a folder that an earlier run
+    wrote."""
     ours = file.suffix.lower() == ".bp" and file.is_dir() and (not any(file.iterdir()) or (file / "md.idx").exists())
     if file.is_symlink() or file.exists() and not (file.is_file() or ours):
         raise InputError(f"file {str(file)!r} is there already, a link, a device or a folder of something else: give"

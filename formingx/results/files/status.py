@@ -90,7 +90,7 @@ class Status:
 
 
 def of_folder(folder: Any) -> Status:
-    """The status of the run that writes to a checkpoint.
+    """Return the status of the run that writes to a checkpoint.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -125,13 +125,14 @@ def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, floa
 
 
 def _words(seconds: float) -> str:
-    """A duration with two digits."""
+    """Return a duration with two digits."""
     size, unit = next(((s, u) for s, u in ((86400, "days"), (3600, "h"), (60, "min")) if seconds >= 2 * s), (1, "s"))
     return f"{seconds / size:.2g} {unit}"
 
 
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
-    """The status now, and whenever there are new states, until the run ends or has had none for `patience` seconds.
+    """Yield the status now, and whenever there are new states, until the run ends or has had none for `patience`
+    seconds.
 
     A folder that is not there yet, or empty, or holds no state, is waited for as long: see `checkpoint.begun`.
 

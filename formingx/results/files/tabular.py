@@ -38,7 +38,7 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """A CSV file with a header; numbers with all their digits; an InputError unless its name ends in .csv."""
+    """Write a CSV file with a header and all digits; raise an InputError unless its name ends in .csv."""
     file = named("to_csv", file, ".csv")
 
     def write(stream):
@@ -52,7 +52,7 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
-    """A JSON file of key numbers; NaN is refused."""
+    """Write a JSON file of key numbers; NaN is refused."""
     text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
     on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
 
@@ -67,7 +67,7 @@ def versions() -> dict[str, str]:
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
-    """The result of an action that rank 0 alone takes, on all ranks; so is what it raises. Collective."""
+    """Return the result of an action that rank 0 alone takes, on all ranks; so is what it raises. Collective."""
     result, error = None, None
     if comm.rank == 0:
         try:
@@ -82,7 +82,7 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
 
 
 def named(caller: str, file: Any, *endings: str) -> Any:
-    """A file's name as a path, or an InputError unless it ends in one of these."""
+    """Return a file's name as a path, or an InputError unless it ends in one of these."""
     file = place(f"{caller}: file", file)
     if file.suffix.lower() not in endings:
         other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())

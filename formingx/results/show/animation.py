@@ -71,7 +71,7 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
 
 
 def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
-    """The frames of the animation as images, one for each shape."""
+    """Return the frames of the animation as images, one for each shape."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -102,7 +102,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
 
 
 def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float], units: Units) -> None:
-    """The loading curve, and a dot where the body is on it."""
+    """Draw the loading curve, and a dot at the present state."""
     x, y = map(units.label, names)
     axes.clear()
     axes.grid(True, color="0.9", linewidth=0.7)
@@ -114,7 +114,7 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float], unit
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """The last frame stands for a second more."""
+    """Write the frames; the last one stands for a second more."""
     from PIL import Image
     pictures = [picture.quantize(256, dither=Image.Dither.NONE) for picture in pictures]
     each = max(int(1000 * seconds / len(pictures)), 20)

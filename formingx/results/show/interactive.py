@@ -34,7 +34,7 @@ def library() -> str:
 
 
 def packed(text: str) -> str:
-    """A text, compressed, in letters that a page can hold."""
+    """Return a text, compressed, in letters that a page can hold."""
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
@@ -165,13 +165,14 @@ def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
-    """A curve; the states on it as dots, where they are not too many."""
+    """Return a curve; the states on it as dots, where they are not too many."""
     return {"x": rounded(x), "y": rounded(y), "name": name, "marker": {"size": 4},
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
 
 def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
-    """The gap left in every corner of the tools that stay, over process time where it runs, else against the pressure.
+    """Return the gap left in every corner of the tools that stay, over process time where it runs, else against the
+    pressure.
 
     Without time, in the last stage.
     """
@@ -189,7 +190,7 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """The wall at the end against height and against arc length, in all and of each layer."""
+    """Return the wall at the end against height and against arc length, in all and of each layer."""
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
     for record, name in zip(records, names):

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def page(title: str, body: list[str], tail: str = "") -> str:
-    """A whole page: its heading is in the body; tail: what comes after it, scripts for one."""
+    """Return a whole page: its heading is in the body; tail: what comes after it, scripts for one."""
     style = resources.files(__package__).joinpath("report.css").read_text()
     return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><style>{style}</style></head>\n<body>"
@@ -16,7 +16,8 @@ def page(title: str, body: list[str], tail: str = "") -> str:
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """A table; columns of numbers stand to the right; with a head of empty words: two columns of words, without it."""
+    """Return a table; columns of numbers stand to the right; with a head of empty words: two columns of words,
+    without it."""
     numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
 
     def line(tag, row):
@@ -41,14 +42,14 @@ def details(title: str, content: str) -> str:
 
 
 def figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    """A matplotlib figure with a caption; kind "small": not over the whole width."""
+    """Return a matplotlib figure with a caption; kind "small": not over the whole width."""
     stream = io.BytesIO()
     figure.savefig(stream, dpi=140)
     return picture(stream.getvalue(), caption, kind)
 
 
 def picture(png: bytes, caption: str, kind: str) -> str:
-    """A PNG with a caption."""
+    """Return a PNG with a caption."""
     text = html.escape(caption, quote=True)
     return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
             f"<figcaption>{text}</figcaption></figure>")
@@ -60,5 +61,5 @@ def lines(text: str) -> str:
 
 
 def number(value: float) -> str:
-    """A number with six digits."""
+    """Return a number with six digits."""
     return f"{value:.6g}"

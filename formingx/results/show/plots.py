@@ -46,7 +46,8 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
-    """The deformed sheet as strips between its two faces; scale: factors of (r, z), colours: of the n nodes, (n, 4)."""
+    """Draw the deformed sheet as strips between its two faces; scale: factors of (r, z), colours: of the n nodes,
+    (n, 4)."""
     import numpy as np
     from matplotlib.collections import PolyCollection
     bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
@@ -67,7 +68,7 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """The deformed sheet filled between its faces, r to the right, lengths times `scale`."""
+    """Draw the deformed sheet filled between its faces, r to the right, lengths times `scale`."""
     import numpy as np
     points = scale * np.vstack([profile.bottom, profile.top[::-1]])
     axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})

@@ -186,7 +186,7 @@ class Record:
 
 
 def of_path(path: Any) -> Record:
-    """The record of a `Path`; collective."""
+    """Return the record of a `Path`; collective."""
     from ...scene.summary import summary
     problem, states, n = path.problem, path.states, len(path)
     with shown_progress(problem.comm, f"report of {n} states") as done:
@@ -220,7 +220,7 @@ def of_path(path: Any) -> Record:
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
-    """The record of what `formingx.results.files.checkpoint.contents` gives."""
+    """Return the record of what `formingx.results.files.checkpoint.contents` gives."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])
@@ -249,7 +249,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """The temperature at the stations of profiles, of what the states of a checkpoint remember of it."""
+    """Return the temperature at the stations of profiles, of what the states of a checkpoint remember of it."""
     from scipy.spatial import cKDTree
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     at = None
@@ -295,7 +295,7 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
 
 
 def words(name: str) -> str:
-    """A column's name for people."""
+    """Return a column's name for people."""
     return name.replace("_", " ")
 
 

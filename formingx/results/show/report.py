@@ -102,7 +102,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
 
 
 def scripts(data: str) -> str:
-    """The end of a page that draws `interactive.data` where `PROCESS` and an element "charts" are."""
+    """Return the end of a page that draws `interactive.data` where `PROCESS` and an element "charts" are."""
     packed = (("library", interactive.library()), ("data", interactive.packed(data)))
     code = resources.files(__package__).joinpath("report.js").read_text()
     tail = "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
@@ -181,7 +181,7 @@ def _made(records: list[Record]) -> list[list[str]]:
 
 
 def _cards(record: Record, found: Part | None, units: Units) -> str:
-    """The few numbers that are asked for first."""
+    """Return the few numbers that are asked for first."""
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
@@ -195,7 +195,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
 
 
 def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
-    """The largest force on every tool, and the largest pressures."""
+    """Return the largest force on every tool, and the largest pressures."""
     found = [(f"largest force on {name}", f"{force[np.argmax(np.abs(force))]:.4g} {units.force}")
              for name, force in record.forces.items()]
     return found + [(f"largest {words(c)}", f"{v.max():.4g} {units.of(c)}") for c, v in record.measures.items()
@@ -228,7 +228,7 @@ def _lead(record: Record, units: Units) -> str:
 
 
 def _key_numbers(record: Record, units: Units) -> str:
-    """The last state and the limit points, measure by measure; the thinnest place."""
+    """Return the last state and the limit points, measure by measure; the thinnest place."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
@@ -287,7 +287,8 @@ def _tools(record: Record, units: Units) -> str:
 
 
 def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
-    """The picture that `draw` makes as a file, or None where there is nothing to draw, or nothing to draw it with."""
+    """Return the picture that `draw` makes as a file, or None where there is nothing to draw, or nothing to draw it
+    with."""
     with TemporaryDirectory() as folder:
         file = FilePath(folder) / "picture.png"
         try:

@@ -16,7 +16,7 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """The sheet revolved about the axis by three quarters, coloured by thickness ratio, as a PNG (rank 0 draws).
+    """Draw the sheet revolved about the axis by three quarters, coloured by thickness ratio, as a PNG (rank 0 draws).
 
     A sheet that is more than twice as high as wide (a parison) is cut along the middle.
 
@@ -31,7 +31,7 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
-    """A sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
+    """Draw a sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
 
     A half sheet, which begins at R = 0, is drawn whole; it is half as long again as it is wide.
 
@@ -53,7 +53,7 @@ def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mirrored(profile: Any) -> Any:
-    """A half sheet and its mirror image as one."""
+    """Return a half sheet and its mirror image as one."""
     def whole(points):
         return np.vstack([points[:0:-1] * (-1, 1), points])
     return type(profile)(*(whole(p) for p in (profile.rest_bottom, profile.rest_top, profile.bottom, profile.top)))
@@ -95,7 +95,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """A plotter to add meshes to, 1000 by `height`; when the block ends, what it shows is written as PNG."""
+    """Return a plotter to add meshes to, 1000 by `height`; when the block ends, what it shows is written as PNG."""
     import pyvista
     picture = io.BytesIO()
     with screen():
@@ -137,7 +137,7 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """A display to draw on: the one that is there, or an Xvfb of our own that ends with the block.
+    """Return a display to draw on: the one that is there, or an Xvfb of our own that ends with the block.
 
     Debian's VTK aborts without one.
     """
