@@ -1,10 +1,15 @@
-"""Points that a step brings to their tools, one after the other: each is held as it arrives, and turns the path.
+"""Prediction of the contact events of a step (gap closure, sliding, opening), and of the path between them.
 
-Along the tangent of a state, by a unit of arc length, points move by w0. A point that has arrived is held by what its
-law of friction says, and so are those that slid before: each sticks, slides against mu N, or separates, which the
-compliance of the body at these points tells (`held`). From one change to the next the path goes straight, and where a
-point arrives an iteration with the same factors brings it back to equilibrium: the path is curved, and where a point
-sticks depends on it.
+Symbols: x are the unknowns, s is the arc length along the tangent of an accepted state.
+
+1. Predictor: along the tangent, an open point moves with the constant velocity w0.
+2. Event: a point meets its tool where its gap closes. The earliest event, over all points and ranks, is taken.
+3. Status: from this event on the point sticks, slides against mu N, or opens. The contact forces F of all closed points
+   follow from Coulomb's law on the condensed system (`reduced_contact`). Changes of status are events too.
+4. Equilibrium: at each event, modified Newton iterations return the prediction to the curved path. They use the stored
+   LU factors and Anderson acceleration (1965).
+
+The path is piecewise linear between the events. A point sticks where its gap closed, so the order of events matters.
 """
 
 from __future__ import annotations
@@ -24,21 +29,20 @@ from .response import Response
 
 @dataclass(frozen=True)
 class EventSettings:
-    """Number and accuracy of the predicted contact events.
+    """Limits and tolerances of the event prediction.
 
     Attributes:
-        iterations: at most this number of for an arrival.
-        to_tools: iterations, of the contact alone, that bring points to their tools.
-        changes: at most this number of points separate or begin to slide from one arrival to the next.
-        taken_over: points that slid before are held by forces of their own, if they are not more than these.
-        same_place: the amount by which an iteration may still move an arrival that sticks, over the length of face that
-            is its own.
-        about_there: the same of one that may slide.
-        far: squares of positions beyond all bounds, length^2.
-        soon: part of a step within which two points arrive together.
-        earlier: at most this number of points turn out to have arrived before the one that is looked at.
-        late: part of the way to an arrival by which an iteration may move it: beyond, where it is is not known.
-        work: iterations to equilibrium and changes of direction, in all, for the events of one step. With more, the
+        iterations: maximum number of equilibrium iterations per event.
+        to_tools: contact iterations that project closed points onto curved tools.
+        changes: maximum number of status changes (slip, opening) between two gap closures.
+        taken_over: sliding points of the start state get their own forces only up to this number of points.
+        same_place: convergence tolerance of a sticking point: its motion over its tributary length.
+        about_there: convergence tolerance of a point that may slide, likewise.
+        far: sum of squared positions above which the iteration has diverged, length^2.
+        soon: part of the step within which two closures are simultaneous.
+        earlier: maximum number of times that an earlier closure replaces the one being located.
+        late: largest change of an event's arc length in an iteration, relative to that arc length.
+        work: maximum number of equilibrium iterations and status changes for all events of a step. Beyond it the
             step takes one gap closure.
     """
 
@@ -59,9 +63,16 @@ _SETTINGS = EventSettings()
 
 
 class GapClosure(NamedTuple):
-    """A point of a face that meets the ramp of its tool; the same on all ranks.
+    """Contact event: an open point reaches the ramp of its tool. All ranks store the same value.
 
-    time: arc length; place: then, shape (2,). length: of face that is its own. sticks: under any force.
+    Attributes:
+        time: arc length of the event.
+        rank: rank that owns the point.
+        face: number of the contact face.
+        point: local number of the point.
+        place: position at the event, shape (2,), length.
+        length: tributary length of the point, length.
+        sticks: True if the point sticks under any force.
     """
 
     time: float
@@ -74,16 +85,21 @@ class GapClosure(NamedTuple):
 
     @property
     def who(self) -> tuple[int, int, int]:
-        """The point."""
+        """Identifier of the point, (rank, face, point)."""
         return self.rank, self.face, self.point
 
 
 class _Piece(NamedTuple):
-    """A straight piece of the path, from an arc length on.
+    """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
 
-    at, speed: positions and velocities of points, by face. Of the m points that are known: status; place: where they
-    stick; force, rate: on them, and by arc length; extra, growth: of it, what the factors do not know, all but the
-    first of shape (m, 2). off: what (x, control) is there off the tangent by more than these.
+    Attributes:
+        begins: arc length at its start.
+        at, speed: positions and velocities of all points, list over faces.
+        status: contact status, shape (m,).
+        place: sticking positions, shape (m, 2), length.
+        force, rate: contact forces and their derivatives by arc length, shape (m, 2).
+        extra, growth: part of the force outside the factorised tangent, and its derivative, shape (m, 2).
+        off: further correction of (x, control) off the tangent.
     """
 
     begins: float
@@ -98,13 +114,13 @@ class _Piece(NamedTuple):
     off: tuple[np.ndarray, float]
 
     def after(self, time: float) -> _Piece:
-        """Return the rest of a piece of path from a time on, with the part before it replaced by a straight line."""
+        """Return the segment with its start moved along itself to another arc length."""
         by = time - self.begins
         return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
                              force=self.force + by * self.rate, extra=self.extra + by * self.growth)
 
     def of(self, m: int) -> _Piece:
-        """It, when m points are known."""
+        """Return the segment for m known points."""
         more = m - len(self.status)
         if not more:
             return self
@@ -115,16 +131,20 @@ class _Piece(NamedTuple):
 
 
 class ContactEventSequence:
-    """The arrivals ahead of a state, in order, and the path bent by them.
+    """Gap closures ahead of an accepted state, in order, and the piecewise-linear path through them.
 
     Args:
-        faces: in contact (`FaceContact`), those that take part; n: owned unknowns of the fields.
-        x, control: the state, locally owned entries; direction, slope: of them by arc length.
-        response: of the body; batch: points for which that is asked at a time.
+        faces: the active `FaceContact` objects.
+        n: number of locally owned field unknowns.
+        x, control: the state; x is the locally owned part.
+        direction, slope: derivatives of x and control by arc length.
+        response: linearised response of the body to contact forces.
+        batch: number of points whose compliance is solved for at a time.
 
     Attributes:
-        touching: how many points of each face touch.
-        ends: arc length beyond which nothing is predicted; stops: no path goes on there.
+        touching: number of closed points of each face.
+        ends: arc length up to which the prediction holds.
+        stops: True if no path continues there.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -141,7 +161,7 @@ class ContactEventSequence:
         none = np.zeros((0, start[0].shape[1]))
         self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
                                (np.zeros(len(x)), 0.0))]
-        self._end: _Piece | None = None                     # of the last piece, in equilibrium
+        self._end: _Piece | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # arrivals that are held; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
         if not self._take_over():
@@ -149,11 +169,11 @@ class ContactEventSequence:
 
     @property
     def exhausted(self) -> bool:
-        """True if the events of this step took all the work that they may."""
+        """True if the events of this step reached the limit `EventSettings.work`."""
         return self._work >= _SETTINGS.work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """The arrival number k (from 0) within a length, or None; those before it are held."""
+        """Return gap closure number k (from 0) within an arc length, or None; the forces of earlier closures act."""
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
                 return None
@@ -167,8 +187,12 @@ class ContactEventSequence:
         return self._closures[k] if self._closures[k].time < length else None
 
     def closures(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-        """Return for each face the arc length at which locally owned points touch, `length` if they do not; where
-        they are then; which are where their forces want them at the end."""
+        """Return the closures within an arc length for each face.
+
+        Returns:
+            Arc lengths at which locally owned points close (`length` if they stay open), their positions there, and the
+            mask of points in agreement with their forces at the end.
+        """
         piece = self._piece(length)
         times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
         for arrival in self._closures:
@@ -180,7 +204,7 @@ class ContactEventSequence:
         return times, at, sure
 
     def positions(self, length: float) -> list[np.ndarray]:
-        """Positions of own points of each face at an arc length, straight from the last change."""
+        """Return the positions of locally owned points of each face at an arc length, linear from the last event."""
         return self._piece(length).after(length).at
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
@@ -199,10 +223,9 @@ class ContactEventSequence:
                 piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
 
     def _held(self, piece: _Piece, moved: Sequence[np.ndarray] = ()) -> _Piece:
-        """Return the start of a piece, its points moved onto their tools and to where they stick; moved: first, by
-        face.
+        """Return the start of a segment with its points on their tools and sticking positions.
 
-        (Tools are curved: it takes a few such iterations.)
+        Curved tools need a few iterations. `moved` is a first motion of the points of each face.
         """
         points, near = self._points, self._points.near(piece.at, piece.force)
         u = points.at(moved) if moved else np.zeros_like(piece.force)
@@ -213,11 +236,11 @@ class ContactEventSequence:
                               extra=piece.extra + more)
 
     def _piece(self, length: float) -> _Piece:
-        """The last piece of the path that begins before a length."""
+        """Return the last segment that begins before an arc length."""
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _take_over(self) -> bool:
-        """Hold points that touched, and may slide, by forces of their own; False: that cannot be told."""
+        """Apply own forces to the sliding points of the state; return False without a prediction."""
         x, control = self._way[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
@@ -237,7 +260,7 @@ class ContactEventSequence:
         return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
 
     def _turn(self, piece: _Piece, status: np.ndarray) -> bool:
-        """The piece of path that goes on from where one begins, with other statuses; False: it cannot be told."""
+        """Return the next segment from the start of another, with new statuses; False without a prediction."""
         points, near = self._points, self._points.near(piece.at, piece.force)
         self._work += 1
         found = points.rates(points.at(self._along), status, near, piece.force)
@@ -255,7 +278,7 @@ class ContactEventSequence:
         return True
 
     def _hold(self, length: float) -> bool:
-        """Hold the arrival that is not held yet: the next piece of the path; False: it cannot be told."""
+        """Apply the contact force of the last closure and add the next segment; return False without a prediction."""
         last, arrival, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or arrival.who not in self._points.who and not self._learn(length):
             return False
@@ -268,7 +291,7 @@ class ContactEventSequence:
         return self._turn(end._replace(status=status, place=place), status)
 
     def _find(self, length: float) -> bool:
-        """The next arrival within a length, on the last piece or off its end."""
+        """Find the next closure within an arc length, on the last segment or at its end."""
         for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
@@ -289,7 +312,7 @@ class ContactEventSequence:
         return self._end is not None and self._first(self._back(self._end, last), length, last)
 
     def _first(self, times: list[np.ndarray], length: float, at: _Piece) -> bool:
-        """Take up the first of arrivals at times, if it is within a length; at: a piece of path there."""
+        """Add the earliest of several closures if it lies within an arc length; `at` is a segment of the path there."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
@@ -299,7 +322,7 @@ class ContactEventSequence:
         return True
 
     def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
-        """The arrival of a point near a time, when points are `at` their places."""
+        """Return the closure of a point near an arc length, from the positions `at` of the points."""
         told = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
@@ -316,7 +339,7 @@ class ContactEventSequence:
         return self._comm.bcast(told, root=rank)
 
     def _settle(self, length: float) -> bool:
-        """Bring the path back to equilibrium where the last point found arrives, and that with it; False: it fails."""
+        """Equilibrate the path at the last closure, and relocate the closure; return False on failure."""
         last, arrival = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(arrival.time)
         if arrival.time - last.begins < _SETTINGS.soon * length:
@@ -343,12 +366,12 @@ class ContactEventSequence:
                 times = self._back(end, last, found)
                 if not self._first(times, found.time, end):
                     return True
-                self._closures.pop(-2)                      # another one has arrived before
+                self._closures.pop(-2)                      # another gap closed before
                 tried = []
         return False
 
     def _back(self, end: _Piece, last: _Piece, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return the times at which points that end a piece inside their tools passed the surface, else its time."""
+        """Return the arc lengths at which points inside their tools passed the surface, else the end of the segment."""
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
             near = face.law.nearest(x)
@@ -361,11 +384,9 @@ class ContactEventSequence:
         return times
 
     def _mixed(self, tried: list[tuple[_Piece, _Piece]]) -> _Piece | None:
-        """Return the mean of iterates, (before, after) each, that is nearest to a fixed point (Anderson 1965).
+        """Return the combination of iterates, (before, after) each, closest to a fixed point (Anderson 1965).
 
-        None: they lead beyond all bounds.
-
-        (Factors of another state alone make them go to and fro.)
+        Return None if they diverge. Without acceleration the stored factors make the iterates oscillate.
         """
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
@@ -385,13 +406,13 @@ class ContactEventSequence:
             off=(mean([p.off[0] for p in after]), float(mean([p.off[1] for p in after]))))
 
     def _moved(self, time: float, piece: _Piece) -> _Piece | None:
-        """A piece of path, from a time on, moved by an iteration towards equilibrium there; None: no factors."""
+        """Return a segment moved by one equilibrium iteration at its start; None without factors."""
         piece, points = piece.of(len(self._points.who)).after(time), self._points
         x, control, direction, slope = self._way
         self._work += 1
         forces = [np.full(at.shape, np.nan) for at in piece.at]
         for given, free in zip(forces, self._free):
-            given[free] = 0.0                               # open points touch nothing
+            given[free] = 0.0                               # open points carry no force
         points.spread(piece.force, forces)
         by = self._response.to_equilibrium(
             x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),
@@ -405,7 +426,7 @@ class ContactEventSequence:
         return piece._replace(off=(piece.off[0] + by[0], piece.off[1] + by[1]))
 
     def _learn(self, length: float) -> bool:
-        """Columns of the arrival that is to be held and of those that come next as it looks; False: no factors."""
+        """Solve for the compliance of the last closure and of the expected next ones; return False without factors."""
         last, arrival, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):

@@ -1,4 +1,4 @@
-"""The length of a step that closes several gaps, and the positions where they close."""
+"""Length of a step that closes several gaps, and the positions of the closures."""
 
 from __future__ import annotations
 
@@ -56,10 +56,11 @@ class ContactEventPrediction:
     """Events ahead of one state, see `step_limit.EventPrediction`.
 
     Args:
-        present: contacts that take part.
-        allowed: number of points of each that may close their gaps in one step.
-        n: owned unknowns of the fields.
-        state: the accepted state; response: of the body there.
+        present: active contacts.
+        allowed: number of points of each contact that may close their gaps in one step.
+        n: number of locally owned unknowns.
+        state: the accepted state.
+        response: linearised response of the body there.
     """
 
     def __init__(self, present: list[Approach], allowed: list[int], n: int, state: Any, response: Response):

@@ -1,13 +1,17 @@
-"""A few contact points and the body as they feel it: the forces that hold them while they stick and slide.
+r"""Frictional contact of a few points, condensed onto their contact forces.
 
-Along the tangent of a state, by a unit of arc length, points move by u. The factors of that tangent know the stiffness
-S of points that touched; with forces F in its place, their motions are
+Coulomb's law is solved for m points alone; the body enters by its compliance C at them. The factorised tangent of a
+state contains a contact stiffness S at points that were closed. For contact forces F instead, the condensed equations
+of motion per arc length are
 
-    dx = u - C (dF - S dx),
+.. math:: dx = u - C (dF - S \, dx)
 
-C the compliance in the plane in which a step ends. A point that sticks does not move, one that slides stays on its tool
-with T = mu N against it; on a tool of curvature c its forces turn as it goes on, dF = c (t dx) (N t - T n) beside what
-they grow by.
+where u is the motion along the tangent, and C is taken in the plane normal to the path. A sticking point has dx = 0. A
+sliding point stays on its tool with T = mu N. On a tool of curvature c its force rotates with the motion:
+
+.. math:: dF = c \, (t \cdot dx) (N t - T n)
+
+with the normal n into the tool and its tangent t: the geometric stiffness of contact.
 """
 
 from __future__ import annotations
@@ -25,16 +29,15 @@ from .response import Response
 
 @dataclass(frozen=True)
 class Agreement:
-    """Tolerances for the equilibrium of contact points with their law.
+    """Limits and tolerances of the active-set search.
 
     Attributes:
-        all_at_once: of the sets of statuses that are looked at, the first: in them all that disagree change,
-            then one at a time.
-        tries: at most this number of sets of statuses.
-        rough: a coefficient of friction beyond all others that is still finite.
-        none: of the largest, a rate that is negligible.
-        soon: arc length in which what a force grows to counts beside it.
-        limit: how far below the limit of friction, or above no pressure (over the largest), counts as there.
+        all_at_once: number of trials in which all violating statuses change; later only one changes at a time.
+        tries: maximum number of status sets.
+        rough: finite value that replaces an infinite friction coefficient.
+        none: part of the largest rate below which a rate is negligible.
+        soon: arc length over which force rates are compared with forces.
+        limit: relative distance from the Coulomb cone, or from zero pressure, that counts as on it.
     """
 
     all_at_once: int = 6
@@ -49,8 +52,13 @@ _AGREEMENT = Agreement()
 
 
 class Near(NamedTuple):
-    """The tool at m points: signed distance, normal into it and tangent, shape (m, 2), curvature; beyond: how much
-    deeper in it each would be as its force wants it."""
+    """Local geometry of the tools at m points.
+
+    Attributes:
+        normal, tangent: unit vectors, normal into the tool, shape (m, 2).
+        curvature: shape (m,), 1/length.
+        beyond: penetration that gives the present force, less the actual penetration, shape (m,), length.
+    """
 
     normal: np.ndarray
     tangent: np.ndarray
@@ -59,8 +67,13 @@ class Near(NamedTuple):
 
 
 class Small(NamedTuple):
-    """Motion of m free points: free: dx, flat; by: dx by each force; turn: how forces that turn grow by dx,
-    shape (m, 2, 2)."""
+    """Motion of m points without contact stiffness.
+
+    Attributes:
+        free: dx without contact forces, shape (2 m,).
+        by: derivative of dx by the forces, shape (2 m, 2 m).
+        turn: derivative of rotating forces by dx, shape (m, 2, 2).
+    """
 
     free: np.ndarray
     by: np.ndarray
@@ -68,17 +81,20 @@ class Small(NamedTuple):
 
 
 class Points:
-    """Points of faces, those of all ranks, whose columns of the compliance are known.
+    """Contact points of all ranks with a known compliance.
 
     Args:
-        faces: in contact (`FaceContact`); n: owned unknowns of the fields; size: of (x, control) on this rank;
-            response: of the body.
+        faces: the active `FaceContact` objects.
+        n: number of locally owned field unknowns.
+        size: number of locally owned entries of (x, control).
+        response: response of the body.
 
     Attributes:
-        who: (rank, face, point) of each.
-        columns, steps: of x (locally owned rows) and of the control by forces -1, shapes (n, 2 m), (2 m,).
-        by: how all points of each face move by them, (points, 2, 2 m).
-        friction: T/N where a point slides, infinite: it sticks; elastic_slip: before; shape (m,).
+        who: (rank, face, point) of each of the m points.
+        columns, steps: changes of x (locally owned rows), shape (n, 2 m), and control, shape (2 m,), by forces -1.
+        by: motion of all points of each face by these forces, shape (points, 2, 2 m).
+        friction: coefficient of friction, infinite for stick, shape (m,).
+        elastic_slip: tangential motion before sliding, shape (m,), length.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
@@ -92,7 +108,12 @@ class Points:
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
-        """Some more own points (numbers) of each face; touched: the factors know their stiffness; False: no factors."""
+        """Add points and solve for their compliance; return False without factors.
+
+        Args:
+            chosen: for each face, local numbers of locally owned points.
+            touched: True if the factorised tangent contains their contact stiffness.
+        """
         found = self._response.to_points(chosen)
         if found is None:
             return False
@@ -117,7 +138,7 @@ class Points:
         return True
 
     def at(self, values: Sequence[np.ndarray], who: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
-        """Values of faces' own points, shape (n, ...), at these points, on all ranks, shape (m, ...)."""
+        """Return values at these points on all ranks, shape (m, ...), from the owned points of the faces."""
         who = self.who if who is None else who
         found = np.zeros((len(who), *values[0].shape[1:]))
         for k, (rank, f, i) in enumerate(who):
@@ -126,7 +147,7 @@ class Points:
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
 
     def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
-        """Put values of these points, shape (m, ...), where they are among those of all own points of each face."""
+        """Write values of these points, shape (m, ...), into the values at each face's owned points."""
         for (rank, f, i), value in zip(self.who, values, strict=True):
             if rank == self._comm.rank:
                 among[f][i] = value
@@ -137,7 +158,7 @@ class Points:
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
     def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> Near:
-        """The tools at all points of the faces, where forces in F, shape (m, 2), act on these."""
+        """Return the geometry of the tools at all points, with forces F, shape (m, 2), at these points."""
         c = self._components
         found = np.zeros((len(self.who), c + c + 2))
         for f, face in enumerate(self._faces):
@@ -153,7 +174,7 @@ class Points:
         return Near(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
     def parts(self, force: np.ndarray, near: Near) -> tuple[np.ndarray, np.ndarray]:
-        """N and T of forces, shape (m,) each."""
+        """Return the normal and tangential components N and T of forces, shape (m,) each."""
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def moved_by(self, by: np.ndarray, f: int) -> np.ndarray:
@@ -162,11 +183,18 @@ class Points:
 
     def held(self, u: np.ndarray, status: np.ndarray, near: Near, force: np.ndarray,
              to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """New forces F of points that the body would move by u, and dF - S dx; shapes (m, 2).
+        """Return new forces F of points that the body would move by u, and dF - S dx, shape (m, 2) each.
 
-        to: the amount by which those that stick are to move, shape (m, 2), but for their elastic slip g_s T/(mu N);
-            those that
-        slide go to their tools. NaN: there are no such forces.
+        Args:
+            u: motion of the points without new forces.
+            status: contact statuses.
+            near: geometry of the tools.
+            force: present forces.
+            to: motion of the sticking points before their elastic slip g_s T/(mu N), shape (m, 2). Sliding points go to
+                their tools.
+
+        Returns:
+            The forces; NaN if none exist.
         """
         N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
@@ -180,9 +208,9 @@ class Points:
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: Near,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Growth of forces and of dF - S dx, and statuses, by unit of arc length; None: none agree with friction.
+        """Return the rates of forces and of dF - S dx, and the statuses; None if no statuses satisfy Coulomb's law.
 
-        status: as before, of which those that disagree with what they lead to are changed.
+        Statuses that violate it are changed.
         """
         (N, T), here = self.parts(force, near), status != ContactStatus.FREE
         try:
@@ -199,7 +227,7 @@ class Points:
 
     def _agreed(self, small: Small, status: np.ndarray, near: Near, N: np.ndarray,
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Rates of forces and positions, and statuses that agree with them; here: points that are at their tools."""
+        """Return consistent rates of forces and positions, and statuses; `here` is the mask of closed points."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
         gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
         for k in range(_AGREEMENT.tries):
@@ -237,7 +265,7 @@ class Points:
         return None
 
     def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
-        """Arc length to where the first point lets go or slides, and statuses then."""
+        """Return the arc length at which the first point opens or slides, and the statuses then."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
         none = _AGREEMENT.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
@@ -270,7 +298,7 @@ class Points:
 
     def _solved(self, small: Small, status: np.ndarray, near: Near,
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Forces (or, without `to`, their rates) and motions, shape (m, 2); slips: elastic, of those that stick."""
+        """Return forces (or, without `to`, their rates) and motions, shape (m, 2); `slips` are elastic slips."""
         free, by, turn = small
         size, held = len(free), status != ContactStatus.FREE
         sticks = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction > 0))

@@ -12,11 +12,13 @@ from ...solve.state import State
 
 
 class Response:
-    """Changes (x, control) by forces, in the plane in which a step from a state ends; None once its factors are gone.
+    """Changes of (x, control) by forces, in the plane in which a step from a state ends.
+
+    The methods return None once the LU factors of the state are replaced.
 
     Args:
-        curve: it has just made the tangent ahead of the state.
-        x, F: vectors to work with.
+        curve: the `Curve`, with the tangent at the state just factorised.
+        x, F: work vectors.
     """
 
     def __init__(self, curve: Curve, state: State, x: PETSc.Vec, F: PETSc.Vec):
@@ -27,24 +29,30 @@ class Response:
 
     @property
     def at_hand(self) -> bool:
-        """The factors are those of the state."""
+        """True if the stored LU factors belong to the state."""
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return the response to -1 at locally owned points (numbers) of each face.
+        """Return the response to unit forces of sign -1 at points.
 
-        It consists of the changes of x, locally owned rows, (n, m), and of the control, (m,).
+        Args:
+            chosen: for each face, local numbers of locally owned points.
 
-        m: point by point, way by way, of all ranks.
+        Returns:
+            Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). Columns run over points and
+            components of all ranks.
         """
         return self._by(unit_forces(self._problem, self._problem.present, chosen)) if self.at_hand else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
-        """Return the correction from (x, control) to equilibrium by the residual there.
+        """Return the modified Newton correction at (x, control) for given contact forces.
 
-        It consists of the changes of x, locally owned entries, and of the control.
+        Args:
+            x, control: the point, locally owned entries.
+            forces: for each face, shape (n, 2); NaN where the contact law gives the force.
 
-        forces: at the points of each face, NaN where the law of contact says it, shape (n, 2).
+        Returns:
+            Changes of x, locally owned entries, and of the control.
         """
         if not self.at_hand:
             return None
