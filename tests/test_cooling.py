@@ -19,7 +19,7 @@ def pulled(material=RELAXING, boundaries=(), work_to_heat: float | None = 1.0):
     mesh = fx.mesh.disc(radius=1.0, thickness=0.4, elements=(3, 2))
     return fx.Scene(mesh=mesh, materials=material, temperature=20.0,
                     heat=fx.Cooling(POLYMER, boundaries, unit="C", tolerance=0.01, work_to_heat=work_to_heat),
-                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z", guide=True),
                               fx.PrescribedDisplacement("rim", "r", name="rim")])
 
 
