@@ -11,8 +11,8 @@ from without import run_without
 
 import formingx as fx
 from formingx.contact.step_limit import Way
-from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Piece
-from formingx.extensions.contact_events.reduced_contact import Near, Points
+from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Segment
+from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
 from formingx.extensions.contact_events.response import Response
 from formingx.physics.contact_law import ContactStatus
 
@@ -118,7 +118,7 @@ def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
     points = Points([face], 0, 0, None)
     points._C, points._S, points._pulls = np.eye(2), np.zeros((1, 2, 2)), np.zeros(1, dtype=bool)
     points.friction, points.elastic_slip = np.array([0.3]), np.zeros(1)
-    near = Near(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(1), np.zeros(1))
+    near = ToolFrame(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(1), np.zeros(1))
     found = points.rates(np.array([moves]), np.array([before]), near, np.array([force]))
     assert found is not None and found[2] == [after] and found[0][0] == pytest.approx(rate)
 
@@ -175,7 +175,7 @@ def test_iterations_that_go_to_and_fro_are_mixed():
 
     def piece(x):
         none = np.zeros((0, 2))
-        return _Piece(x[0], [x[None]], [np.zeros((1, 2))], np.zeros(0), none, none, none, none, none, (x, x[1]))
+        return _Segment(x[0], [x[None]], [np.zeros((1, 2))], np.zeros(0), none, none, none, none, none, (x, x[1]))
     starts = [fixed + by for by in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
     tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
     found = ContactEventSequence._mixed(SimpleNamespace(_comm=MPI.COMM_SELF), tried)

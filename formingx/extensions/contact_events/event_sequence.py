@@ -89,7 +89,7 @@ class GapClosure(NamedTuple):
         return self.rank, self.face, self.point
 
 
-class _Piece(NamedTuple):
+class _Segment(NamedTuple):
     """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
 
     Attributes:
@@ -113,13 +113,13 @@ class _Piece(NamedTuple):
     growth: np.ndarray
     off: tuple[np.ndarray, float]
 
-    def after(self, time: float) -> _Piece:
+    def after(self, time: float) -> _Segment:
         """Return the segment with its start moved along itself to another arc length."""
         by = time - self.begins
         return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
                              force=self.force + by * self.rate, extra=self.extra + by * self.growth)
 
-    def of(self, m: int) -> _Piece:
+    def of(self, m: int) -> _Segment:
         """Return the segment for m known points."""
         more = m - len(self.status)
         if not more:
@@ -159,9 +159,9 @@ class ContactEventSequence:
         self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
         none = np.zeros((0, start[0].shape[1]))
-        self._pieces = [_Piece(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
+        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
                                (np.zeros(len(x)), 0.0))]
-        self._end: _Piece | None = None                     # end of the last segment, in equilibrium
+        self._end: _Segment | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # arrivals that are held; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
         if not self._take_over():
@@ -222,7 +222,7 @@ class ContactEventSequence:
         return (piece.off[0] - self._points.columns @ piece.extra.ravel(),
                 piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
 
-    def _held(self, piece: _Piece, moved: Sequence[np.ndarray] = ()) -> _Piece:
+    def _held(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
         """Return the start of a segment with its points on their tools and sticking positions.
 
         Curved tools need a few iterations. `moved` is a first motion of the points of each face.
@@ -235,7 +235,7 @@ class ContactEventSequence:
         return piece._replace(at=[x + m for x, m in zip(at, moved)] if moved else at, force=force,
                               extra=piece.extra + more)
 
-    def _piece(self, length: float) -> _Piece:
+    def _piece(self, length: float) -> _Segment:
         """Return the last segment that begins before an arc length."""
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
@@ -259,7 +259,7 @@ class ContactEventSequence:
         place = self._points.at(piece.at) - slip[:, None] * self._points.near(piece.at, force).tangent
         return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
 
-    def _turn(self, piece: _Piece, status: np.ndarray) -> bool:
+    def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
         """Return the next segment from the start of another, with new statuses; False without a prediction."""
         points, near = self._points, self._points.near(piece.at, piece.force)
         self._work += 1
@@ -311,7 +311,7 @@ class ContactEventSequence:
         self._end = self._moved(length, last)
         return self._end is not None and self._first(self._back(self._end, last), length, last)
 
-    def _first(self, times: list[np.ndarray], length: float, at: _Piece) -> bool:
+    def _first(self, times: list[np.ndarray], length: float, at: _Segment) -> bool:
         """Add the earliest of several closures if it lies within an arc length; `at` is a segment of the path there."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
@@ -344,7 +344,7 @@ class ContactEventSequence:
         self._end = end = last.after(arrival.time)
         if arrival.time - last.begins < _SETTINGS.soon * length:
             return True
-        tried: list[tuple[_Piece, _Piece]] = []
+        tried: list[tuple[_Segment, _Segment]] = []
         for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
             if len(tried) == _SETTINGS.iterations or self.exhausted:
                 return False
@@ -370,7 +370,7 @@ class ContactEventSequence:
                 tried = []
         return False
 
-    def _back(self, end: _Piece, last: _Piece, but: GapClosure | None = None) -> list[np.ndarray]:
+    def _back(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
         """Return the arc lengths at which points inside their tools passed the surface, else the end of the segment."""
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
@@ -383,7 +383,7 @@ class ContactEventSequence:
             t[inside] = last.begins + np.clip(left - back, 1e-3 * left, 0.999 * left)[inside]
         return times
 
-    def _mixed(self, tried: list[tuple[_Piece, _Piece]]) -> _Piece | None:
+    def _mixed(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
         """Return the combination of iterates, (before, after) each, closest to a fixed point (Anderson 1965).
 
         Return None if they diverge. Without acceleration the stored factors make the iterates oscillate.
@@ -405,7 +405,7 @@ class ContactEventSequence:
             force=mean([p.force for p in after]), extra=mean([p.extra for p in after]),
             off=(mean([p.off[0] for p in after]), float(mean([p.off[1] for p in after]))))
 
-    def _moved(self, time: float, piece: _Piece) -> _Piece | None:
+    def _moved(self, time: float, piece: _Segment) -> _Segment | None:
         """Return a segment moved by one equilibrium iteration at its start; None without factors."""
         piece, points = piece.of(len(self._points.who)).after(time), self._points
         x, control, direction, slope = self._way

@@ -28,7 +28,7 @@ from .response import Response
 
 
 @dataclass(frozen=True)
-class Agreement:
+class StatusSearch:
     """Limits and tolerances of the active-set search.
 
     Attributes:
@@ -48,10 +48,10 @@ class Agreement:
     limit: float = 1e-6
 
 
-_AGREEMENT = Agreement()
+_SEARCH = StatusSearch()
 
 
-class Near(NamedTuple):
+class ToolFrame(NamedTuple):
     """Local geometry of the tools at m points.
 
     Attributes:
@@ -66,7 +66,7 @@ class Near(NamedTuple):
     beyond: np.ndarray
 
 
-class Small(NamedTuple):
+class ReducedSystem(NamedTuple):
     """Motion of m points without contact stiffness.
 
     Attributes:
@@ -126,11 +126,11 @@ class Points:
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
         whole = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, _AGREEMENT.rough) * one,
+        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * one,
                                          face.law.elastic_slip * one, face.scale, face.law.pulls * one])
                         for face, one in zip(self._faces, whole)], new)
         friction, slip, scale, pulls = more.T
-        self.friction = np.append(self.friction, np.where(friction < _AGREEMENT.rough, friction, np.inf))
+        self.friction = np.append(self.friction, np.where(friction < _SEARCH.rough, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)
         known = self.at([face.stiffness_in_tangent for face in self._faces], new)
@@ -152,12 +152,12 @@ class Points:
             if rank == self._comm.rank:
                 among[f][i] = value
 
-    def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: Near) -> np.ndarray:
+    def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
         """Return the motion of points onto their tools, shape (m, 2)."""
         along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
-    def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> Near:
+    def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> ToolFrame:
         """Return the geometry of the tools at all points, with forces F, shape (m, 2), at these points."""
         c = self._components
         found = np.zeros((len(self.who), c + c + 2))
@@ -171,9 +171,9 @@ class Points:
                 depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
                 found[mine] = np.column_stack([near.normal, near.tangent, near.curvature, depth - near.distance])
         found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
-        return Near(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
+        return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
-    def parts(self, force: np.ndarray, near: Near) -> tuple[np.ndarray, np.ndarray]:
+    def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
         """Return the normal and tangential components N and T of forces, shape (m,) each."""
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
@@ -181,7 +181,7 @@ class Points:
         """Return the motion of all locally owned points of a face by forces -1 times `by`, shape (m, 2)."""
         return self.by[f] @ by.ravel()
 
-    def held(self, u: np.ndarray, status: np.ndarray, near: Near, force: np.ndarray,
+    def held(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
              to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return new forces F of points that the body would move by u, and dF - S dx, shape (m, 2) each.
 
@@ -206,7 +206,7 @@ class Points:
             return force, np.full(force.shape, np.nan)
         return F, F - force - np.einsum("nij,nj->ni", self._S, dx)
 
-    def rates(self, u: np.ndarray, status: np.ndarray, near: Near,
+    def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return the rates of forces and of dF - S dx, and the statuses; None if no statuses satisfy Coulomb's law.
 
@@ -217,7 +217,7 @@ class Points:
             small = self._small(u, near, force)
         except np.linalg.LinAlgError:
             return None
-        slack = here & (np.abs(N).max(initial=0.0) * _AGREEMENT.limit >= N) & ~self._pulls
+        slack = here & (np.abs(N).max(initial=0.0) * _SEARCH.limit >= N) & ~self._pulls
         for begin in (status, np.where(slack, ContactStatus.FREE, status)):
             found = self._agreed(small, begin.copy(), near, N, T, here)
             if found is not None:
@@ -225,12 +225,12 @@ class Points:
                 return F, F - np.einsum("nij,nj->ni", self._S, dx), status
         return None
 
-    def _agreed(self, small: Small, status: np.ndarray, near: Near, N: np.ndarray,
+    def _agreed(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame, N: np.ndarray,
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return consistent rates of forces and positions, and statuses; `here` is the mask of closed points."""
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
         gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
-        for k in range(_AGREEMENT.tries):
+        for k in range(_SEARCH.tries):
             try:
                 F, dx = self._solved(small, status, near)
             except np.linalg.LinAlgError:
@@ -238,16 +238,16 @@ class Points:
             if not np.isfinite(F).all():
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
-            none = _AGREEMENT.limit * (np.abs(N).max() + _AGREEMENT.soon * np.abs(dN).max())
+            none = _SEARCH.limit * (np.abs(N).max() + _SEARCH.soon * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != ContactStatus.STICKS) & (mu > 0)
-            turns = slides & (status * along < -_AGREEMENT.none * np.abs(along).max())
+            turns = slides & (status * along < -_SEARCH.none * np.abs(along).max())
             other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
-            most = mu * ((1 - _AGREEMENT.limit) * N - none)
+            most = mu * ((1 - _SEARCH.limit) * N - none)
             full = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            gives = full & (over > _AGREEMENT.none * np.abs(dT).max())
+            gives = full & (over > _SEARCH.none * np.abs(dT).max())
             other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
             lets = held & ~self._pulls & (none >= N) & (dN < 0)
             other[lets], miss[lets] = ContactStatus.FREE, -(dN * gives_way)[lets]
@@ -258,16 +258,17 @@ class Points:
             changes = np.flatnonzero(other != status)
             if not len(changes):
                 return F, dx, status
-            if k >= _AGREEMENT.all_at_once or status.tobytes() in seen:
+            if k >= _SEARCH.all_at_once or status.tobytes() in seen:
                 changes = changes[[np.argmax(miss[changes])]]
             seen.add(status.tobytes())
             status[changes] = other[changes]
         return None
 
-    def change(self, status: np.ndarray, near: Near, force: np.ndarray, rate: np.ndarray) -> tuple[float, np.ndarray]:
+    def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
+                                                                                                        np.ndarray]:
         """Return the arc length at which the first point opens or slides, and the statuses then."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
-        none = _AGREEMENT.limit * max(np.abs(N).max(initial=0.0), 1e-30)
+        none = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
         lets = held & ~self._pulls & (dN < 0) & (none < N)
         times[lets], other[lets] = -N[lets] / dN[lets], ContactStatus.FREE
@@ -275,7 +276,7 @@ class Points:
             k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
             mu = self.friction[k]
             left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (grows > 0) & (left > _AGREEMENT.limit * mu * np.abs(N[k]))
+            slips = (grows > 0) & (left > _SEARCH.limit * mu * np.abs(N[k]))
             t = np.divide(left, grows, out=np.full(len(k), np.inf), where=slips)
             first = t < times[k]
             times[k[first]], other[k[first]] = t[first], sense
@@ -286,7 +287,7 @@ class Points:
         after[first] = other[first]
         return float(times[first]), after
 
-    def _small(self, u: np.ndarray, near: Near, force: np.ndarray) -> Small:
+    def _small(self, u: np.ndarray, near: ToolFrame, force: np.ndarray) -> ReducedSystem:
         """Return the motion by u and by each force without the stiffness of points, except for forces that turn."""
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
@@ -294,9 +295,9 @@ class Points:
         size = len(self._C)
         CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), self._S - turn).reshape(size, size)
         found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
-        return Small(found[:, 0], found[:, 1:], turn)
+        return ReducedSystem(found[:, 0], found[:, 1:], turn)
 
-    def _solved(self, small: Small, status: np.ndarray, near: Near,
+    def _solved(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame,
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return forces (or, without `to`, their rates) and motions, shape (m, 2); `slips` are elastic slips."""
         free, by, turn = small
@@ -320,7 +321,7 @@ class Points:
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
         a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
-        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _AGREEMENT.none * np.abs(gives).max(initial=0.0))
+        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _SEARCH.none * np.abs(gives).max(initial=0.0))
         gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves
         if slips is not None:
             k = np.arange(len(sticks), 2 * len(sticks))

@@ -49,7 +49,7 @@ def lack(what: str, wanted: float | None, found: float) -> str:
     return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
 
 
-class Aim:
+class WallTarget:
     """Least-squares target of a wall: relative deviations of the wall, and of a prescribed volume.
 
     Args:
@@ -147,7 +147,7 @@ class Aim:
         return f"These parameters bring it no nearer: by the derivatives {100 * now:.2g} % is left on the mean"
 
 
-class MeasuredAim(Aim):
+class MeasuredWallTarget(WallTarget):
     """Least-squares target of a measured wall: relative deviations at the measured points of the part.
 
     Args:

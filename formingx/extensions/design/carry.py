@@ -27,10 +27,10 @@ from ...solve.newton import Failure, fixed
 from ...solve.process import driving, end_of, next_knot, straight
 from ...solve.stage import Plan, plan
 from ...solve.state import State
-from .neighbours import Neighbour, settle
+from .neighbours import PerturbedRun, settle
 
 
-def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
+def carry(path: Path, end: Any, neighbours: Sequence[PerturbedRun]) -> None:
     """Solve for all perturbed runs at the last state of the base run.
 
     Args:
@@ -41,11 +41,11 @@ def carry(path: Path, end: Any, neighbours: Sequence[Neighbour]) -> None:
     Raises:
         Failure: the run has no derivative; its text is the reason.
     """
-    _Carrier(path, end, neighbours).run()
+    _StateTransfer(path, end, neighbours).run()
 
 
-class _Carrier:
-    def __init__(self, path: Path, end: Any, neighbours: Sequence[Neighbour]):
+class _StateTransfer:
+    def __init__(self, path: Path, end: Any, neighbours: Sequence[PerturbedRun]):
         if len(path.segments) > 1:
             raise Failure("the body was remeshed", [])
         if path.ended:

@@ -17,7 +17,7 @@ from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
-from .aim import SEARCH, Aim, MeasuredAim, inside_of, lack
+from .aim import SEARCH, MeasuredWallTarget, WallTarget, inside_of, lack
 from .answer import Answer
 from .parameters import Parameters
 from .run import DesignRun
@@ -134,10 +134,10 @@ class Design:
             raise InputError("fit: within is for a wanted wall: leave points of a measured one out of it")
         held = None if volume is None or measured and volume == "kept" else (
             first.volume * (1 - SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
-        aim = MeasuredAim(first, wall, held) if measured else Aim(first, wall, within, held)
+        aim = MeasuredWallTarget(first, wall, held) if measured else WallTarget(first, wall, within, held)
         return self._search(first, aim, most, good)
 
-    def _search(self, first: DesignRun, aim: Aim, most: int, good: float) -> Answer:
+    def _search(self, first: DesignRun, aim: WallTarget, most: int, good: float) -> Answer:
         """Take Gauss-Newton steps from the best run, halved if a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size

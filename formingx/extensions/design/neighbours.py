@@ -25,7 +25,7 @@ from ...solve.state import State
 
 
 @dataclass(frozen=True)
-class Solved:
+class PerturbedTolerances:
     """Convergence criterion of a perturbed run: Newton corrections over its distance from the base state.
 
     Attributes:
@@ -43,14 +43,14 @@ class Solved:
     none: float = 2e-13
 
 
-_SOLVED = Solved()
+_TOLERANCES = PerturbedTolerances()
 
 
-class Apart(Failure):
+class PerturbedRunFailure(Failure):
     """Failure to find a perturbed state near the base run: the change is too large for the contact's thin ramps."""
 
 
-class Neighbour:
+class PerturbedRun:
     """Problem and state of one perturbed run.
 
     Args:
@@ -121,7 +121,7 @@ class Neighbour:
         self.problem.destroy()
 
 
-def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: Any,
+def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
     """Solve for the perturbed runs at a state of the base run, whose problem is restored to that state.
 
@@ -136,7 +136,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
         Residual of the base run, locally owned entries, shape (n,).
 
     Raises:
-        Apart: no perturbed state is found near the base state.
+        PerturbedRunFailure: no perturbed state is found near the base state.
         Failure: the state has no tangent, or the target quantity does not change along the path.
     """
     problem, newton = curve.problem, curve.newton
@@ -165,9 +165,9 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
                 one.control - state.control))
         return one.constraint(equations[k]) - kept
     size = _norm(problem, state.x) + abs(state.control)
-    enough = _SOLVED.enough_in_contact if problem.has_kinks else _SOLVED.enough
+    enough = _TOLERANCES.enough_in_contact if problem.has_kinks else _TOLERANCES.enough
     todo, first = list(range(len(neighbours))), np.full(len(neighbours), np.inf)
-    for iteration in range(_SOLVED.iterations):
+    for iteration in range(_TOLERANCES.iterations):
         rows = np.column_stack([neighbours[k].residual(left_over) for k in todo])
         left = np.array([constraint(k) for k in todo])
         if len(todo) > 1:
@@ -186,11 +186,12 @@ def settle(curve: Any, state: State, neighbours: Sequence[Neighbour], equation: 
                 one.x, one.control = one.x + dx[:, j], one.control + steps[j]
             away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
             if not np.isfinite(correction):
-                raise Apart(f"with {one.name} a little changed no state is found near", [])
+                raise PerturbedRunFailure(f"with {one.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
-            good &= correction <= max(enough * away, _SOLVED.none * size)
-            if iteration == _SOLVED.iterations - 1 and correction > max(_SOLVED.good * away, 10 * _SOLVED.none * size):
-                raise Apart(f"with {one.name} a little changed no state is found near", [])
+            good &= correction <= max(enough * away, _TOLERANCES.none * size)
+            if iteration == _TOLERANCES.iterations - 1 and correction > max(_TOLERANCES.good * away,
+                                                                            10 * _TOLERANCES.none * size):
+                raise PerturbedRunFailure(f"with {one.name} a little changed no state is found near", [])
         if good:
             break
         # the error is now of second order: if the most corrected run has converged, so have the others

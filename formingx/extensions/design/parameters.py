@@ -178,13 +178,13 @@ def _number(name: str, given: Any) -> Spline:
     return Spline(start, float(parts[1]), float(parts[2]), profile=False)
 
 
-def _check_bounds(who: str, start: np.ndarray, low: Any, high: Any) -> None:
+def _check_bounds(caller: str, start: np.ndarray, low: Any, high: Any) -> None:
     """Raise an InputError unless the bounds are in order and contain the start values."""
     try:
         low, high = float(low), float(high)
     except (TypeError, ValueError):
-        raise InputError(f"{who}: low = {low!r}, high = {high!r}: must be numbers") from None
+        raise InputError(f"{caller}: low = {low!r}, high = {high!r}: must be numbers") from None
     if not low < high:
-        raise InputError(f"{who}: low = {low:g}, high = {high:g}: the first must be below the second")
+        raise InputError(f"{caller}: low = {low:g}, high = {high:g}: the first must be below the second")
     if not np.all((start >= low) & (start <= high)):
-        raise InputError(f"{who}: start = {start if len(start) > 1 else start[0]}: must be from {low:g} to {high:g}")
+        raise InputError(f"{caller}: start = {start if len(start) > 1 else start[0]}: must be from {low:g} to {high:g}")

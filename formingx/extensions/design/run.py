@@ -20,7 +20,7 @@ from ...solve.record import Record
 from ...units import NONE, Units
 from . import scatter
 from .carry import carry
-from .neighbours import Apart, Neighbour
+from .neighbours import PerturbedRun, PerturbedRunFailure
 from .parameters import Parameters
 from .scatter import Band
 
@@ -122,7 +122,7 @@ class DesignRun:
         return _volume(self.path.problem)
 
     @cached_property
-    def _neighbours(self) -> list[tuple[list[Neighbour], float]]:
+    def _neighbours(self) -> list[tuple[list[PerturbedRun], float]]:
         """For each parameter, the perturbed runs at the last state and the parameter difference between them.
 
         The difference is taken from the base run if there is only one.
@@ -135,7 +135,7 @@ class DesignRun:
                 made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
             try:
                 carry(self.path, self._end, [one for beside, _ in made for one in beside])
-            except Apart as failure:
+            except PerturbedRunFailure as failure:
                 reason = failure.reason
             except Failure as failure:
                 reason = failure.reason
@@ -144,12 +144,12 @@ class DesignRun:
                 return made
         raise InputError(f"Design: this run has no derivative: {reason}")
 
-    def _beside(self, k: int, step: float) -> Neighbour:
+    def _beside(self, k: int, step: float) -> PerturbedRun:
         """Return an unsolved perturbed run with one parameter changed."""
         moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
-            return Neighbour(*self._make(moved), self.path.problem, name)
+            return PerturbedRun(*self._make(moved), self.path.problem, name)
         except InputError as error:
             raise InputError(f"Design: no derivative by {name}: next to its value {self.vector[k]:.6g} build(...)"
                              f" fails: {error}") from None
@@ -262,7 +262,7 @@ class DesignRun:
                              " earlier states too, whose derivatives are not kept")
         return whole
 
-    def _at(self, one: Neighbour, measure: Any) -> Any:
+    def _at(self, one: PerturbedRun, measure: Any) -> Any:
         if measure == "volume":
             return _volume(one.problem)
         state = one.state(self.path.last)

@@ -82,11 +82,11 @@ class Band:
     __repr__ = __str__
 
 
-def covariance_of(who: str, parameters: Parameters, given: Any) -> np.ndarray:
+def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray:
     """Return the covariance of the n numbers of a design, shape (n, n).
 
     Args:
-        who: name of the caller, for messages.
+        caller: name of the caller, for messages.
         parameters: the parameters of the design.
         given: {parameter: standard deviation}. The knots of a profile are independent and have the same deviation.
             Or a fit (`Fit`) whose constants have the names of parameters. Or a list of such, independent of each other.
@@ -100,21 +100,22 @@ def covariance_of(who: str, parameters: Parameters, given: Any) -> np.ndarray:
             for name, size in part.items():
                 mine = [k for k, one in enumerate(parameters.names) if one == name or one.startswith(f"{name}[")]
                 if not mine:
-                    raise _unknown(who, name, parameters)
-                found[mine, mine] += non_negative(f"{who}: {name}", size) ** 2
+                    raise _unknown(caller, name, parameters)
+                found[mine, mine] += non_negative(f"{caller}: {name}", size) ** 2
         elif hasattr(part, "covariance") and hasattr(part, "constants"):
             names = list(part.constants)
             for name in names:
                 if name not in parameters.names:
-                    raise _unknown(who, name, parameters)
+                    raise _unknown(caller, name, parameters)
             open_ = [name for name, row in zip(names, part.covariance) if not np.all(np.isfinite(row))]
             if open_:
-                raise InputError(f"{who}: the tests of this fit leave {', '.join(open_)} open: no deviation is known;"
-                                 f" fit it to more points than it has constants, or a law with fewer constants")
+                raise InputError(f"{caller}: the tests of this fit leave {', '.join(open_)} open: no deviation is"
+                                 f" known; fit it to more points than it has constants, or a law with fewer constants")
             at = [parameters.names.index(name) for name in names]
             found[np.ix_(at, at)] += part.covariance
         else:
-            raise InputError(f"{who}: {part!r}: must be {{parameter: standard deviation}}, a Fit, or a list of these")
+            raise InputError(f"{caller}: {part!r}: must be {{parameter: standard deviation}}, a Fit, or a list of"
+                             f" these")
     return found
 
 
@@ -136,7 +137,7 @@ def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", by, covariance, by), 0.0))
 
 
-def _unknown(who: str, name: Any, parameters: Parameters) -> InputError:
+def _unknown(caller: str, name: Any, parameters: Parameters) -> InputError:
     """Return the InputError for an unknown parameter."""
     known = dict.fromkeys(one.partition("[")[0] for one in parameters.names)
-    return InputError(f"{who}: parameter {name!r} is not known; known: {', '.join(known)}")
+    return InputError(f"{caller}: parameter {name!r} is not known; known: {', '.join(known)}")

@@ -15,7 +15,7 @@ from ...contact.rule import Lobatto
 from ...physics.contact_law import Touch
 
 
-class Worn(NamedTuple):
+class ContactState(NamedTuple):
     """Contact state of a face on the old mesh, with n points in m pairs of neighbours.
 
     Attributes:
@@ -35,7 +35,7 @@ class Worn(NamedTuple):
     slip: float
 
     @classmethod
-    def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> Worn:
+    def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> ContactState:
         """Return the contact state of a face.
 
         Args:
@@ -82,7 +82,7 @@ class Worn(NamedTuple):
         return self.pairs[k], share[np.arange(len(x)), k]
 
 
-def take_over(face: FaceContact, worn: Worn, fields: np.ndarray, control: float) -> None:
+def take_over(face: FaceContact, worn: ContactState, fields: np.ndarray, control: float) -> None:
     """Give a new face the pressure and friction per present area of the old one.
 
     The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.

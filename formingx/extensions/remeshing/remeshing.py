@@ -28,7 +28,7 @@ from ...solve.path_following import Run
 from ...solve.record import Record, Segment
 from ...solve.state import State
 from ...solve.stepping import StepControl
-from .contact_transfer import Worn, take_over
+from .contact_transfer import ContactState, take_over
 from .earlier_meshes import scene_on
 from .preformed import Preformed
 from .remeshed import enclosed, remeshed
@@ -260,7 +260,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         edges = outline.edges()
         of = {name: outline.of(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
-        worn = [(c, Worn.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
+        worn = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
     touched = [(c.contact.on, w.position[w.touches] + by) for c, w, by in worn]
     order = outline.around("remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
@@ -337,7 +337,7 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
     return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
 
 
-def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, Worn, np.ndarray]]) -> np.ndarray:
+def _outside(x: np.ndarray, names: frozenset[str], worn: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
     """Return outline points, shape (n, 2), moved out of tools to the depth of neighbouring contacts.
 
     Straight edges cut corners of the body.
