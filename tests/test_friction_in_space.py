@@ -136,6 +136,7 @@ def test_force_of_a_rough_ball():
     assert forces[0] == pytest.approx(exact, rel=0.015) and forces[1] == pytest.approx(forces[0], rel=0.01)
 
 
+@pytest.mark.slow
 def test_more_friction_takes_more_force():
     """A smooth ball slides, at 0 as at next to no friction; no friction holds more than stick does."""
     forces = {mu: fx.trace(pushed(mu, 0.2), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
@@ -166,6 +167,7 @@ def test_work_of_the_plug_is_strain_energy_and_friction():
     assert work == pytest.approx(energy[-1] + lost, rel=0.01)
 
 
+@pytest.mark.slow
 def test_two_ranks_slide_alike():
     script = """
 import json, sys

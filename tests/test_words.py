@@ -46,7 +46,7 @@ RULES = {
     "coined": "|".join(COINED),
 }
 NO_SUBJECT = (r"(?:Of|What|Whatever|That|Those|By|At|In|From|As|To|Which|Whether|How|Where|When|Not|Also|Else|Why)\b")
-LIMITS = {"free_relative": 9.0, "that_of": 2.4, "coined": 7.6, "long": 5.7, "no_subject": 15.3, "particles": 0.91}
+LIMITS = {"free_relative": 2.4, "that_of": 1.5, "coined": 0.65, "long": 3.4, "no_subject": 0.05, "particles": 0.65}
 """Per 1000 words; per cent of sentences above 30 words; of docstrings; of names."""
 
 
