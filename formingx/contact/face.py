@@ -44,8 +44,8 @@ class FaceContact:
         law: at the points; thickness: of the body behind the face, length.
         increment: the `Increment` that goes on.
         present: it takes part in the stage.
-        shift: what distances count less by, shape (n,), length, or None.
-        unbalanced: of the own forces, what the body does not bear at its nodes, shape (components,), stress length^2:
+        shift: reduction of the distances, shape (n,), length, or None.
+        unbalanced: contact forces less the reaction of the body at its nodes, shape (components,), stress length^2:
             round-off of positions, given by the perturbed runs of a design sensitivity.
     """
 

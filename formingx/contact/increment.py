@@ -17,8 +17,8 @@ class Increment:
         tractions(x)     for the residual, at the positions x of the points seen from the tool, shape (n, components);
         linearise(x)     at the same positions: the tangent of the iteration is that of `tractions(x)` from now on;
 
-    and then it is asked: `status`, `arrivals`, `taken`, `foretold`, and `expect` says what the next iteration is to
-    take. Whoever accepts the state begins another increment.
+    and then it is asked: `status`, `arrivals`, `taken`, `foretold`, and `expect` says the arguments of the next
+    iteration. Whoever accepts the state begins another increment.
 
     Args:
         law: of the contact; touch: their history variables; None without friction.
@@ -82,7 +82,7 @@ class Increment:
         return self.ahead(slice(None))(by)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
-        """`foretold` of m of the points: what gives their tractions if they move on, shape (m, c)."""
+        """`foretold` of m of the points: a function for their tractions after a motion, shape (m, c)."""
         touch = self._touch and Touch(*(part[points] for part in self._touch))
         law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
         return lambda by: law.tractions(x, touch, None, there(by))

@@ -62,7 +62,7 @@ class Rule:
 
 
 class Lobatto(Rule):
-    """The nodes of the face. `lumped`, exact for what is cubic along a facet, gives the node on the axis no area."""
+    """The nodes of the face. `lumped`, exact for cubics along a facet, gives the node on the axis no area."""
 
     def __init__(self, solid: Any, on: str, assemble: Any):
         kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
@@ -92,7 +92,7 @@ class Lobatto(Rule):
         return values
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the mean of what the edges on both sides of a node say; on the axis the stretch is the same both
+        """Return the mean of the values of the edges on both sides of a node; on the axis the stretch is the same both
         ways."""
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
@@ -110,7 +110,7 @@ class Lobatto(Rule):
 
     @cached_property
     def _first_lengths(self) -> np.ndarray:
-        """The mean of what the edges on both sides of a node say."""
+        """Return the mean of the values of the edges on both sides of a node."""
         if self._brought is None:
             return self.lengths
         first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
@@ -134,7 +134,7 @@ class Lobatto(Rule):
     def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
         """Give the node on the axis some area of its facet's, so that something holds it.
 
-        (1/24, -2/24, 1/24) of L times the weight at L: integrals of what is linear along the facet stay exact.
+        (1/24, -2/24, 1/24) of L times the weight at L: integrals of linear functions along the facet stay exact.
         """
         nodes = gathered(comm, np.column_stack([self.points, self.lengths, self.lumped]))
         for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:

@@ -172,7 +172,7 @@ class StepLimit:
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
-        """Take up in a state that was found what its step brought into tools in three dimensions; False if nothing
+        """Update a converged state by the points that its step brought into tools in three dimensions; False if nothing
         is left.
 
         Points that came into a tool are held: at a target all, else on tools with friction, which begins then. That is

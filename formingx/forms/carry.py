@@ -108,9 +108,9 @@ def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
 
 
 def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, moved: bool = False) -> None:
-    """Let a problem remember what one of the same body on another mesh does in a state; collective.
+    """Transfer the history variables of the same body on another mesh in a state; collective.
 
-    Where it has not the same contacts, what these remember is left out.
+    Histories of contacts that it has not are left out.
 
     Args:
         x, control: the state of it that this belongs to, locally owned entries.
@@ -130,8 +130,8 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
 def fitted_shapes(carrier: Carrier, values: np.ndarray, there: np.ndarray, here: np.ndarray) -> np.ndarray:
     """Positive tensors, as C, entries 11, 22, 12, 33, shape (m, 4), at the targets, shape (n, 4).
 
-    What is fitted is the logarithm of them as the body as it is sees them, F^-T C F^-1: how it is strained since. So
-    stresses go on as they were, whatever a fit of F makes of that.
+    The fit is of their logarithm in the present configuration, F^-T C F^-1: how it is strained since. So
+    the stresses continue, independently of a fit of F.
 
     there, here: deformation gradients, shapes (m, 3, 3), (n, 3, 3).
     """

@@ -1,4 +1,4 @@
-"""The forms of a scene: what a solid and a membrane have in common.
+"""Forms of a scene: the common base of a solid and a membrane.
 
 Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
 largest shear modulus). The energy is divided by stress times reference volume. So a run does not depend on the
@@ -42,13 +42,13 @@ class Formulation(ABC):
         displacement_element: the scalar element of a displacement component.
         u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
         F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of
-            that over `ratio_before`: det F of what a body brings from another mesh (`Preformed`).
+            that over `ratio_before`: det F of the deformation transferred from another mesh (`Preformed`).
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every item of the scene;
             last, 1 for the time. control_scale: that of the only driven item, or L.
         terms: of each material of the scene its `MaterialTerms`.
-        histories: what the forms depend on besides fields, control and time (`History`).
+        histories: arguments of the forms besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
             without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
             likewise. Each but the first may be None.
@@ -130,7 +130,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def _groups(self) -> list[tuple[Any, list[str]]]:
-        """[(material, layers)]: what has one form of the energy."""
+        """[(material, layers)] with one form of the energy."""
 
     @abstractmethod
     def _weight(self) -> Any:
@@ -269,7 +269,7 @@ class Formulation(ABC):
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        """Process time at control 0: of the setting, or as a run with its own times has set it."""
         return float(self._time[0].value)
 
     @clock.setter

@@ -58,7 +58,7 @@ class Histories:
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: of the setting, or what a run that chooses its times has set since."""
+        """Process time at control 0: of the setting, or as a run with its own times has set it."""
         return self.forms.clock
 
     @clock.setter

@@ -21,7 +21,7 @@ class History(Protocol):
     The order of calls, contacts first, then materials, the temperature last, which takes the heat that they dissipate:
 
         start                   the body is in equilibrium;
-        get, advance, put       a step is tried: the new history variables; back to what was;
+        get, advance, put       a step is tried: the new history variables; back to the old ones;
         advance                 a state is accepted;
         get, put                to another accepted state, and back;
         save, load              to a file and back, on any number of ranks;
@@ -55,8 +55,8 @@ class History(Protocol):
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Any:
-        """Return the memory, here, of what the same part remembers in a problem of the same body on another mesh;
-        collective.
+        """Return the history variables of the same part, from a problem of the same body on
+        another mesh; collective.
 
         Args:
             source: its history there; memory: of that. The problem there stands at the state that it belongs to.

@@ -41,7 +41,7 @@ class MaterialHistory:
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
         self._updated = _compat.compile_expression(ufl.as_vector(flat), terms.places)
-        self._now: Memory | None = None                              # what was put or got last, if it still holds
+        self._now: Memory | None = None  # the last values put or got, if they are still valid
         self.start()
 
     def start(self) -> None:

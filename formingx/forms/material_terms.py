@@ -120,7 +120,7 @@ class MaterialTerms:
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
         """Virtual work beside that of the step's potential, per reference volume (UFL, stress), or None.
 
-        derivative: what makes of a UFL expression its virtual change.
+        derivative: a function that returns the virtual change of a UFL expression.
         """
         if self.material.symmetric:
             return None

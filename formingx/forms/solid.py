@@ -138,8 +138,8 @@ class Solid(Formulation):
                          of: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
         """[(energy per reference volume (UFL, stress), quadrature metadata)] of a body for F, shape (3, 3).
 
-        The energy of the material, then what keeps the volume: W(F) - rest_stress ln J, and p (J - 1) or a penalty.
-        `of`: see `_energy`.
+        The energy of the material, then the terms that keep the volume: W(F) - rest_stress ln J, and p (J - 1) or a
+        penalty. `of`: see `_energy`.
         """
         return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], of)
 

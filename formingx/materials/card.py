@@ -1,4 +1,4 @@
-"""A material's card: a page with what it does in three tests, at rates and temperatures of forming, and its limits."""
+"""A material's card: a page with its response in three tests, at rates and temperatures of forming, and its limits."""
 
 import base64
 import html

@@ -49,7 +49,7 @@ class Varying(ABC):
         """Return the constant in a form (UFL scalar).
 
         Args:
-            fields: what it may depend on: `fields.X`, the reference position (UFL, shape (2,)), and
+            fields: its possible arguments: `fields.X`, the reference position (UFL, shape (2,)), and
                 `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients that hold f(R, Z) and f(T) at the
                 quadrature points of the energy; the latter follows the temperature when that changes.
         """

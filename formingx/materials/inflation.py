@@ -1,6 +1,6 @@
 """Thin bodies of one or more layers that are inflated freely: the pressure that they bear at a stretch.
 
-Membrane theory of shapes that stay what they are. The layers share the stretches, so their forces add up.
+Membrane theory of shapes that keep their kind. The layers share the stretches, so their forces add up.
 """
 
 from collections.abc import Callable, Sequence
@@ -69,6 +69,6 @@ def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
     """Return the first maximum of a pressure over stretches from 1 to 20; None: it only grows."""
     stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
-    found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to what can be stretched
+    found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to the largest stretch
     falls = np.flatnonzero(found[1:] < found[:-1] * (1 - 1e-12))
     return Peak(float(stretches[falls[0]]), float(found[falls[0]])) if len(falls) else None

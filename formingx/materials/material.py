@@ -1,8 +1,8 @@
 """Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
 
 A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
-which advance from one accepted state to the next. What an energy of F leaves as stress in the reference
-configuration, an isotropic pressure, is removed where it is used: W(F) - rest_stress ln J. (On a thin sheet Newton's
+which advance from one accepted state to the next. The isotropic stress of an energy of F
+in the reference configuration is removed where the energy is used: W(F) - rest_stress ln J. (On a thin sheet Newton's
 method takes half as many iterations with that form than with the isochoric part of F: see the notes on
 incompressibility.)
 """
@@ -245,7 +245,7 @@ class Material:
 
     def report(self, file: Any = "card.html", *, temperatures: Sequence[float] = (),
                rates: Sequence[float] = (0.1, 1.0, 10.0), unit: str = "", unit_of_time: str = "s") -> Any:
-        """Write one HTML page that shows what the material does, and its limits; returns where it is.
+        """Write one HTML page on the response of the material and its limits; return its path.
 
         Args:
             temperatures: needed where constants or times depend on it, in the unit that theirs are in.
@@ -263,7 +263,7 @@ class Material:
         """Raise an InputError unless the constants are admissible: finite, with a positive stiffness in the
         reference configuration.
 
-        What is a number, of any type, is kept as a float.
+        Numbers of any type are kept as floats.
         sample: where to look at constants that vary; None: only those that do not vary are checked.
         """
         self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)

@@ -11,7 +11,7 @@ class Published(NamedTuple):
     """A material as published.
 
     material: constants in `unit`, c10 of I1.
-    substance: what was tested.
+    substance: the tested material.
     temperature: in degrees Celsius, or None: not stated by the source.
     rate: of the tests, as text. mode: the tests that the constants come from, as text.
     source: who published the constants, and where they are quoted from if not from there.

@@ -18,7 +18,7 @@ _BEFORE, _LAST, _GLASS, _FRACTION = "C_before", "C_last", "A_glass", "fraction"
 class Solidification(Material):
     """A material that sets as it cools, and softens when it is heated again.
 
-    Of the fraction phi(T) that has set, what is added in a cooling step is stress-free in the shape of that moment:
+    Of the fraction phi(T) that has set, the part added in a cooling step is stress-free in the shape of that moment:
 
         W = W_base + (G/2) [tr(C A) - 3 phi],   dA = C^-1 dphi as phi grows,   A in proportion to phi as it falls,
 

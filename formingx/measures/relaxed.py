@@ -42,7 +42,7 @@ class PoleStressRatio:
 
     @staticmethod
     def known(problem: Any) -> bool:
-        """Return True if the scene has a pole, and of all its materials it is known what is left."""
+        """Return True if the scene has a pole, and the equilibrium stress of all its materials is known."""
         forms = problem.forms
         return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
                                                        for t in forms.terms)

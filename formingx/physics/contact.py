@@ -262,7 +262,7 @@ class Law(NormalLaw):
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.elastic_slip, self.pulls = elastic_slip, pulls
         self._set_friction(mu)
-        self._slid: tuple[Nearest, Touch, tuple] | None = None      # of what is near, and remembered: the slip
+        self._slid: tuple[Nearest, Touch, tuple] | None = None      # slip of the last nearest points and history
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """Return the same law with other coefficients of friction."""
@@ -323,9 +323,9 @@ class Law(NormalLaw):
         """Compute the tractions at points x, shape (n, 2), with the history variables `old` (not used without
         friction).
 
-        `expected`: where to linearise the law, at the points if None. Newton's method wants what the iteration before
-        predicted: tractions as unknowns of their own would be those. Taken from the points, the curvature of tool and
-        motion, times a stiff penalty, would drown them.
+        `expected`: where to linearise the law, at the points if None. Newton's method needs the values that the
+        iteration before predicted: tractions as unknowns of their own would be those. Taken from the points, the
+        curvature of tool and motion, times a stiff penalty, would drown them.
 
         `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
         taken as stuck for this one iteration: Newton's method would send it to and fro across the narrow range of

@@ -44,11 +44,11 @@ class Touch(NamedTuple):
 
 
 class Tractions:
-    """Tractions at n points per unit reference area, as the residual wants them (what the body does to the tool).
+    """Tractions at n points per unit reference area, with the sign of the residual (of the body on the tool).
 
     force: shape (n, c), stress; normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the
-    tangent, 0 if stuck, shape (n,). stiffness, touch: what gives those properties when they are first asked for, which
-    most tractions never are.
+    tangent, 0 if stuck, shape (n,). stiffness, touch: functions for these properties, called when they
+    are first needed.
     """
 
     def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
@@ -106,7 +106,7 @@ class ContactLaw(Protocol):
 
     Attributes:
         theta: half-width of the ramp: at -theta contact begins, length; elastic_slip: before a point slides, length.
-        shift: what distances are less by, length, a number or one for each point, shape (n,).
+        shift: reduction of the distances, length, a number or one for each point, shape (n,).
         has_friction: tractions depend on slip; remembers: on `Touch`; pulls: the body may pull at the tool, and what
             `energy` says is held by the bond (`Path.work`).
     """

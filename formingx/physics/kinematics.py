@@ -187,7 +187,7 @@ class ThreeD(Kinematics):
         return ufl.cofac(self.deformation_gradient(u, X)) * N
 
     def rigid_motions(self):
-        """Out of its plane a flat sheet may turn about a rim that is straight: what holds it is its tension."""
+        """Out of its plane a flat sheet may turn about a rim that is straight: only its tension resists."""
         return {**{f"translation along {a}": lambda X, k=k: 0 * X + np.eye(3)[k] for k, a in enumerate(self.axes)},
                 "rotation about z": lambda X: np.stack([-X[:, 1], X[:, 0], 0 * X[:, 0]], 1)}
 

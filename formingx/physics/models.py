@@ -56,7 +56,7 @@ class Model:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
-        """Raise an InputError if the scene has what this model cannot have."""
+        """Raise an InputError if the scene has items that this model cannot have."""
 
     def locking(self, mesh: Any) -> Locking | None:
         """Triangles of a mesh in which its elements lock so that a word is due, or None; collective."""

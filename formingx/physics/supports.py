@@ -63,7 +63,7 @@ class Support(Part):
         return None
 
     def held(self) -> list[Held | MeanHeld]:
-        """`constraints`, and what its energy resists."""
+        """`constraints`, and the components that its energy resists."""
         return [*self.constraints(), *(Held(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)]
 
     def __repr__(self) -> str:

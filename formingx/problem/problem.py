@@ -62,7 +62,7 @@ class Problem(Histories, Units):
         x: a vector of unknowns; inside `at` those of the state.
         matrix: the tangent, refilled by `tangent`.
         contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
-        histories: what F depends on besides x and control (`History`); limit: what a step may bring (`StepLimit`).
+        histories: arguments of F besides x and control (`History`); limit: limits of a step (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
         admissible: whether the body has a shape, and keeps its volume (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
@@ -201,7 +201,7 @@ class Problem(Histories, Units):
             self.forms.control.value = control
 
     def restore(self, state: Any) -> None:
-        """Go on from an accepted state: its setting and its histories are what they were then."""
+        """Restore the stage data and history variables of an accepted state, to start a step from it."""
         if self.has_history:
             self.memory = state.memory
         if state.setting:
@@ -225,7 +225,7 @@ class Problem(Histories, Units):
             out.array_w += (control - 1) * stage.left
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
-        """Force of the body on what a support (its number in the scene) drives, along its motion, all ranks.
+        """Force of the body on a driven support (by its number in the scene), along its motion, all ranks.
 
         Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
         """
@@ -410,8 +410,8 @@ class Problem(Histories, Units):
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
         """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
 
-        Constrained unknowns are held where x has it, now or, if it is driven, at this control; if the setting fades
-        the unbalanced forces, that is what makes (x, control) a state. x: locally owned entries.
+        Constrained unknowns are held where x has it, now or, if it is driven, at this control; a fading
+        setting removes the unbalanced forces at (x, control). x: locally owned entries.
         """
         before = self._stage
         if before is not None and setting == before.setting:

@@ -24,7 +24,7 @@ class Path(States):
     """The states of a run, from the unloaded body to the target.
 
     Attributes:
-        record: what the solver keeps of the run (`formingx.solve.record.Record`).
+        record: the solver's record of the run (`formingx.solve.record.Record`).
         pilot: the path of the run that its mesh was made by (`trace(..., adapt_mesh=True)`); else None.
 
     >>> path
@@ -45,7 +45,7 @@ class Path(States):
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
     def findings(self) -> list[Finding]:
-        """Return what the checks found before and after the run, worst first (`formingx.findings`); collective.
+        """Return the findings of the checks before and after the run, worst first (`formingx.findings`); collective.
 
         A finding has a severity ("serious": the results must not be used as they are; "warning": they may be another's
         than was meant, or less exact than usual; "note"), the subject and the text.

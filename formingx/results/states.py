@@ -38,10 +38,10 @@ class _View:
 
 
 class States:
-    """The states of a run, from the unloaded body to the target: what `Path` is made of.
+    """The states of a run, from the unloaded body to the target: the base of what `Path` is made of.
 
     Attributes:
-        record: what the solver keeps of the run (`formingx.solve.record.Record`).
+        record: the solver's record of the run (`formingx.solve.record.Record`).
     """
 
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None,
@@ -183,7 +183,7 @@ class States:
                 started = started or left is after
                 if not started or left.setting != right.setting:
                     continue
-                with segment.problem.state_context(left):              # a travel is that of what the stage drives
+                with segment.problem.state_context(left):  # a travel is the travel of the control of the stage
                     try:
                         bound = target.bind(segment.problem)
                     except InputError as error:
@@ -256,8 +256,8 @@ class States:
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
         """Columns along the smooth path through the states, `points` to each piece; for drawing.
 
-        Values at the states themselves are theirs. Between them, what follows from displacements and control alone is
-        that of the cubic path; other columns (forces, energies) follow a monotone cubic through their values, by arc
+        Values at the states themselves are theirs. Between them, quantities of displacements and control alone
+        follow the cubic path; other columns (forces, energies) follow a monotone cubic through their values, by arc
         length.
         """
         self._check(*columns)
@@ -311,7 +311,8 @@ class States:
     def _dissipated(self, segment: Segment, states: list[State]) -> float:
         """Energy that materials have dissipated between the last two of some states, by Simpson's rule.
 
-        Half way in time the body is on the curve that the run takes it along; what it remembers is advanced to there.
+        Half way in time the body is on the curve that the run takes it along; its history variables are advanced to
+        there.
         """
         before, state = states[-2:]
         if not before.time < state.time:                     # as where a mesh is made again

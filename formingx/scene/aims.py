@@ -78,7 +78,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """Return the support that holds what a `displacement` target (u_r_at_R_Z) wants to move, or None."""
+    """Return the support that constrains the point that a `displacement` target (u_r_at_R_Z) wants to move, or None."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:

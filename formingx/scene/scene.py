@@ -222,7 +222,7 @@ class Scene:
             self._check_rigid_body(supports)
 
     def check_driven(self, supports: Sequence[Any]) -> None:
-        """Raise an InputError if what one of these supports drives is held by another."""
+        """Raise an InputError if one of these supports drives a component that another one constrains."""
         held = [(support, h) for support in supports for h in support.constraints()]
         for mine, driven in held:
             for other, h in held if driven.driven else ():

@@ -63,7 +63,7 @@ class MirrorPlanes:
         return _PARTS.get(len(self.planes), "")
 
     def basis(self, depth: str | None) -> str:
-        """Return as text what results are given for; "" for a body that is modelled as a whole, in three dimensions.
+        """Return the basis of results as text; "" for a body that is modelled as a whole, in three dimensions.
 
         Args:
             depth: in plane strain the unit of depth, such as "mm", or "unit"; else None.

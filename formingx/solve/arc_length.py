@@ -182,7 +182,7 @@ class Curve:
 
         predictor: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
         state, the path smooth from there on: the guess is on the parabola through it, the old one and its tangent.
-        bend: what the guess is off the tangent, in the plane normal to it.
+        bend: deviation of the guess from the tangent, in the plane normal to it.
         """
         plane = self._plane(old, *self._ahead(old, length))
         return self._solve_from(*self._ahead(old, length, behind, bend), plane, "step", old, predictor)

@@ -29,7 +29,7 @@ class Limits:
         singular: its growth from there that tells of a singular tangent.
         round_off: a condition number that leaves next to nothing of 16 digits.
         slowing: slope of the control over its largest, below which the last slopes may tell of a limit point ahead.
-        material: part of what a material's limit allows of I1 - 3.
+        material: part of a material's limit of I1 - 3.
         volume, shape: J, and a deformed element's shape over that in the reference configuration, of one about to
             turn inside out.
     """
@@ -171,8 +171,8 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
     """Everything that the last good state and the failed attempt tell; collective.
 
     Args:
-        states: the accepted ones, may be empty. attempt: None: no iteration failed. pace: what more is known if the
-            run was ended in good health. target: of the control (the user's units), if that is what it aims at.
+        states: the accepted ones, may be empty. attempt: None: no iteration failed. pace: further facts if
+            the run ended without a failure. target: of the control (the user's units), if the run has one.
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),

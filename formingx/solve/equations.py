@@ -11,7 +11,7 @@ x is dimensionless, its rows spread over the ranks ("own part"); so is the contr
     tangent(ahead=True)                 that of the next step, where F has a kink at the state
 
 `at` and `stand` go to another state; `enter` changes the setting between the stages of a process.
-What is written out here is what equations without contact, history, time or units have: a class that is derived from
+The defaults here suit equations without contact, history, time or units: a class that is derived from
 `Equations` need only give F.
 """
 
@@ -291,7 +291,8 @@ class Histories(Protocol):
 
     def step_error(self, past: Sequence[Standing], share: Array, x: Array,
                    control: float) -> tuple[float, float]:
-        """Error of the step in time from the last of `past` to (x, control), relative: at its end; what lasts of it.
+        """Error of the step in time from the last of `past` to (x, control), relative: at its end; its part that
+        persists.
 
         share: of each state, and of the new one, in x half-way in time.
         """
@@ -309,7 +310,7 @@ class Stages(Protocol):
         """Take a setting, in which (x, control), locally owned entries, is a state."""
 
     def restore(self, state: Standing) -> None:
-        """Go on from an accepted state: its setting and its histories are what they were then."""
+        """Restore the stage data and history variables of an accepted state, to start a step from it."""
 
     def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
         """Stand at a state, its x and control too, and come back on leaving."""

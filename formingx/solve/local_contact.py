@@ -81,7 +81,7 @@ class LocalSolve:
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
         """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
 
-        border(V): what solutions V = K^-1 E, shape (n, m), become in the bordered system, in place; returns those of
+        border(V): maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns those of
         the control, shape (m,).
         """
         for _ in range(4):
@@ -157,7 +157,7 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
 
 
 class _Points:
-    """A few points and the body as they see it. Arrays: all of all ranks, but for what is said to be own."""
+    """A few points and the body as they see it. Arrays hold all ranks, except those said to be locally owned."""
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):

@@ -35,8 +35,8 @@ class Newton:
             to 4).
         diverged: the iteration has diverged, contact or not, where three relative corrections in a row are larger (of
             solutions: below 0.1).
-        left_alone: the iteration (from 0) without a local solve of contact: what the first got wrong often comes right
-            in it.
+        left_alone: the iteration (from 0) without a local solve of contact: it often corrects the errors of
+            the first one.
         chords: chord iterations that may cost less than one with a new tangent: each costs a residual and a solve,
             about a sixth.
         slow: fall of the residual in an iteration above which a tangent is not kept: round-off would look like
@@ -61,7 +61,7 @@ def relative(equations: Residual, forces: float, floor: float = Newton.unloaded)
 
 
 class Iteration(NamedTuple):
-    """One Newton iteration: what it found and what it did. The last entry of a history is the converged state.
+    """One Newton iteration: its residual and its correction. The last entry of a history is the converged state.
 
     residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + `Newton.at_rest`),
     criterion (3.5.1); work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration
@@ -155,7 +155,7 @@ class Tolerances:
         could go to and fro.
 
         Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
-        near 1e-8): then nothing better is to be had, and the residual may be what round-off leaves. A
+        near 1e-8): then nothing better is to be had, and the residual may be round-off. A
         residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
         penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
         (r0/h0 = 1e6: corrections go up and down between 1e-10 and 4e-9, and the residual stays where it is.)

@@ -58,7 +58,7 @@ class Run:
         at_limit_point: what to do where the control has a limit point: "continue" along the path back,
             "snap_through" to the next state, or "stop"; None: as `at_limit_points` says.
         accuracy: the error in time that is allowed, relative.
-        label: what is said before the target beside a progress bar.
+        label: text before the target beside a progress bar.
         wanted: one of the targets that ends the run as the last does, or None.
     """
 
@@ -167,7 +167,7 @@ class Run:
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _go_on(self, may_turn: bool) -> dict[str, Any]:
-        """Take up the states with the last one's setting as those of this run; what they left to continue with.
+        """Take up the states with the last one's setting as those of this run; and their data for the continuation.
 
         If it turns, its first state is the last one. (It does not turn to a pressure, which may come again ahead.)
         """
@@ -202,7 +202,7 @@ class Run:
                            accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
-        """Return the next states: one at a target within reach, or one step ahead, and what lies on the way to it.
+        """Return the next states: one at a target within reach, or one step ahead, and those between.
 
         A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
         snap-through near there found no rest, and from a first state with a history, only if the shortest fails.
@@ -394,7 +394,7 @@ class Run:
                 limit = self.curve.limit_point(old, new)
             except Failure as failure:
                 raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
-            if (limit.control - old.control) * old.slope < 0:   # it belongs to what a jump has passed
+            if (limit.control - old.control) * old.slope < 0:   # it belongs to the part that a jump has passed
                 raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
         for target, bound in self.aim.open:

@@ -16,7 +16,7 @@ def before(states: Sequence[State], time: float, most: int, close: float = 0.1) 
     """Return the last states, at most this number of, on whose polynomial a time lies ahead: in order, from the last
     jump on.
 
-    Those closer than the part `close` of the step ahead are not told apart: what they are not exact in would be
+    Those closer than the part `close` of the step ahead are merged: their errors would be
     magnified.
     """
     found: list[State] = []

@@ -2,8 +2,8 @@
 
 Everything is created once. A stage sets how the items of the scene follow the control (`Setting`): its controls have
 the control as its amplitude; other controllable items keep the value that it has. Tables against time make the time
-the control, piece by piece between their knots. What a stage leaves out (a grip that opens, a plug that is not there
-yet) leaves forces without balance: they are taken away gradually, which is one more path to follow.
+the control, piece by piece between their knots. Inactive items (an open grip, a plug that
+is not there yet) leave unbalanced forces. They fade along one more path.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Execution:
 
     Args:
         record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
-            their turn comes; look: looks at one, given what tells the value of an item (its number) then, the user's
-            units. step: step control of stages that have none of their own.
+            their turn comes; look: looks at one, given a function for the value of an item (its number),
+            the user's units. step: step control of stages that have none of their own.
         balanced: forces left over, relative to the support forces, that count as none.
         accuracy: the error in time that is allowed, relative.
     """
@@ -199,7 +199,7 @@ class Execution:
         return [*setting.standing(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one item is what makes a measure follow a course in time."""
+        """Piece 1: one item is adjusted so that a quantity follows an amplitude in time."""
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._left_to_meet(),

@@ -19,7 +19,7 @@ log = logging.getLogger("formingx")
 
 
 class Aim:
-    """The targets of a run that are still open, and what the last of them, which ends it, measures in its states.
+    """The open targets of a run, and the values of the last one, which ends it, in its states.
 
     Attributes:
         open: [(target, its measure)]; until, measure: those of the last; values: of that, in the user's units.
@@ -147,7 +147,7 @@ class Progress:
     """Progress of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
 
     Args:
-        comm: of the run. words: what it is about. shown: False: no bar, and lines are of the level INFO.
+        comm: of the run. words: its subject. shown: False: no bar, and lines are of the level INFO.
 
     Attributes:
         silence: seconds of processor time after which a line says where a run stands.

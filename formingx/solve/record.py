@@ -23,7 +23,7 @@ log = logging.getLogger("formingx")
 @dataclass
 class Counts:
     """Cost of a run: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
-    was kept, too), seconds; limits: {what made a step shorter, or fail: how often}."""
+    was kept, too), seconds; limits: {reason for a shorter or failed step: count}."""
 
     steps: int = 0
     failures: int = 0
@@ -55,12 +55,12 @@ class Record:
 
     Attributes:
         segments: list of `Segment`, the last of which grows.
-        counts: what the run cost (`Counts`).
+        counts: cost of the run (`Counts`).
         stage: name of the stage of a process that is going on.
         ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
         on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
         on_step: functions called whenever a step is complete.
-        on_end: functions called when the run ends, with the words of what failed, or "", and the findings of the run.
+        on_end: functions called when the run ends, with the text of the failure, or "", and the findings of the run.
         findings: of the checks before the run.
         judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
         allow_inadmissible: keep such states, too.
@@ -123,7 +123,7 @@ class Record:
         self.counts = replace(other.counts, limits=dict(other.counts.limits))
 
     def accept(self, state: State) -> None:
-        """Take up a state: what has a history continues from it.
+        """Accept a state: the histories continue from it.
 
         Raises:
             Unusable: it is none that a body can have; the record is as it was before.
@@ -156,8 +156,8 @@ class Record:
             listener()
 
     def describe(self, state: State) -> str:
-        """Return a state's main numbers in one line, without what no body has (the pole stretch of a wall not above
-        0)."""
+        """Return a state's main numbers in one line, without impossible ones (a pole stretch of a wall not
+        above 0)."""
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)

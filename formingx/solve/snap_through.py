@@ -6,9 +6,9 @@ It reaches equilibrium in the next equilibrium. The way there is followed with v
     F(x) + eta V (x - x_k) = 0,   V that of a viscous stress in proportion to dF, as in a Kelvin-Voigt solid,
 
 from one x_k to the next, the histories updated at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
-to their stiffness. Damping in proportion to the mass holds short ones least: what separates at an edge then wants 1e4
-times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows where it
-does not; where it is 0 the body is in equilibrium. The unbalanced force dissipates work on the way.
+to their stiffness. Damping in proportion to the mass holds short ones least: points that separate at an edge then need
+1e4 times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows
+where it does not; where it is 0 the body is in equilibrium. The unbalanced force dissipates work on the way.
 """
 
 from __future__ import annotations

@@ -129,8 +129,8 @@ class Stage:
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
-        """Return (what makes targets, knots, shape (n, 2), or a function of time) of a measure that follows a
-        course."""
+        """Return (function that makes targets, knots, shape (n, 2), or a function of time) of
+        a prescribed quantity."""
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
                              f" [(time,"
@@ -195,8 +195,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     """Return a stage by the numbers of the items of its scene.
 
     Raises:
-        InputError: it drives or leaves out something that is not there, leaves the body free to move, or aims at what
-            cannot be met.
+        InputError: it drives or leaves out something that is not there, leaves the body free to move, or has a
+            target that cannot be met.
     """
     caller = stage.who
     off = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})

@@ -23,8 +23,8 @@ class State:
         jump: of a "jump": {"dissipated": energy that was lost (stress length^3), "moved": how far the body moved from
             the state before, mean over its volume (length)}.
         met: the target that it hits, or None.
-        memory: the history variables of the problem from here on (`Problem.histories`); before: what it did while
-            the state was solved for; empty if that is not known.
+        memory: the history variables of the problem from here on (`Problem.histories`); before: those used to
+            solve for the state; empty if they are not known.
         stage: name of the stage of a process; setting: the step data of the stage, as plain data (`Setting`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
         time: process time.

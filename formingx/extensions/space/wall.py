@@ -85,7 +85,7 @@ class WallInSpace(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """{name: values, shape (m,)}: what the files hold."""
+        """Columns of the files: {name: values, shape (m,)}."""
         X, x = self.rest[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
         return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,

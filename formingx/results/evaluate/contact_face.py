@@ -38,7 +38,7 @@ class ContactTable(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """{name: values, shape (n,)}: what the files hold."""
+        """Columns of the files: {name: values, shape (n,)}."""
         return {"reference_radius": self.rest[:, 0], "reference_height": self.rest[:, 1], "r": self.points[:, 0],
                 "z": self.points[:, 1], "gap": self.gap, "contact_pressure": self.pressure,
                 "friction_stress": self.friction}
@@ -84,7 +84,7 @@ class ContactFace:
         return ContactTable(self.rest, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Deformed over reference area at the nodes, the mean of what the edges on both sides say, shape (n,)."""
+        """Deformed over reference area at the nodes, the mean of the edges on both sides, shape (n,)."""
         n, rest, now = len(points), self.rest[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._rest_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:

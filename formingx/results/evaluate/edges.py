@@ -28,7 +28,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
     """Return the edge in a state on which contact points are the furthest apart; None if nothing slides over one;
     collective.
 
-    Neighbours are next to each other in the order of R, then Z. What a support holds does not slide.
+    Neighbours are next to each other in the order of R, then Z. Supported points do not slide.
     """
     found: list[Edge] = []
     with path.problem.state_context(state) as problem:

@@ -29,7 +29,7 @@ class Filling(Sheet):
 
     Attributes:
         corners: of the tool.
-        control: {name of the pressure, or of what else is driven: its values, shape (n,)}.
+        control: {name of the pressure, or of another control: its values, shape (n,)}.
         gaps: the largest distance from the points of each corner to the face, shape (n, k), length.
         comm: of the run.
     """
@@ -41,7 +41,7 @@ class Filling(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """{name: values, shape (n,)}: what the files hold."""
+        """Columns of the files: {name: values, shape (n,)}."""
         return self.control | {f"corner_{k}_gap": gap for k, gap in enumerate(self.gaps.T, 1)}
 
     @property

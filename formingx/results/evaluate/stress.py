@@ -285,7 +285,7 @@ class Stresses:
         return _unpack(*(gathered(self.problem.comm, v).reshape(-1, v.shape[-1]) for v in (points, values)))
 
     def fit(self, state: Any) -> Fitted:
-        """F and S fitted to their values at the quadrature points, and what follows; collective."""
+        """F and S fitted to their values at the quadrature points, and derived values; collective."""
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
@@ -348,7 +348,8 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
-        """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of what keeps its volume."""
+        """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of the terms that keep its
+        volume."""
         F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(material, names, F):

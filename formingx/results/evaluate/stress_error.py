@@ -101,7 +101,7 @@ class Fitted(NamedTuple):
         points: reference points (R, Z), shape (m, q, 2), length.
         volume: reference volumes that belong to them, shape (m, q).
         raw, smooth: sigma_h and sigma*, shape (m, q, 3, 3), stress.
-        cubics: what they were fitted by (`Patches`), shape (m, 10, k).
+        cubics: the cubics of the fit (`Patches`), shape (m, 10, k).
     """
 
     points: np.ndarray

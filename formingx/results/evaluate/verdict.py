@@ -73,7 +73,7 @@ class Depth(NamedTuple):
 
 
 class Verdict:
-    """Looks at the states of one problem; what does not change is found once."""
+    """Admissibility check of the states of one problem; constant data are found once."""
 
     def __init__(self, problem: Any):
         self._problem, self._solid = problem, problem.scene.model.solid
@@ -207,7 +207,7 @@ def _most_inside(contact: Any) -> np.ndarray:
 def _off(contact: Any, state: State, images: int) -> float:
     """Return the amount by which penetration changes the force F on a tool, relative; collective.
 
-    What the tool gains on the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
+    Advance of the tool into the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
     presses: it is as large as that. images: of the body in the part, whose energy the state tells.
     """
     if not contact.contact.driven:

@@ -70,7 +70,7 @@ class Wall(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """{name: values, shape (n,)}: what the files hold."""
+        """Columns of the files: {name: values, shape (n,)}."""
         each = {f"wall_of_{name}": share * self.wall for name, share in self.layers.items()}
         return {"reference_radius": self.reference_radius, "arc_length": self.arc_length, "r": self.r, "z": self.z,
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}

@@ -1,4 +1,4 @@
-"""The energy balance of a run: work that is put into the body, by what puts it in, and where it went.
+"""The energy balance of a run: work done on the body by each item, and its uses.
 
 Between two states of one control the body moves on the cubic through both and their tangents. Loads are integrated
 along it (Gauss's rule). Reactions of supports and tools are no smooth functions of a guessed body, so their force is a
@@ -29,8 +29,8 @@ _LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
 _FOOT = 0.06           # of half the width of the ramp: points nearer to its outer edge count as at the edge
 _SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
-_CLOSED = 2e-4         # of the largest energy: what a step may leave unbalanced
-_PROMISED = 5e-3       # of the largest part of a balance: what a run may leave unbalanced
+_CLOSED = 2e-4         # of the largest energy: allowed imbalance of a step
+_PROMISED = 5e-3       # of the largest part of a balance: allowed imbalance of a run
 _HALVINGS = 6          # of a step, at most
 _PARTS = 0.5, 0.35, 0.65   # of a step at which it is halved
 
@@ -96,7 +96,7 @@ class Ledger:
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
-        """Return {what: what is added in each state to what was there before, shape (states,)}."""
+        """Return {item: energy added in each state, shape (states,)}."""
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._between(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
@@ -152,7 +152,7 @@ class Ledger:
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _of_body(self, a: Any, b: Any) -> dict[str, float]:
-        """Return the same of the body as modelled, without what jumps lose."""
+        """Return the same of the body as modelled, without the losses of jumps."""
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)

@@ -5,10 +5,10 @@
     run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, what its histories remember
     run/end.json          how the run ended, and what it said then; not there while it goes on, or if it was killed
 
-A state is written beside its place and then renamed: what has its name is complete, whenever a run is killed. Fields
-are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks; what histories
-remember, by node or by cell, likewise. The first state on a mesh that was made on the way holds that mesh, and what the
-body has brought to it ("mesh"). Of format 4, which is read, too, fields are x.bp and direction.bp, written by
+A state is written beside its place and then renamed: a state with its final name is complete, even if the run is
+killed. Fields are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks;
+history variables, by node or by cell, likewise. The first state on a mesh that was made on the way holds that mesh,
+and the data transferred to it ("mesh"). Of format 4, which is read, too, fields are x.bp and direction.bp, written by
 adios4dolfinx, and all else is in state.json.
 """
 
@@ -58,7 +58,7 @@ class Checkpoint:
 
     Args:
         folder: made, or looked at, at once.
-        path: the `Path` of the run; what is in the folder must be its beginning.
+        path: the `Path` of the run; the states in the folder must be its beginning.
 
     Raises (collective):
         InputError: the folder holds another run, or something else.
@@ -83,14 +83,14 @@ class Checkpoint:
                 done((self._there - first) / (len(path) - first))
 
     def end(self, failure: str, findings: Sequence[Finding]) -> None:
-        """Write that the run has ended, what failed, or "", and the findings (`Path.findings`)."""
+        """Write the end of the run: the failure, or "", and the findings (`Path.findings`)."""
         about = {"failure": failure, "findings": findings}
         files.on_root(self._comm, lambda: _plainly(
             lambda: files.replace(self.folder / _END, lambda stream: json.dump(about, stream, indent=1)),
             self.folder, f"{_END} could not be written; its states are kept"))
 
     def _begin(self) -> int:
-        """Make the folder, or check what is in it; the number of states there."""
+        """Make the folder, or check its content; return the number of states in it."""
         problem, folder, path = self._path.segments[0].problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
@@ -107,14 +107,14 @@ class Checkpoint:
             there = _states(folder)
             held = [_read_data(folder, k, checksums=False) for k in range(len(there))]
             settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
-            whole = held[:max(settled, len(path))]          # what is beyond is of a step that was not finished
+            whole = held[:max(settled, len(path))]          # later states belong to an unfinished step
             if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
                                              for h, s in zip(whole, path.states)):
                 raise InputError(f"checkpoint {str(folder)!r} holds {len(held)} states of another run: go on from it"
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
             for left in there[len(whole):]:
                 shutil.rmtree(left)
-            if kept["formingx"] != FORMAT:                  # what is written from now on is of this one
+            if kept["formingx"] != FORMAT:                  # from now on files have this format
                 files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
             return len(whole)
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
@@ -224,7 +224,7 @@ def begun(folder: Any) -> bool:
 
 
 def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
-    """(how many states a checkpoint holds, what state.json says of the last ones, how many seconds ago it was written).
+    """(number of states in a checkpoint, data of state.json of the last ones, seconds since it was written).
 
     A run may be writing to it.
 
@@ -436,7 +436,7 @@ def _instead(file: FilePath) -> str:
 
 
 def _checksums(data: dict, content: dict[str, bytes]) -> dict[str, int]:
-    """{file: CRC-32} of what state.json says and of the other files of a state."""
+    """{file: CRC-32} of the data of state.json and of the other files of a state."""
     rest = {key: value for key, value in data.items() if key != "checksums"}
     found = {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode())}
     return found | {name: zlib.crc32(bytes_) for name, bytes_ in content.items()}

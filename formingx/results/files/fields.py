@@ -160,7 +160,7 @@ def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> N
         except OSError as error:
             _remove(part)
             raise OSError(error.errno, f"{str(file)!r} could not be written: {error.strerror}") from None
-        except RuntimeError as error:                       # what the libraries throw, a full disk for one
+        except RuntimeError as error:                       # errors of the libraries, such as a full disk
             _remove(part)
             raise OSError(f"{str(file)!r} could not be written: {error}") from None
     files.on_root(comm, write_all)

@@ -1,4 +1,4 @@
-"""A bar for what takes long after a run: a report, a checkpoint that is written or read."""
+"""Progress bar for long work after a run: a report, a checkpoint that is written or read."""
 
 import contextlib
 from collections.abc import Callable, Iterator

@@ -20,7 +20,7 @@ class Sheet:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """{name: values, shape (n,)}: what the files hold."""
+        """Columns of the files: {name: values, shape (n,)}."""
         raise NotImplementedError
 
     def to_csv(self, file: Any, units: Units = NONE) -> None:
@@ -64,7 +64,7 @@ class Sheet:
         widths = [max(map(len, column)) for column in zip(*lines)]
         return "\n".join("  ".join(f"{cell:>{w}}" for cell, w in zip(line, widths)) for line in lines) + f"\n{n} rows"
 
-    def __repr__(self) -> str:                               # what a notebook shows
+    def __repr__(self) -> str:                               # shown by a notebook
         return str(self)
 
     def _header(self, units: Units) -> list[str]:

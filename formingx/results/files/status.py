@@ -29,7 +29,7 @@ class Status:
         target: (measure, the value that ends the stage, its value now), or None.
         spent, left: seconds that the run has worked, and about how many it takes to the end of the stage at the pace of
             its last steps; None: it came no nearer in them.
-        limits: {what made steps shorter: how often}, in the whole run.
+        limits: {reason for shorter steps: count}, in the whole run.
         age: seconds since the last state was written.
         ended: {"failure": what ended it, or "", "findings": [Finding]} of a run that has ended; None: it goes on, or
             was killed.

@@ -58,7 +58,7 @@ def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what a result depends on."""
+    """Versions of the programs that a result depends on."""
     import dolfinx
     import petsc4py
     from petsc4py import PETSc
@@ -67,7 +67,7 @@ def versions() -> dict[str, str]:
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
-    """Return the result of an action that rank 0 alone takes, on all ranks; so is what it raises. Collective."""
+    """Return the result of an action that rank 0 alone takes, on all ranks; its exceptions, too. Collective."""
     result, error = None, None
     if comm.rank == 0:
         try:

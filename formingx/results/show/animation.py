@@ -1,6 +1,7 @@
 """The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process.
 
-The curve is that of what the stage drives: a plug's force against its travel, a pressure against the pole's height.
+The curve is the loading curve of the stage's control: a plug's force against its travel, a pressure against the
+pole's height.
 """
 
 import shutil
@@ -56,7 +57,7 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
-    """{stage: (x, y) of its curve}: what stands still is not it; while nothing is driven, a force over time."""
+    """{stage: (x, y) of its curve}: a fixed item is not used; while nothing is driven, a force over time."""
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
         values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}

@@ -48,7 +48,7 @@ def data(records: list[Record], names: list[str], units: Units, more: dict[str, 
 
 
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
-    """One run: the section and what colours it, frame by frame."""
+    """One run: the section and its colours, frame by frame."""
     ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
     at, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(at[a]), "to": float(at[b - 1])}
@@ -120,7 +120,7 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """(x, y, their values) of what a stage drives."""
+    """(x, y, their values) of the control of a stage."""
     found, measures = [], record.measures
     for column, values in measures.items():
         if np.ptp(values[stage]) <= 1e-9 * (np.ptp(values) or 1.0):

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def page(title: str, body: list[str], tail: str = "") -> str:
-    """Return a whole page: its heading is in the body; tail: what comes after it, scripts for one."""
+    """Return a whole page: its heading is in the body; tail: text after it, such as scripts."""
     style = resources.files(__package__).joinpath("report.css").read_text()
     return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><style>{style}</style></head>\n<body>"

@@ -1,4 +1,4 @@
-"""A run as plain data, made from a path or from a checkpoint alone: what reports and pictures are made of."""
+"""A run as plain data, made from a path or from a checkpoint alone, for reports and pictures."""
 
 import sys
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class Record:
         kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
         histories: of the n states, rows (residual, correction, work) of Newton's iterations.
         profiles: of the n states, each a `Profile`, or None: of no sheet, or of a state that is not drawn (`frames`).
-        counts: what the run cost; until: (measure, value) that it aimed at, or None.
+        counts: cost of the run; until: its target (quantity, value), or None.
         tooling: the `Tooling` of the scene; travels: of the n states, `Tooling.travels`.
         forces: {tool: the force that it takes, shape (n,)}, positive when it resists its travel; of a tool that stays,
             along Z.
@@ -109,7 +109,7 @@ class Record:
         return [k for k in self.frames if self.profiles[k] is not None]
 
     def all_findings(self) -> list[Finding]:
-        """Return what a reader should know before trusting the numbers, worst first."""
+        """Return the findings on the numbers of the run, worst first."""
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
@@ -139,7 +139,7 @@ class Record:
 
     @property
     def limits(self) -> dict[str, int]:
-        """{what made steps shorter: how often}, the most frequent first; empty where it is not known."""
+        """{reason for shorter steps: count}, the most frequent first; empty where it is not known."""
         return dict(sorted(self.counts.get("limits", {}).items(), key=lambda entry: -entry[1]))
 
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
@@ -249,7 +249,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """Return the temperature at the stations of profiles, of what the states of a checkpoint remember of it."""
+    """Return the temperature at the stations of profiles, from the history variables in a checkpoint."""
     from scipy.spatial import cKDTree
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     at = None

@@ -36,7 +36,7 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
         runs: paths, or folders of checkpoints.
         title: its heading.
         names: of the runs; default 1, 2, ...
-        units: what the numbers of the scripts are in, for the labels.
+        units: units of the numbers of the scripts, for the labels.
         density: in g/cm3, for the weights in grams; trim: where parts are cut off, see `Path.part`.
 
     Raises:
@@ -247,7 +247,7 @@ def _course_columns(record: Record) -> list[list[str]]:
 
 
 def _stages(record: Record, units: Units) -> str:
-    """Every stage: its states and iterations, where it ended, the largest forces on tools in it, what gap is left."""
+    """Every stage: its states and iterations, where it ended, the largest forces on tools in it, the remaining gap."""
     columns = [c for kind in _course_columns(record) for c in kind if not c.endswith("force")]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]

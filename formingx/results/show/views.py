@@ -95,7 +95,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """Return a plotter to add meshes to, 1000 by `height`; when the block ends, what it shows is written as PNG."""
+    """Return a plotter to add meshes to, 1000 by `height`; when the block ends, its picture is written as PNG."""
     import pyvista
     picture = io.BytesIO()
     with screen():
