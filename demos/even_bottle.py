@@ -54,8 +54,8 @@ def main():
     answer.plot_wall(axes[0])
     axes[0].set(xlabel="length along the parison, cm", ylabel="wall of the bottle, cm")
     knots = answer.values["wall"]
-    axes[1].plot(np.full(KNOTS, WALL), knots.places * (ROUND + LENGTH), "0.6", label="before")
-    axes[1].plot(knots.values, knots.places * (ROUND + LENGTH), "C0o-", label="after")
+    axes[1].plot(np.full(KNOTS, WALL), knots.coordinates * (ROUND + LENGTH), "0.6", label="before")
+    axes[1].plot(knots.values, knots.coordinates * (ROUND + LENGTH), "C0o-", label="after")
     axes[1].set(xlabel="wall of the parison, cm", ylabel="length along its inside, cm", xlim=(0, None))
     axes[1].legend()
     save(drawing, args.out / "even_bottle.png")
@@ -63,7 +63,7 @@ def main():
         "cv_before": before.std() / before.mean(), "cv_after": after.std() / after.mean(),
         "least_wall_before": before.min(), "least_wall_after": after.min(), "paths": answer.paths,
         "volume_before": answer.before.volume, "volume_after": answer.best.volume,
-        "wall_of_the_parison": {f"{s:g}": w for s, w in zip(knots.places * (ROUND + LENGTH), knots.values)},
+        "wall_of_the_parison": {f"{s:g}": w for s, w in zip(knots.coordinates * (ROUND + LENGTH), knots.values)},
         "elements_along": elements[0], "versions": files.versions()})
 
 

@@ -41,7 +41,7 @@ def search(scene, targets, wanted, radius, length):
         path = fx.trace(scene, start=path, until=target, progress=False)
         new = [state for state in path.states if all(state is not one for one in seen)]
         for n, flipped in [kind for kind in wanted if kind not in found]:
-            losses = [one for one in path.stability([n], new).losses if one.flipped == flipped]
+            losses = [one for one in path.stability([n], new).critical_points if one.flipped == flipped]
             best = max(losses, key=lambda one: purity(one, radius, length), default=None)
             if best is not None and purity(best, radius, length) > 0.7:
                 found[n, flipped] = best
@@ -191,7 +191,7 @@ def main():
     path = fx.trace(scene, until=fx.pole_stretch(8.5), progress=False)
     summary["sheet"] = {
         "alarms": len(path.stability(range(1, 7)).bifurcations),
-        "n_0_lost_at_pole_stretch": path.stability([0]).losses[0].state.measures["pole_stretch"]}
+        "n_0_lost_at_pole_stretch": path.stability([0]).critical_points[0].state.measures["pole_stretch"]}
     error, loss, bulge = switched(0.8, 1, fine)
     summary["switched"] = {"mirror_error": error}
     say(f"sheet: {summary['sheet']}", f"switched: mirror error {error:.1e}")

@@ -107,7 +107,7 @@ def test_an_even_wall():
     assert answer.paths <= 4 and answer.cv[0] > 0.03 and answer.cv[1] < 1e-3
     assert np.exp(answer.values["h"](0.0)) / 50 == pytest.approx(1.2**2 * answer.best.wall.mean(), rel=2e-3)
     assert answer.best.volume == pytest.approx(answer.before.volume, rel=1e-5)
-    assert "unevenness" in str(answer) and abs(answer.foretold / answer.best.wall - 1).max() < 0.02
+    assert "unevenness" in str(answer) and abs(answer.predicted / answer.best.wall - 1).max() < 0.02
 
 
 def test_bad_input_is_told_in_words():
@@ -273,7 +273,7 @@ def test_spread_and_table():
     run = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1)}).run()
     by = run.derivative("wall")[1]
     assert run.spread({"c": 0.1, "h": 0.002}) == pytest.approx(np.hypot(0.1 * by[:, 0], 0.002 * by[:, 1]))
-    assert "c" in str(run.sensitivities("wall")) and run.sensitivities("pressure").by.shape == (1, 2)
+    assert "c" in str(run.sensitivities("wall")) and run.sensitivities("pressure").jacobian.shape == (1, 2)
     with pytest.raises(fx.InputError, match="parameter 'mu' is not known"):
         run.spread({"mu": 0.1})
 

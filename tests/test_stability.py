@@ -169,7 +169,7 @@ def test_modes_that_cross_in_one_long_step(n):
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
     path = fx.trace(scene, until=fx.displacement(2.2 * ratio, at=(ratio, 0.0), component="r"), progress=False)
-    (loss,) = path.stability([n], "all").losses
+    (loss,) = path.stability([n], "all").critical_points
     inner = np.sqrt(1 + loss.state.measures["enclosed_volume"] / (np.pi * ratio**2 * np.pi / 2))
     assert len(path.states) < 10 and inner == pytest.approx(exact.inflated_tube(ratio, 2, n), rel=1e-4)
 
@@ -178,11 +178,11 @@ def test_flipped_half_is_the_whole():
     """What a half cylinder loses, with its image and against it, is what the whole one loses."""
     whole, half = (fx.trace(column(0.2, elements=e, half=h), until=fx.travel(-d), progress=False)
                    for e, h, d in (((2, 32), False, 1.0), ((2, 16), True, 0.5)))
-    a = [1 + loss.control / (np.pi / 0.2) for loss in whole.stability([1, 2]).losses]
+    a = [1 + loss.control / (np.pi / 0.2) for loss in whole.stability([1, 2]).critical_points]
     found = half.stability([1, 2])
-    b = [1 + 2 * loss.control / (np.pi / 0.2) for loss in found.losses]
+    b = [1 + 2 * loss.control / (np.pi / 0.2) for loss in found.critical_points]
     assert a == pytest.approx(sorted(b, reverse=True), abs=1e-7) and len(a) == 2
-    assert {loss.flipped for loss in found.losses} == {None, "bottom"}
+    assert {loss.flipped for loss in found.critical_points} == {None, "bottom"}
 
 
 def test_ring_under_outer_pressure():
@@ -200,7 +200,7 @@ def test_what_is_formed_is_silent():
     """A hinged sheet through its maximum of pressure: a limit point is none that alarms."""
     path = fx.trace(treloar(elements=(10, 2)), until=fx.pole_stretch(4.0), progress=False)
     found = path.stability(range(5))
-    assert found.bifurcations == [] and [loss.limit_point for loss in found.losses] == [True]
+    assert found.bifurcations == [] and [loss.limit_point for loss in found.critical_points] == [True]
     assert "limit point" in str(found)
 
 
@@ -255,7 +255,7 @@ scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symme
 path = fx.trace(scene, until=fx.travel(-1.2), progress=False)
 found = path.stability(range(3))
 if MPI.COMM_WORLD.rank == 0:
-    print(json.dumps([[loss.number, loss.control, *loss.at] for loss in found.losses]))
+    print(json.dumps([[loss.number, loss.control, *loss.at] for loss in found.critical_points]))
 """
 
 

@@ -35,7 +35,7 @@ class Answer:
         failed: error messages of the other runs.
         inside: mask of the nodes of the wall that count, shape (k,).
         why: reason for the end of the search, as text.
-        foretold: wall of the best run as predicted by the run before it, shape (k,), length.
+        predicted: wall of the best run as predicted by the run before it, shape (k,), length.
         lack: targets that were missed (volume, wall or minimum wall) and the reason, as text, or "".
         wanted: wanted wall at the m nodes that count, shape (m,), length, or None.
         measured: the `MeasuredWall` of the fit, or None.
@@ -47,7 +47,7 @@ class Answer:
     failed: list[str]
     inside: np.ndarray
     why: str
-    foretold: np.ndarray
+    predicted: np.ndarray
     lack: str = ""
     wanted: np.ndarray | None = None
     measured: Any = None
@@ -108,7 +108,7 @@ class Answer:
 
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
-        off = abs(self.foretold - self.best.wall)[self.inside].max() / after.mean()
+        off = abs(self.predicted - self.best.wall)[self.inside].max() / after.mean()
         lines = [f"{self.paths} runs" + f", of which {len(self.failed)} failed" * bool(self.failed) + f"; {self.why}",
                  f"{'':24}{'before':>12}{'after':>12}",
                  f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",

@@ -45,7 +45,7 @@ class Design:
     ...                     materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
     ...                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_height(4.0)
     >>> effects = fx.Design(build, {"thickness": (0.5, 0.1, 1.0)}).run().sensitivities("pressure")
-    >>> effects.names, round(float(effects.by[0, 0]), 3)
+    >>> effects.names, round(float(effects.jacobian[0, 0]), 3)
     (['thickness'], 0.046)
     """
 
@@ -141,7 +141,7 @@ class Design:
         """Take Gauss-Newton steps from the best run, halved if a run is worse or fails."""
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
-        best, taken, foretold, before = first, [first], first.wall, 1.0
+        best, taken, predicted, before = first, [first], first.wall, 1.0
         notes: list[str] = []
         why = f"runs = {most} were used up"
         while len(taken) + len(notes) < most:
@@ -176,7 +176,7 @@ class Design:
             if new is None:
                 why = "no shorter step brings an improvement" if share < SEARCH.shortest else why
                 break
-            foretold = best.wall + share * (best.derivative("wall")[1] @ step)
+            predicted = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - aim.cost(new) / aim.cost(best)
             best = new
             if max(gained, before) < SEARCH.worth:     # a single small improvement may precede a larger one
@@ -185,7 +185,7 @@ class Design:
             before = gained
             log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
         lacks = [lack("volume", aim.held, best.volume), aim.shortfall(best)]
-        return Answer(first, best, taken, notes, aim.inside, why, foretold, "\n".join(filter(None, lacks)), aim.wanted,
+        return Answer(first, best, taken, notes, aim.inside, why, predicted, "\n".join(filter(None, lacks)), aim.wanted,
                       aim.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
@@ -213,7 +213,7 @@ class Design:
         first = self._run(self.parameters.start.copy())
         inside = inside_of(first, within)
         unit = min(least, first.wall[inside].min())
-        best, taken, foretold, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
+        best, taken, predicted, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
@@ -243,7 +243,7 @@ class Design:
                 new = self._run(np.clip(best.vector + step, low, high))
                 taken.append(new)
                 if cost(new) < cost(best):
-                    foretold, best, reach = wall + by @ step, new, min(2 * reach, 1.0)
+                    predicted, best, reach = wall + by @ step, new, min(2 * reach, 1.0)
                     continue
             except (InputError, ConvergenceError) as error:
                 notes.append(str(error).splitlines()[0])
@@ -252,5 +252,5 @@ class Design:
                 why = "no shorter step brings an improvement"
                 break
         thinnest = best.wall[inside].min()
-        return Answer(first, best, taken, notes, inside, why, foretold,
+        return Answer(first, best, taken, notes, inside, why, predicted,
                       lack("least wall", least, min(thinnest, least)))

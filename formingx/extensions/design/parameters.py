@@ -29,16 +29,16 @@ class Knots:
 
     def __init__(self, values: Any, smooth: bool = False):
         self.values, self.smooth = np.array(values, dtype=float), smooth
-        self.places = np.linspace(0.0, 1.0, len(self.values))
+        self.coordinates = np.linspace(0.0, 1.0, len(self.values))
 
     def __call__(self, s: Any) -> Any:
         s = np.clip(s, 0.0, 1.0)
-        return self._spline(s) if self.smooth else np.interp(s, self.places, self.values)
+        return self._spline(s) if self.smooth else np.interp(s, self.coordinates, self.values)
 
     @cached_property
     def _spline(self) -> Any:
         from scipy.interpolate import CubicSpline
-        return CubicSpline(self.places, self.values)
+        return CubicSpline(self.coordinates, self.values)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -88,14 +88,14 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     >>> fx.spline(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
     """
-    least = 4 if instance("along: smooth", smooth, bool, "True or False") else 2
-    if count("along: knots", knots) < least:
-        raise InputError(f"along: knots = {knots}: must be at least {least}")
-    values = [start] * knots if np.ndim(start) == 0 else several("along: start", start, "numbers")
+    least = 4 if instance("spline: smooth", smooth, bool, "True or False") else 2
+    if count("spline: knots", knots) < least:
+        raise InputError(f"spline: knots = {knots}: must be at least {least}")
+    values = [start] * knots if np.ndim(start) == 0 else several("spline: start", start, "numbers")
     if len(values) != knots:
-        raise InputError(f"along: start has {len(values)} numbers: must be one for each of {knots} knots")
-    at = np.array([finite("along: start", v) for v in values])
-    _check_bounds("along", at, low, high)
+        raise InputError(f"spline: start has {len(values)} numbers: must be one for each of {knots} knots")
+    at = np.array([finite("spline: start", v) for v in values])
+    _check_bounds("spline", at, low, high)
     return Spline(at, float(low), float(high), smooth)
 
 
@@ -172,7 +172,7 @@ def _number(name: str, given: Any) -> Spline:
     """Return a parameter that is a single number, from the user's argument."""
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
-        raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.along(...)")
+        raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.spline(...)")
     start = np.array([finite(f"Design: {name}: start", parts[0])])
     _check_bounds(f"Design: {name}", start, parts[1], parts[2])
     return Spline(start, float(parts[1]), float(parts[2]), profile=False)

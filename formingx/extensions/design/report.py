@@ -24,7 +24,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
     attainable, met, none = answer.attainable(), answer.at_bounds(), answer.without_effect()
     walls = [run.wall[answer.inside] for run in (before, best)]
-    off = abs(answer.foretold - best.wall)[answer.inside].max() / walls[1].mean()
+    off = abs(answer.predicted - best.wall)[answer.inside].max() / walls[1].mean()
     cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "least wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
@@ -128,7 +128,7 @@ def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
     drawing, axes = figure(1, width=9, height=4)
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
-    axes.plot(s, answer.foretold, "--", color="C1", linewidth=1, label="predicted by the run before the best")
+    axes.plot(s, answer.predicted, "--", color="C1", linewidth=1, label="predicted by the run before the best")
     if answer.wanted is not None:
         axes.plot(s[answer.inside], answer.wanted, "k--", linewidth=1, label="wanted")
     if not np.all(answer.inside):
@@ -148,7 +148,7 @@ def _patterns(before: Any, best: Any) -> str:
         for run, colour, label in ((before, "0.6", "before"), (best, "C0", "after")):
             profile = run.values[name]
             one.plot(s, profile(s), color=colour, label=label)
-            one.plot(profile.places, profile.values, "o", color=colour, markersize=4)
+            one.plot(profile.coordinates, profile.values, "o", color=colour, markersize=4)
         for bound in (low, high):
             if np.isfinite(bound):
                 one.axhline(bound, color="0.5", linestyle=":", linewidth=1)
@@ -189,7 +189,7 @@ def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
 
 def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     """Return a table with a row for every parameter."""
-    p, tenth = run.parameters, effects.by * effects.sizes / 10
+    p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),
             units.label("wall", "least wall"), units.label("wall", "largest change"), units.label("volume")]

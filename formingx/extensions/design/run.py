@@ -42,22 +42,23 @@ class Effects:
         measure: name of the quantity.
         names: names of the parameters.
         sizes: ranges of the parameters, or their start values without a range, shape (n,).
-        places: positions of the values, shape (m,): reference lengths of the wall, else numbers.
+        coordinates: positions of the values, shape (m,): reference lengths of the wall, else numbers.
         value: values of the quantity, shape (m,).
-        by: derivatives, shape (m, n).
+        jacobian: derivatives, shape (m, n).
     """
 
     measure: str
     names: list[str]
     sizes: np.ndarray
-    places: np.ndarray
+    coordinates: np.ndarray
     value: np.ndarray
-    by: np.ndarray
+    jacobian: np.ndarray
 
     def __str__(self) -> str:
         rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
         lines = ["".join([f"{'at':>10}{self.measure[:10]:>12}", *(f"{name[:11]:>12}" for name in self.names)])]
-        lines += ["".join([f"{self.places[k]:10.4g}{self.value[k]:12.5g}", *(f"{d:12.4g}" for d in self.by[k])])
+        lines += ["".join([f"{self.coordinates[k]:10.4g}{self.value[k]:12.5g}",
+                           *(f"{d:12.4g}" for d in self.jacobian[k])])
                   for k in rows]
         return "\n".join(lines)
 
@@ -74,10 +75,11 @@ class Effects:
         """
         from ...figures import figure
         axes = axes if axes is not None else figure()[1]
-        tenth, n = (self.by * self.sizes / 10).T, len(self.names)
-        most, places = abs(tenth).max() or 1.0, self.places if len(self.places) > 1 else np.array([0.0, 1.0])
+        tenth, n = (self.jacobian * self.sizes / 10).T, len(self.names)
+        most, places = abs(tenth).max() or 1.0, self.coordinates if len(self.coordinates) > 1 else np.array([0.0, 1.0])
         edges = np.concatenate([places[:1], (places[1:] + places[:-1]) / 2, places[-1:]])
-        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5, tenth if len(self.places) > 1 else tenth.repeat(2, 1),
+        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5,
+                                tenth if len(self.coordinates) > 1 else tenth.repeat(2, 1),
                                 cmap="RdBu_r", vmin=-most, vmax=most)
         axes.set(yticks=range(n), yticklabels=self.names, xlabel="reference length" if self.measure == "wall" else "")
         axes.invert_yaxis()

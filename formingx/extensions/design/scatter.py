@@ -18,7 +18,7 @@ class Band:
 
     Attributes:
         measure: name of the quantity.
-        places: reference lengths of the wall, or numbers, shape (m,).
+        coordinates: reference lengths of the wall, or numbers, shape (m,).
         value: values of the run, shape (m,).
         deviation: standard deviation, shape (m,).
         confidence: confidence level of the band between `low` and `high`, for a normal distribution.
@@ -32,7 +32,7 @@ class Band:
     """
 
     measure: str
-    places: np.ndarray
+    coordinates: np.ndarray
     value: np.ndarray
     deviation: np.ndarray
     confidence: float = 0.95
@@ -65,8 +65,8 @@ class Band:
         if axes is None:
             from ...figures import figure
             axes = figure(width=7)[1]
-        line, = axes.plot(self.places, self.value, **options)
-        axes.fill_between(self.places, self.low, self.high, color=line.get_color(), alpha=0.2, linewidth=0,
+        line, = axes.plot(self.coordinates, self.value, **options)
+        axes.fill_between(self.coordinates, self.low, self.high, color=line.get_color(), alpha=0.2, linewidth=0,
                           label=f"{100 * self.confidence:g} % band")
         axes.set(xlabel="reference length" if self.measure == "wall" else "", ylabel=self.measure)
         axes.legend()
@@ -75,7 +75,7 @@ class Band:
     def __str__(self) -> str:
         rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
         lines = [f"{'at':>10}{self.measure[:11]:>12}{'deviation':>12}{'lowest':>12}{'highest':>12}"]
-        lines += [f"{self.places[k]:10.4g}{self.value[k]:12.5g}{self.deviation[k]:12.3g}{self.low[k]:12.5g}"
+        lines += [f"{self.coordinates[k]:10.4g}{self.value[k]:12.5g}{self.deviation[k]:12.3g}{self.low[k]:12.5g}"
                   f"{self.high[k]:12.5g}" for k in rows]
         return "\n".join(lines)
 
@@ -128,8 +128,8 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
     if not 0 < finite("band: confidence", confidence) < 1:
         raise InputError(f"band: confidence = {confidence!r}: must be between 0 and 1")
     effects = run.sensitivities(measure)
-    deviation = deviations(effects.by, covariance_of("band", run.parameters, given))
-    return Band(effects.measure, effects.places, effects.value, deviation, confidence)
+    deviation = deviations(effects.jacobian, covariance_of("band", run.parameters, given))
+    return Band(effects.measure, effects.coordinates, effects.value, deviation, confidence)
 
 
 def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -129,18 +129,18 @@ class Stability:
         numbers: the wave numbers examined.
         states: the states examined, in order.
         counts: {(number, flipped): number of unstable modes in each state, shape (states,)}.
-        losses: the `CriticalPoint` objects, in order along the path.
+        critical_points: the `CriticalPoint` objects, in order along the path.
     """
 
     def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
                  losses: list[CriticalPoint]):
-        self.path, self.numbers, self.states, self.losses = path, numbers, states, losses
+        self.path, self.numbers, self.states, self.critical_points = path, numbers, states, losses
         self.counts = {tuple(kind): np.array(found) for kind, found in counts.items()}
 
     @property
     def bifurcations(self) -> list[CriticalPoint]:
         """Critical points that are no limit points."""
-        return [loss for loss in self.losses if loss.gained and not loss.limit_point]
+        return [loss for loss in self.critical_points if loss.gained and not loss.limit_point]
 
     @property
     def first(self) -> CriticalPoint | None:
@@ -160,7 +160,7 @@ class Stability:
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
-        lines += [f"  {unit} = {loss.number:g}: {_shown(loss)}" for loss in self.losses]
+        lines += [f"  {unit} = {loss.number:g}: {_shown(loss)}" for loss in self.critical_points]
         return "\n".join(lines if len(lines) > 1 else [*lines, "  no mode is unstable"])
 
     __repr__ = __str__
