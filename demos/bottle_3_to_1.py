@@ -50,7 +50,7 @@ def main():
                          "limit_pressure_MPa": [s.measures["pressure"] for s in path.limit_points],
                          "least_wall_mm": part.min_wall, "least_wall_at_height_mm": part.min_wall_height,
                          "evenness": part.uniformity, "content_ml": part.capacity / 1000, **cost(path)}
-        say(f"{name}: blown {summary[name]['blow_ratio']:.2f} to 1, least wall {part.min_wall:.3f} mm, evenness"
+        say(f"{name}: blown {summary[name]['blow_ratio']:.2f} to 1, minimum wall {part.min_wall:.3f} mm, evenness"
             f" {part.uniformity:.3f}, limit pressures {summary[name]['limit_pressure_MPa']}, {len(path)} states")
         label = name.replace("_", "-")
         if name == "gent":

@@ -9,7 +9,7 @@ one grade.
 
 Plugs at 30, 100 and 150 C that take heat through a contact of 0, 200 and 1000 W/(m2 K), where and while they touch;
 then, for a plug at 30 C, with and without relaxation (an elastic sheet of the same instantaneous modulus), chill and
-friction: eight runs. Beside them straight vacuum. Base, corner and least wall are over the thickness of the sheet. In
+friction: eight runs. Beside them straight vacuum. Base, corner and minimum wall are over the thickness of the sheet. In
 parallel processes, or with mpirun over the ranks. Lengths in mm, stresses in MPa, W, s, degrees Celsius.
 """
 
@@ -32,7 +32,7 @@ FRICTION = {"by temperature": fx.table({20: 0.15, 100: 0.3, 150: 0.6, 160: 0.6})
 PLUGS = [(HOT, 0), (100.0, 200), (100.0, 1000), (COLD, 200), (COLD, 1000), (HOT, 1000)]  # C, W/(m2 K)
 MOST = PLUGS[-2]
 FACTORS = ("relaxation", "chill", "friction")
-KEYS = {"base": "base", "corner": "corner", "least": "least wall"}
+KEYS = {"base": "base", "corner": "corner", "least": "minimum wall"}
 
 
 def modulus(at_hot):

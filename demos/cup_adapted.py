@@ -2,7 +2,7 @@
 
 The sheet and the cup of `cup` with a corner of an eighth of the thickness (0.0375 cm), stuck where it touches, to 160
 psi: the wall is least where the sheet comes last, beside the corner. What sticks keeps its wall from then on, so that
-the least wall leaps with the place of the nodes, by percents on columns of one size. `mesh.adapted` takes a run on 20
+the minimum wall leaps with the place of the nodes, by percents on columns of one size. `mesh.adapted` takes a run on 20
 columns and lets none turn by more than `share` radians as the sheet bends (or over a fillet that it lies on); each mesh
 is made by the run before. Lengths in cm, stresses in psi.
 """
@@ -37,7 +37,7 @@ def disc(columns):
 
 
 def least_walls(path, pressures) -> dict:
-    """{pressure as text: least wall over h0, away from the rim}."""
+    """{pressure as text: minimum wall over h0, away from the rim}."""
     shapes = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
     return {p: float(shape.wall_ratio[shape.reference_radius < INSIDE * RADIUS].min()) for p, shape in shapes.items()}
 
@@ -63,7 +63,7 @@ def main():
             "newton_iterations": {f"{columns(p)}": p.counts.iterations for p in runs[name]},
         }
         for n, w in found.items():
-            say(f"{name}, {n} columns: least wall over h0 " + ", ".join(
+            say(f"{name}, {n} columns: minimum wall over h0 " + ", ".join(
                 f"{v:.4f} at {p} psi ({100 * off[n][p]:+.2f} %)" for p, v in w.items()))
     save(draw(runs, walls, truth, last), args.out / "cup_adapted.png")
     summarise(args.out, {**summary, "corner_over_h0": CORNER / THICKNESS, "versions": files.versions()})
@@ -75,14 +75,15 @@ def columns(path) -> int:
 
 
 def draw(runs, walls, truth, last):
-    """The least wall against columns, and how long they are."""
+    """The minimum wall against columns, and how long they are."""
     figure, (left, right) = plots.figure(2, width=5.0)
     for k, (name, found) in enumerate(walls.items()):
         left.plot(list(found), [w[last] for w in found.values()], "o-", color=f"C{k}", label=name)
         ends = runs[name][-1].problem.scene.mesh.columns.ends
         right.stairs(np.diff(ends), ends, baseline=None, color=f"C{k}", label=f"{name}, {len(ends) - 1}")
     left.axhline(truth[last], color="0.5", linewidth=1)
-    left.set(xlabel="columns of elements", ylabel="least wall / original", title=f"wall beside the corner, {last} psi",
+    left.set(xlabel="columns of elements", ylabel="minimum wall / original",
+             title=f"wall beside the corner, {last} psi",
              xscale="log")
     right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="finest meshes",
               yscale="log")

@@ -63,7 +63,7 @@ def main():
         path = form(part, size)
         found = summary[f"{part}_{size:g}"] = numbers(path)
         say(f"{part}, size {size:g}: {found['triangles']} triangles, {found['iterations']} iterations,"
-            f" {found['failures']} failures, {found['seconds']:.0f} s; weight {found['weight_g']:.4g} g, least wall"
+            f" {found['failures']} failures, {found['seconds']:.0f} s; weight {found['weight_g']:.4g} g, minimum wall"
             f" {found['least_wall_mm']:.4g} mm, plug {found['plug_force_N']:.4g} N")
         if part == "quarter":
             path.wall().to_csv(args.out / "wall.csv", UNITS)

@@ -1,9 +1,9 @@
 """A tray with ribs, draft and a boss, from an STL file: a plug draws the sheet down, then vacuum; the sheet relaxes.
 
 The mould is drawn here as a height over the plane, 150 mm by 90 mm at its mouth and 35 mm deep, its walls at 10 degrees
-to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. The least wall, in a corner, needs
-small triangles there: after sheets of one size the mesh is adapted, so that the wall changes by at most a fifth from
-one triangle to the next. Lengths in mm, stresses in MPa, times in s.
+to the axis, with ribs and a boss (an F) on its floor, and written as a closed solid. The minimum wall, in a corner,
+needs small triangles there: after sheets of one size the mesh is adapted, so that the wall changes by at most a
+fifth from one triangle to the next. Lengths in mm, stresses in MPa, times in s.
 """
 
 import numpy as np

@@ -143,7 +143,7 @@ def test_bad_input_is_told_in_words():
 
 
 def test_what_is_not_reached_is_said():
-    """A wall, a volume and a least wall beyond the bounds."""
+    """A wall, a volume and a minimum wall beyond the bounds."""
     design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
     answer = design.fit(wall=1.0, volume=None)
     assert "within the bounds, would be 0.9 % better" in answer.why
@@ -159,7 +159,7 @@ def test_what_is_not_reached_is_said():
     assert "It is stopped by the volume, which is held at" in str(held)
     assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))
     answer = design.minimum_weight(min_wall=1.0)
-    assert "least wall that was asked for, 1, was not reached" in str(answer)
+    assert "minimum wall that was asked for, 1, was not reached" in str(answer)
     assert answer.best.vector.min() > 0.2                              # as thick as may be, not as light
 
 

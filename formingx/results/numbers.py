@@ -60,9 +60,9 @@ class PartNumbers(KeyNumbers):
         """Rows; where: the minimum wall is; more: those of one kind of part alone."""
         rows = [("given for", self.basis)] if self.basis else []
         rows += [(self.weight_label, self._said(self.weight, self.units.weight))] if self.weight is not None else []
-        rows += [("least wall", f"{self._length(self.min_wall)} at {where}"),
+        rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),
                  ("mean wall", self._length(self.mean_wall)),
-                 ("evenness (least over mean wall)", f"{self.uniformity:.4g}"),
+                 ("uniformity (minimum over mean wall)", f"{self.uniformity:.4g}"),
                  ("coefficient of variation of the wall", f"{self.variation:.4g}"),
                  ("areal draw ratio", f"{self.draw_ratio:.4g}"),
                  ("volume", self._said(self.volume, self.units.volume)),

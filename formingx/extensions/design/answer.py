@@ -112,7 +112,7 @@ class Answer:
         lines = [f"{self.paths} runs" + f", of which {len(self.failed)} failed" * bool(self.failed) + f"; {self.why}",
                  f"{'':24}{'before':>12}{'after':>12}",
                  f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",
-                 f"{'least wall':24}{before.min():12.5g}{after.min():12.5g}",
+                 f"{'minimum wall':24}{before.min():12.5g}{after.min():12.5g}",
                  f"{'mean wall':24}{before.mean():12.5g}{after.mean():12.5g}",
                  f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
         if self.wanted is not None:

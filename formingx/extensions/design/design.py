@@ -253,4 +253,4 @@ class Design:
                 break
         thinnest = best.wall[inside].min()
         return Answer(first, best, taken, notes, inside, why, predicted,
-                      lack("least wall", least, min(thinnest, least)))
+                      lack("minimum wall", least, min(thinnest, least)))

@@ -26,7 +26,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
     walls = [run.wall[answer.inside] for run in (before, best)]
     off = abs(answer.predicted - best.wall)[answer.inside].max() / walls[1].mean()
     cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
-             (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "least wall")),
+             (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "minimum wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
              (str(answer.paths), "runs were taken")]
     said = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
@@ -40,7 +40,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
     rows = [[str(k), *(page.number(v) for v in (one.wall[answer.inside].std() / one.wall[answer.inside].mean(),
              one.wall[answer.inside].min(), one.wall[answer.inside].mean(), one.volume))]
             for k, one in enumerate(answer.runs, 1)]
-    runs = page.table(["run", "unevenness", units.label("wall", "least wall"), units.label("wall", "mean wall"),
+    runs = page.table(["run", "unevenness", units.label("wall", "minimum wall"), units.label("wall", "mean wall"),
                        units.label("volume")], rows)
 
     def pictures() -> list[str]:
@@ -57,7 +57,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
     cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
-             (f"{wall.min():.4g}", units.label("wall", "least wall")),
+             (f"{wall.min():.4g}", units.label("wall", "minimum wall")),
              (f"{run.volume:.4g}", units.label("volume", "volume of the whole part at rest"))]
     said = [("bad", found.text) for found in alarming(run.path.findings())]
 
@@ -173,7 +173,7 @@ def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
     wall, by = run.derivative("wall")
     thin = int(np.argmin(wall))
     rows = [(units.label("wall", "mean wall"), wall.mean(), by.mean(0)),
-            (units.label("wall", "least wall"), wall[thin], by[thin])]
+            (units.label("wall", "minimum wall"), wall[thin], by[thin])]
     names = [name for name in run.path.columns if name.endswith(("force", "pressure"))]
     for name in ("volume", *names):
         value, slope = run.derivative(name)
@@ -192,12 +192,12 @@ def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),
-            units.label("wall", "least wall"), units.label("wall", "largest change"), units.label("volume")]
+            units.label("wall", "minimum wall"), units.label("wall", "largest change"), units.label("volume")]
     most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
     rows = [[name, *([page.number(before.vector[k])] if before else []),
              *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),
              *(f"{v:.3g}" for v in (tenth[:, k].mean(), tenth[thin, k], most[k], grows[k]))]
             for k, name in enumerate(p.names)]
     return page.table(head, rows) + ("<p class=lead>Changes that a tenth of the range of a parameter makes, to first"
-                                     " order: of the mean and of the least wall, the largest anywhere, of the volume."
+                                     " order: of the mean and of the minimum wall, the largest anywhere, of the volume."
                                      "</p>")

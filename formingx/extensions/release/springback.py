@@ -91,7 +91,7 @@ class Springback(KeyNumbers):
                 ("springback of the height", said(self.springback)),
                 ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(before))})"),
                 ("shrinkage of the diameter", f"{100 * self.shrinkage:.3g} %"),
-                ("least wall", said(self.min_wall)),
+                ("minimum wall", said(self.min_wall)),
                 ("flange has turned by", f"{self.flange_angle:.3g} degrees")]
 
 

@@ -185,7 +185,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
-        cards = [(f"{found.min_wall:.4g}{length}", f"least wall, at r = {found.min_wall_at[0]:.4g}{length}"),
+        cards = [(f"{found.min_wall:.4g}{length}", f"minimum wall, at r = {found.min_wall_at[0]:.4g}{length}"),
                  (f"{found.uniformity:.3g}", "least over mean wall"),
                  (f"{found.weight:.4g} {found.units.weight}", found.weight_label) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
