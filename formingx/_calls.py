@@ -56,7 +56,7 @@ def explain(module: types.ModuleType) -> None:
 
 
 def _explain_class(cls: type) -> None:
-    """Explain the public methods of a class and of its bases, and those of their results."""
+    """Explain the public methods of a class and of its bases, and the methods of their results."""
     _seen.add(cls)
     for base in cls.__mro__:
         if base.__module__.startswith(_PACKAGE):

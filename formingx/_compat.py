@@ -95,7 +95,7 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
 def assemble_matrix(matrix: Any, form: Any, bcs: Any, held: float = 1.0) -> None:
     """Add a compiled form's entries to a PETSc matrix, but for the rows and columns that `bcs` hold: these get `held`
     on the diagonal, else nothing."""
-    fem_petsc.assemble_matrix(matrix, form, bcs, held)  # type: ignore[misc]  # its types are those of another variant
+    fem_petsc.assemble_matrix(matrix, form, bcs, held)  # type: ignore[misc]  # types of another variant
 
 
 def interpolation_points(space: Any) -> Any:

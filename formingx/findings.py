@@ -72,7 +72,7 @@ def found_at(moment: Moment, subject: Any) -> list[Finding]:
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings sorted by severity; those of one severity keep their order."""
+    """Return findings sorted by severity; findings of one severity keep their order."""
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))
 
 

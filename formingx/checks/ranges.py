@@ -37,7 +37,7 @@ def moduli(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def friction(body: Body) -> Iterator[Finding]:
-    """Coefficients of friction above those of rubber on steel, below those that count as sticking."""
+    """Coefficients of friction between rubber on steel and sticking."""
     for contact in body.scene.contacts:
         if contact.sticks:
             continue

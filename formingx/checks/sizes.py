@@ -24,7 +24,7 @@ Found = Iterator[Finding]
 
 _PRESSED = 100.0           # of the shear modulus: more presses no wall further into any corner
 _SLIGHT = 1e-4             # of shear modulus x thickness / length: as good as no pressure
-_BEYOND = 1.1              # of the largest pressure of a cap, which is 3 % below that of a disc
+_BEYOND = 1.1              # of the largest pressure of a cap, 3 % below the pressure of a disc
 _LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_check.py
 _BLOWN = 8.0               # blow ratio that no bottle has
 _DEEP = 0.5                # of the opening: a wall beyond it that high is a mould's, not a grip's

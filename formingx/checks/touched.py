@@ -1,4 +1,4 @@
-"""Checks of a run's tools: those that the body never touched, and moulds from which it moved away."""
+"""Checks of a run's tools: untouched tools, and moulds from which the body moved away."""
 
 from __future__ import annotations
 

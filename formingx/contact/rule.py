@@ -49,7 +49,8 @@ class Rule:
         raise NotImplementedError
 
     def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Stiffness of the points, shape (n, components, components), as that of their `dofs`, shape (n, m, m)."""
+        """Stiffness of the points, shape (n, components, components), as the stiffness of their `dofs`, shape (n, m,
+        m)."""
         raise NotImplementedError
 
     def at_points(self, values: np.ndarray) -> np.ndarray:

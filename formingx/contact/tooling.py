@@ -16,8 +16,8 @@ from ..tools.shapes import Arc, Line, Tool
 class Tooling(NamedTuple):
     """All contacts of a scene.
 
-    contacts: in the order of the scene; before: how many of its items come before them (`Scene.things`); length: that
-    of a problem's forms, which makes amplitudes of travels.
+    contacts: in the order of the scene; before: how many of its items come before them (`Scene.things`); length: length
+    scale of a problem's forms, which makes amplitudes of travels.
     """
 
     contacts: list[Contact]
@@ -59,7 +59,7 @@ class Tooling(NamedTuple):
                 for i in range(self.before, self.before + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
-        """(tool, its shift (r, z)) of those that take part."""
+        """(tool, its shift (r, z)) of the active tools."""
         return [(contact.tool, travel * contact.way)
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 

@@ -46,7 +46,7 @@ class Formulation(ABC):
         dx, weight: weight * dx is the element of reference volume.
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every item of the scene;
-            last, 1 for the time. control_scale: that of the only driven item, or L.
+            last, 1 for the time. control_scale: scale of the only controlled item, or L.
         terms: of each material of the scene its `MaterialTerms`.
         histories: arguments of the forms besides fields, control and time (`History`).
         potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
@@ -126,7 +126,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
-        """Return the scalar element of the displacement, and those of all fields."""
+        """Return the scalar element of the displacement, and the elements of all fields."""
 
     @abstractmethod
     def _groups(self) -> list[tuple[Any, list[str]]]:

@@ -47,7 +47,7 @@ class Histories:
 
     @property
     def relaxes(self) -> bool:
-        """True if F depends on time: on histories other than those of rate-independent materials."""
+        """True if F depends on time: on histories of rate-dependent materials, contact or heat."""
         return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
                    for history in self.forms.histories)
 

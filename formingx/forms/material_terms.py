@@ -83,7 +83,7 @@ class MaterialTerms:
     def of_temperature(self, function: Any) -> Any:
         """f(T) at the quadrature points of the energy, exactly, at the end of a step, or in its middle."""
         forms, found = self.forms, self.quadrature_function()
-        law = getattr(function, "clamped", function)          # that of a user's own constant may be any function
+        law = getattr(function, "clamped", function)          # a user's own constant may be any function
         followed = Followed(forms, found, [(self.cells, law)], [forms.temperatures(self)])
         self._followed.append(followed)
         return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
@@ -118,7 +118,7 @@ class MaterialTerms:
         return self.material.stored_energy(F, self.internal | self.held, **self.constants)
 
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
-        """Virtual work beside that of the step's potential, per reference volume (UFL, stress), or None.
+        """Virtual work beside the step's potential, per reference volume (UFL, stress), or None.
 
         derivative: a function that returns the virtual change of a UFL expression.
         """

@@ -12,7 +12,7 @@ class Setting:
     """amplitude = base + rate * control of every item of a scene (`Scene.things`), dimensionless; last, process time.
 
     Attributes:
-        base, rate: one number for each item (0 unless it can be driven), then those of the process time.
+        base, rate: one number for each item (0 unless it can be controlled), then the process time.
         off: numbers of the items that take no part.
         fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.

@@ -15,7 +15,7 @@ from ..physics import kinematics as kin
 from .formulation import Formulation
 from .material_terms import MaterialTerms
 
-_THIN = 5e-4               # volume over length^3 (a disc of r0/h0 = 6000) below which that of bending is round-off
+_THIN = 5e-4  # volume over length^3 (a disc of r0/h0 = 6000) below which the bending stiffness is round-off
 _FIRST_STRETCH = 1e-4      # at which the first direction of a path is taken
 
 

@@ -1,8 +1,8 @@
 """Time integration error of the stress at the end of a step: against two steps of half the length.
 
 The history variables of materials are advanced once more, in two halves, along the displacements that the states
-before and the new one make likely, at the temperatures that the step has led to. The stress that this leaves at the
-end is compared with that of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point,
+before and the new one make likely, at the temperatures that the step has led to. The resulting stress at the end is
+compared with the stress of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point,
 at a given deformation, so nothing is solved for. Nothing need be known of a material but its step.
 """
 

@@ -12,7 +12,7 @@ class Temperature:
     """The temperature of a problem's body at the last accepted state.
 
     Args:
-        given: that of the scene.
+        given: temperature of the scene.
 
     Attributes:
         T: the DOLFINx `Function` (P2) of its values. Who changes it calls `take_temperature` of the `Problem`.
@@ -29,7 +29,7 @@ class Temperature:
         self.limits = (-np.inf, np.inf)
 
     def now_and_before(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the temperatures of `GivenTemperature.in_cells`, and those of the step before if there are any: (1
+        """Return the temperatures of `GivenTemperature.in_cells`, and of the step before if there is one: (1
         or 2, cells, q)."""
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)

@@ -141,7 +141,7 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """Return [(number, line)] without empty lines and those that begin with #, other than inside quotes."""
+    """Return [(number, line)] without empty lines and comment lines (#), other than inside quotes."""
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):

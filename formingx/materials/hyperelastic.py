@@ -322,7 +322,7 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """ln x, not a number where x < 0, and so are its derivatives (those of ln x itself are finite there)."""
+    """ln x, not a number where x < 0, and so are its derivatives (the derivatives of ln x itself are finite there)."""
     return 2 * ufl.ln(ufl.sqrt(x))
 
 

@@ -53,7 +53,7 @@ class Inflated:
         """Return the pressure on a disc blown to a cap of a sphere that is stretched evenly, shape (n,), stress.
 
         With the height s a the area ratio is l^2 = 1 + s^2, and p = 4 s (P h0 / l) / (a (1 + s^2)). The largest is
-        2 to 3 % below that of a hinged neo-Hookean disc.
+        2 to 3 % below the pressure of a hinged neo-Hookean disc.
         """
         force = self._forces(along("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)

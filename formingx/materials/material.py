@@ -31,7 +31,7 @@ class Material:
     """A strain energy with named constants.
 
     Subclasses set `self.parameters` (name to number, or to a varying coefficient: see `constants`) and give
-    `strain_energy`. The constants' unit of stress is the user's own and fixes that of all pressures and stresses.
+    `strain_energy`. The constants' unit of stress is the user's own; all pressures and stresses have it.
 
     A material with a history sets `self.internal` too, and gives `step_energy` and `updated`. In their arguments and
     results, `internal` is {name: UFL expression} with the values at the beginning of the step, and `time_step` the
@@ -39,8 +39,8 @@ class Material:
 
     Attributes:
         parameters: {name: constant}.
-        internal: {name: value in the reference configuration}, a number or nested tuples, whose shape is that of the
-            variable; of a quantity per quadrature point. Empty: no history.
+        internal: {name: value in the reference configuration}, a number or nested tuples, of the shape
+            of the variable; of a quantity per quadrature point. Empty: no history.
         of_motion: names of internal variables that tell how the body moved in the last step, for its rate in the next;
             as in the reference configuration they tell nothing.
         shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or as its inverse, of entries 11,
@@ -65,8 +65,8 @@ class Material:
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
 
-        Of a material with a history: that of a body in the reference configuration until now which is strained in no
-        time.
+        For a material with a history: the instantaneous energy of a body that was in the reference
+        configuration before.
         """
         if not self.internal:
             raise NotImplementedError
@@ -142,7 +142,7 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """Modulus of small shear, E/3; of fibres that of the stiffest direction. Unit: stress.
+        """Modulus of small shear, E/3; for fibres in the stiffest direction. Unit: stress.
 
         Half the largest W'' of small strains e = ln l with zero sum: if isotropic, W = mu (e1^2 + e2^2 + e3^2).
         """
@@ -264,7 +264,7 @@ class Material:
         reference configuration.
 
         Numbers of any type are kept as floats.
-        sample: where to look at constants that vary; None: only those that do not vary are checked.
+        sample: where to look at constants that vary; None: only constants that do not vary are checked.
         """
         self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
                            for name, value in self.parameters.items()}

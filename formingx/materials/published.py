@@ -35,7 +35,7 @@ _MORE: list[Callable[[], dict[str, Published]]] = []
 
 
 def register_published(constants: Callable[[], dict[str, Published]]) -> Callable[[], dict[str, Published]]:
-    """Add the published constants of an extension to those that `published` returns; usable as a decorator.
+    """Add the published constants of an extension to the constants that `published` returns; usable as a decorator.
 
     Args:
         constants: a function without arguments, which returns {name: `Published`}.

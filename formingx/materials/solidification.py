@@ -74,7 +74,8 @@ class Solidification(Material):
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
-        """See `Material`: those of the base; C of the last two states, A, and phi of the former, which A stands for.
+        """See `Material`: the terms of the base; C of the last two states, A, and phi of the former, which A stands
+        for.
 
         The part that solidifies in a step is known when the temperature at its end is: then, at the beginning of the
         next, A takes it.
@@ -102,7 +103,7 @@ class Solidification(Material):
         return self.base.largest_I1
 
     def strain_energy(self, F, **constants):
-        """See `Material`: that of a body that was never strained until now."""
+        """See `Material`: the response of a body that was never strained before."""
         phi = ufl.max_value(ufl.min_value(ufl.ln(constants["set_end"]), 1.0), 0.0)
         return self._base.strain_energy(F, **self._of_base(constants)) \
             + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)

@@ -31,7 +31,7 @@ from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared,
 class RelaxingMaterial(Relaxing):
     """An equilibrium energy and relaxing branches, for any law of the branches.
 
-    The constants are those of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
+    The constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
     (`strain_energy`, `shear_modulus`, `stress` without times) it is the instantaneous response: nothing has flowed.
 
     Args:
@@ -333,8 +333,8 @@ class TransientNetwork(RelaxingMaterial):
     memory: in steady extension faster than 1/(2 tau) the stress grows without bound.
 
     A step is exact where C^-1 goes along a parabola in time, through its value at the end of the step and the two
-    known before. So it is of third order, and of second however short tau is: for dt >> tau the stress is that of the
-    rate at the end of the step, by the backward difference of three points (BDF2 with variable steps). With x = dt/tau
+    known before. So it is of third order, and of second however short tau is: for dt >> tau the stress follows the rate
+    at the end of the step, by the backward difference of three points (BDF2 with variable steps). With x = dt/tau
     the step has the potential (mu/2) tr(C M), A = M + (1 - m - p) C^-1, m = (1 - e^-x)/x, M = e^-x A_n
     + (m - e^-x + p) C_n^-1 + p s (C_n^-1 - C_n-1^-1), p = [x - 2 + (x + 2) e^-x]/x^2 s/(1 + s), s the length of the
     step over that of the one before. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].

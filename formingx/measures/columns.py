@@ -16,7 +16,8 @@ Measure = Target | Callable[[Any], float]
 
 
 class _Recorded(Bound):
-    """A measure that depends on more than the displacements: between two states it is not that of a guessed body."""
+    """A measure that depends on more than the displacements: between two states it cannot be evaluated for a guessed
+    body."""
 
     smooth = False
 
@@ -105,7 +106,7 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """Return the measures that every run records, by column name.
 
-    Energies, volumes, areas and forces are those of the whole part, of the whole tool and of the whole support, also
+    Energies, volumes, areas and forces belong to the whole part, the whole tool and the whole support, also
     where a half or a quarter is modelled (`Scene.symmetry_factor`); in plane strain they are per unit depth.
 
     pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy

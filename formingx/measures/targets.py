@@ -61,7 +61,7 @@ class Amplitude(Bound):
 
     @property
     def of_load(self) -> bool:
-        """True if it is that of a load, as a pressure."""
+        """True for a load, such as a pressure."""
         return self._acts
 
     @property
@@ -134,7 +134,7 @@ class _Form(Bound):
 
 
 class Sag(Bound):
-    """See `sag`: that of the node that has sunk the most, the first of several."""
+    """See `sag`: the node that has sunk the most, the first of several."""
 
     smooth = False
 
@@ -257,7 +257,7 @@ def enclosed_volume(value: float) -> Target:
     """Return the target: the volume swept by the loaded face reaches `value` (length^3; per depth in plane strain).
 
     It lies between the face in the reference configuration and now; where an end of the face has moved, straight
-    lines close it. Where a half or a quarter is modelled it is that of the whole part (`Scene.symmetry_factor`).
+    lines close it. Where a half or a quarter is modelled it belongs to the whole part (`Scene.symmetry_factor`).
 
     >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
     500.0

@@ -49,8 +49,8 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a row, of each layer
             a count, or the relative sizes of its elements from the bottom up, (60, [[1, 2, 4], 2]); those of a single
             layer may stand alone, (60, [1, 2, 4]). Each rectangle is two triangles.
-        grading: size of the last element at the rim over that of the first at the axis, 1e-6 to 1e6.
-        concentrate: in place of `grading`, {reference radius: size of the elements there over that of the largest}, for
+        grading: size of the last element at the rim over the first at the axis, 1e-6 to 1e6.
+        concentrate: in place of `grading`, {reference radius: size of the elements there over the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
     Raises:
@@ -145,7 +145,7 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
         inner_radius: length.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
         elements: (from the axis to the equator, through each layer), as in `disc`.
-        grading: size of the last element at the equator over that of the first at the axis.
+        grading: size of the last element at the equator over the first at the axis.
 
     Raises:
         InputError: as in `disc`.
@@ -178,7 +178,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
             vary (a programmed wall): a function of Z, or a table {Z: thickness}, linear between its heights. Z is that
             of the inner face, from -inner_radius at the bottom to `length`; thickness is measured along its normal.
         elements: (from the axis to the neck, through each layer), as in `disc`.
-        grading: size of the last element at the neck over that of the first at the axis.
+        grading: size of the last element at the neck over the first at the axis.
 
     Raises:
         InputError: as in `disc`; fewer than two elements along the meridian.
@@ -212,12 +212,12 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a body from its outline: what lies between two lines through points, each point opposite that of the
+    """Return a body between two lines through points, each point opposite the same point of the
     other line.
 
     Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
 
-    Boundaries: `inner`, `outer`, `start` and `end` (from the first or last point of one to that of the other; called
+    Boundaries: `inner`, `outer`, `start` and `end` (from the first or last point of one line to the other; called
     `axis` where both points have R = 0).
 
     Args:

@@ -55,7 +55,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return a number of the piece that each element is of, 0 for that of the first node, shape (m,)."""
+    """Return a number of the piece that each element is of, 0 for the piece of the first node, shape (m,)."""
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:

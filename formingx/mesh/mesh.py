@@ -21,7 +21,7 @@ class Columns(NamedTuple):
 
     Attributes:
         ends: where they end, by a coordinate along the sheet, shape (n + 1,); fixed: ends that must stay, shape (m,).
-        faces: names of the boundaries along the sheet: those of the first and the last row of nodes.
+        faces: names of the boundaries along the sheet, with the first and the last row of nodes.
         place: at coordinates, shape (k,): the nodes of all rows there, shape (rows, k, 2), length.
         make: the mesh with other ends.
     """

@@ -71,7 +71,7 @@ class Contact(Part):
         tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
         friction: "stick" (a point stays where it touched), "none", or the coefficient mu of Coulomb's law (5.9), at
             least 0. A coefficient that depends on the temperature of the body is a `table` {T: mu} or the result of
-            `of_temperature`; its value is that of the last accepted state.
+            `of_temperature`; its value is taken at the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick.
         elastic_slip: g_s over thickness of the sheet: the elastic motion of a point before it slides.
@@ -384,7 +384,7 @@ class Law(NormalLaw):
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the traction round the axis by the motion there, shape (n,), stress/length.
 
-        That of the normal traction, N n_r/r (r: `radius`, infinite in plane strain), and the stiffness of a sticking
+        For the normal traction it is N n_r/r (r: `radius`, infinite in plane strain), and the stiffness of a sticking
         point; nothing holds one that slides.
         """
         turned, near, found = super().stiffness_round(x, old, radius), self.nearest(x), self.tractions(x, old)

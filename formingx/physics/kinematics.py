@@ -31,7 +31,7 @@ class Kinematics:
         dimension_of_volume: 3; of a volume per unit depth 2.
         formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
         reader: class of the `Reader` of a path; None: `SectionReader`. An extension sets it.
-        scene_checks: checks of a scene (`SceneChecks`); None: those of a section. An extension sets it.
+        scene_checks: checks of a scene (`SceneChecks`); None: the checks of a section. An extension sets it.
     """
 
     axes: tuple[str, ...] = ("r", "z")

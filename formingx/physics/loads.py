@@ -110,7 +110,7 @@ class Gravity(Load):
     .. math:: \delta W = -\int_{V} \rho \, g \, \delta u_z \, dV
 
     Args:
-        density: of the body in the reference configuration, above 0, or {layer: density} for those that have weight:
+        density: of the body in the reference configuration, above 0, or {layer: density} for layers with weight:
             kg/m3 with Pa, m and s; t/mm3 with MPa, mm and s.
         value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
         name: its name in a process and in its columns.

@@ -86,14 +86,14 @@ class _OneComponent(Support):
 class Symmetry(_OneComponent):
     """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
 
-    Where a flat end of the body lies in it the part goes on behind it as the image of the body, and results are those
-    of the whole part: see `Scene.symmetry_factor`.
+    Where a flat end of the body lies in it the part goes on behind it as the image of the body, and results belong
+    to the whole part: see `Scene.symmetry_factor`.
 
     Args:
         on: name of the boundary.
         normal: the component that is held: "r" or "z"; in three dimensions "x", "y" or "z".
         mirror: modes that are no image of themselves count, too, see `Path.stability`.
-        guide: the part ends there and slides along a frictionless wall: results are those of the body alone.
+        guide: the part ends there and slides along a frictionless wall: results belong to the body alone.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
     [Symmetry('axis', 'r'), Symmetry('middle', 'z')]

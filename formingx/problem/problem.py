@@ -59,9 +59,9 @@ class Problem(Histories, Units):
         scene: the scene.
         forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
-        x: a vector of unknowns; inside `at` those of the state.
+        x: a vector of unknowns; inside `at` the unknowns of the state.
         matrix: the tangent, refilled by `tangent`.
-        contacts: the scene's contacts (`FaceContact`); present: of those that take part now.
+        contacts: the scene's contacts (`FaceContact`); present: the active contacts.
         histories: arguments of F besides x and control (`History`); limit: limits of a step (`StepLimit`).
         setting: the `Setting` that x and control are seen under; see `enter`.
         admissible: whether the body has a shape, and keeps its volume (`Admissible`).
@@ -408,7 +408,7 @@ class Problem(Histories, Units):
         self.x.destroy()
 
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
-        """Take a setting: from here on F is that of the setting, and (x, control) is a state on its path.
+        """Take a setting: from here on F belongs to the setting, and (x, control) is a state on its path.
 
         Constrained unknowns are held where x has it, now or, if it is driven, at this control; a fading
         setting removes the unbalanced forces at (x, control). x: locally owned entries.
@@ -431,7 +431,7 @@ class Problem(Histories, Units):
             left.destroy()
 
     def _take(self, stage: _Stage) -> None:
-        """Make the forms, the contacts and the matrix those of a stage."""
+        """Set the forms, the contacts and the matrix to a stage."""
         before, self._stage = self._stage, stage
         if before is stage:
             return

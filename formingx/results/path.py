@@ -164,7 +164,7 @@ class Path(States):
              units: Units | None = None) -> Any:
         """Return the formed part in numbers (`Part`): volume, weight, area, minimum wall and where, evenness; print it.
 
-        They are those of the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
+        They belong to the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
 
         Args:
             state: default the last.

@@ -62,7 +62,7 @@ class Points:
         return self._in_order(response.stress(self._stretches, list(constants)))
 
     def modulus(self) -> float:
-        """Return the median of the stresses over those of a neo-Hookean body of unit modulus, stress."""
+        """Return the median ratio of the stresses to a neo-Hookean body of unit modulus, stress."""
         l1, l2 = self._stretches
         with np.errstate(divide="ignore"):
             shape = self._in_order(np.stack([l1 - 1 / (l1**3 * l2**2), l2 - 1 / (l2**3 * l1**2)]))

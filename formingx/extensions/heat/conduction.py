@@ -36,7 +36,7 @@ _MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants b
 class Stage(NamedTuple):
     """Result of an implicit stage: changes of T and of the lines of each touch, and the rates there.
 
-    changes, rates: [of T, owned part, shape (n,), then of each touch, shape (its nodes, m)]; rates are those of heat,
+    changes, rates: [of T, owned part, shape (n,), then of each touch, shape (its nodes, m)]; rates of heat,
     M dT/dt. heats: rate of heat through each boundary and source, of the whole body.
     """
 

@@ -12,7 +12,7 @@ from ...values.temperature import FunctionOfTemperature
 class ThermalExpansion:
     """The volume ratio J_T(T) at which a material has no stress, alike in all directions.
 
-    F = J_T^(1/3) F_e: the energy and the constraint are those of F_e, so det F = J_T where the volume is kept, and the
+    F = J_T^(1/3) F_e: the energy and the constraint depend on F_e, so det F = J_T where the volume is kept, and the
     isochoric part is that of F (Lu and Pister, Int. J. Solids Struct. 11 (1975) 927).
 
     Args:

@@ -2,7 +2,7 @@
 
 Heat has gone sqrt(a t) deep by a time t (a: diffusivity), and elements must be smaller than that there. A layer at a
 depth y below such a face is a given part of max(that depth at the first time of interest, y/3) thick, so that later
-profiles, which are deeper, are met as well. Edges are cut, those that neighbours share for both; triangles are cut
+profiles, which are deeper, are met as well. Edges are cut, shared edges for both neighbours; triangles are cut
 into rows between the cuts of their edges, in the shape of the element that they are part of.
 """
 
@@ -71,7 +71,7 @@ def _along(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return {ends of an edge, that of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
+    """Return {ends of an edge, the end of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
 
     points: where nodes are, for depths, shape (n, 2).
     """

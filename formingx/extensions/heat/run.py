@@ -90,7 +90,8 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """{boundary: depths that heat has gone at the first and the last time of interest}, of those that heat passes."""
+    """{boundary: depths that heat has gone at the first and the last time of interest}, for boundaries that heat
+    passes."""
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
     first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))

@@ -37,9 +37,9 @@ _STRAIN = 0.25
 class KBKZ(Relaxing):
     """The factorised K-BKZ equation, the body in the reference configuration before.
 
-    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h times
-    that of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material stores no
-    energy that the state alone would tell, so runs with it have no columns of energies.
+    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h
+    times the stress of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material
+    stores no energy that the state alone would tell, so runs with it have no columns of energies.
 
     Args:
         spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.

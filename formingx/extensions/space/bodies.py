@@ -1,7 +1,7 @@
 """The bodies of a closed surface of triangles: which triangles hang together, and which bodies may be looked at as one.
 
-Where bodies overlap, each has faces inside the other, to which a distance means nothing: that of their union is the
-largest of theirs (positive inside), exact outside. So each body that may overlap another is looked at by itself.
+Where bodies overlap, each has faces inside the other, to which a distance means nothing: the distance of their union
+is the largest (positive inside), exact outside. So each body that may overlap another is looked at by itself.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
 
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
-    """Numbers of the triangles of each body: those that hang together by edges, around an edge those of one wedge."""
+    """Numbers of the triangles of each body: triangles connected by edges; around an edge the triangles of one
+    wedge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n = len(triangles)

@@ -80,7 +80,7 @@ class LaggedStick:
         return np.zeros(len(x), dtype=bool) if old is None else self.held(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`; those of the last few states are kept."""
+        """See `ContactLaw`; results of the last few states are kept."""
         for at, found in self._found:
             if np.array_equal(at, x):
                 return found

@@ -26,7 +26,8 @@ class PartInSpace(PartNumbers):
         draw_ratio: area over that in the reference configuration; mean_wall: volume/area.
         min_wall: length; min_wall_at: (x, y, z) where; min_wall_reference: (x, y) where it was on the flat sheet.
         uniformity: minimum over mean wall; variation: standard deviation of the wall over the surface, over its mean.
-        weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over that of the sheet.
+        weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over the volume of
+            the sheet.
         wrinkled: share of the area in the reference configuration that is in compression.
         basis: what volume, area and weight are given for, as text; "" of a part that was modelled as a whole.
         units: of the labels.

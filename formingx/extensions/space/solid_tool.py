@@ -214,8 +214,8 @@ class Triangulated(SolidTool):
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
         """Compute undercuts and draft of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
 
-        Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of those that look
-        against the direction, and the smallest angle of the others to it (90: a floor).
+        Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of faces
+        that look against the direction, and the smallest angle of the others to it (90: a floor).
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)
@@ -262,7 +262,8 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
     Args:
         half: half widths along x and y at the mouth (of a plug: at its upper end), length.
         depth: from the mouth down to the floor; mouth: its z.
-        corner: radius in plan at the mouth; with draft that of the floor is less, and must not be below `fillet`.
+        corner: radius in plan at the mouth; with draft the radius at the floor is smaller, and must not be below
+            `fillet`.
         fillet, lip: radii between wall and floor, and wall and flange (of a plug none).
         draft: angle between wall and z axis, degrees.
         plug: the solid is inside, and goes up from there.

@@ -171,8 +171,8 @@ class WallInSpace(Sheet):
         return found
 
     def to_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Values of triangles, shape (m,), as those of nodes, (n,): means over those around, by their areas in the
-        reference configuration."""
+        """Average values of triangles, shape (m,), to nodes, (n,): means over the triangles around, by their areas
+        in the reference configuration."""
         total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
         np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
         np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))

@@ -1,6 +1,6 @@
 """Stresses and stretches of a state, layer by layer: nothing is smeared over an interface.
 
-P = d(energy density)/dF, the energy being that of `solid`: material and volume term; S = F^-1 P; Cauchy stress
+P = d(energy density)/dF, the energy of `solid`: material and volume term; S = F^-1 P; Cauchy stress
 sigma = F S F^T / J. F and S are projected (L2) on piecewise linear fields, one for each layer; all else follows from
 them point by point. (S does not turn with the sheet: projecting sigma instead would spoil the small stress normal to
 an inflated sheet with the large one along it.)

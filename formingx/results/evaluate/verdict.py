@@ -34,7 +34,7 @@ class Limits:
             flat.
         small: of arc length: half of a difference quotient.
         felt: penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet.
-        thinnest: the largest pole stretch; that of a wall that is not above 0 is 1e150.
+        thinnest: the largest pole stretch; it is 1e150 for a wall that is not above 0.
         pulls: force by which a tool without friction is pulled, over the forces that press on it.
     """
 

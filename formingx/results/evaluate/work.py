@@ -269,7 +269,7 @@ class Ledger:
     def _warmed(self, a: Any, b: Any) -> float:
         """Return the stored energy that comes with the temperature, by the trapezium rule: the body as it was, and
         as it is."""
-        cold, warm = a.memory[-1], b.memory[-1]        # that of the temperature is last
+        cold, warm = a.memory[-1], b.memory[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
             still = temperature._replace(before=None)                         # it does not continue from there

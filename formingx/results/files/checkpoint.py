@@ -323,7 +323,7 @@ def _by_cell(space: Any, own: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
-    """Own unknowns, without those that belong to no cell, of the result of `_by_cell`."""
+    """Locally owned unknowns of cells, of the result of `_by_cell`."""
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]
