@@ -102,8 +102,8 @@ class StepLimit:
     @property
     def only_sticks(self) -> bool:
         """True if all contacts with friction stick: then sliding never ends a path, and short steps go on."""
-        rough = [approach.face for approach in self.present if approach.face.law.has_friction]
-        return bool(rough) and all(face.contact.sticks and not face.contact.lagged for face in rough)
+        coarse = [approach.face for approach in self.present if approach.face.law.has_friction]
+        return bool(coarse) and all(face.contact.sticks and not face.contact.lagged for face in coarse)
 
     @property
     def predicts_events(self) -> bool:

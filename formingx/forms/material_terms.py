@@ -147,9 +147,9 @@ class MaterialTerms:
         """{name: internal variable at the end of the step (UFL)}."""
         found = self.material.updated(F, self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}
-        wanted = {name: np.shape(value) for name, value in self.material.internal.items()}
-        if shapes != wanted:
-            raise InputError(f"{self.material}: updated must return the internal variables {wanted}, by shape; it"
+        requested = {name: np.shape(value) for name, value in self.material.internal.items()}
+        if shapes != requested:
+            raise InputError(f"{self.material}: updated must return the internal variables {requested}, by shape; it"
                              f" returns {shapes}")
         return found
 

@@ -32,7 +32,7 @@ class Table(NamedTuple):
     units: dict[str, str | None]
     kinds: list[str] | None = None
 
-    def take(self, column: str, wanted: float | str | None = None) -> np.ndarray:
+    def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
         """Return a column times a factor (a number), or in a unit (its name; the header must state its own).
 
         Raises:
@@ -43,35 +43,35 @@ class Table(NamedTuple):
         if not np.all(np.isfinite(values)):
             row = int(np.argmin(np.isfinite(values))) + 1
             raise InputError(f"{self.name}: column {column!r}: row {row} of the data is empty or not a finite number")
-        if wanted is None:
+        if requested is None:
             if unit is not None:
                 raise InputError(f"{self.name}: column {column!r} is in {unit!r}: give units=..., a factor or the"
                                  f" unit of the other side")
             return values
-        if not isinstance(wanted, str):
-            return values * positive(f"units of {column!r}", wanted)
+        if not isinstance(requested, str):
+            return values * positive(f"units of {column!r}", requested)
         if unit is None:
             raise InputError(f"{self.name}: the header does not state the unit of column {column!r} (as in"
-                             f" '{column} [{wanted}]'): give a factor instead of {wanted!r}")
-        return values * conversion(unit, wanted)
+                             f" '{column} [{requested}]'): give a factor instead of {requested!r}")
+        return values * conversion(unit, requested)
 
 
-def conversion(unit: str, wanted: str) -> float:
+def conversion(unit: str, requested: str) -> float:
     """Return the number of `wanted` units in one `unit`.
 
     Raises:
         InputError: a unit is not known, or they are of different kinds.
     """
-    if unit == wanted:
+    if unit == requested:
         return 1.0
     for sizes in UNITS.values():
-        if unit in sizes and wanted in sizes:
-            return sizes[unit] / sizes[wanted]
+        if unit in sizes and requested in sizes:
+            return sizes[unit] / sizes[requested]
     names = [name for sizes in UNITS.values() for name in sizes]
-    for name in (unit, wanted):
+    for name in (unit, requested):
         if name not in names:
             raise InputError(f"unit {name!r} is not known; known: {', '.join(names)}; or give a factor")
-    raise InputError(f"{unit!r} cannot be turned into {wanted!r}: they measure different things")
+    raise InputError(f"{unit!r} cannot be turned into {requested!r}: they measure different things")
 
 
 def read(file: Any) -> Table:

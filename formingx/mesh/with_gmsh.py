@@ -17,11 +17,11 @@ def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any
     mine = not gmsh.isInitialized()
     if mine:
         gmsh.initialize(interruptible=False)
-    wanted = {**_DEFAULTS, **(options or {})}
-    before = {option: gmsh.option.getNumber(option) for option in wanted}
+    requested = {**_DEFAULTS, **(options or {})}
+    before = {option: gmsh.option.getNumber(option) for option in requested}
     current = gmsh.model.getCurrent()
     try:
-        for option, value in wanted.items():
+        for option, value in requested.items():
             gmsh.option.setNumber(option, value)
         gmsh.model.add(name)
         yield gmsh

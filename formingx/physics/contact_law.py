@@ -217,11 +217,11 @@ class NormalLaw:
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        near, none = self.nearest(x), np.zeros(len(x))
+        near, zero = self.nearest(x), np.zeros(len(x))
         n, t, at = near.normal, near.tangent, near.distance if expected is None else expected.distance
         F, slope = self.ramp(at)
         N = self.k * (F + slope * (near.distance - at))
-        return Tractions(N[:, None] * n, N, none, none, lambda: outer(n, (self.k * slope)[:, None] * n)
+        return Tractions(N[:, None] * n, N, zero, zero, lambda: outer(n, (self.k * slope)[:, None] * n)
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:

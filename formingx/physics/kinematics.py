@@ -120,9 +120,9 @@ class Axisymmetric(Kinematics):
         """Along the axis and about it (n = 0); across it and tilting it (n = 1)."""
         def mode(*components):
             return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)
-        none, element = (lambda r, z: 0 * r), (lambda r, z: 1 + 0 * r)
-        return {0: [mode(none, element, none), mode(none, none, lambda r, z: r)],
-                1: [mode(element, none, lambda r, z: -1 + 0 * r),
+        zero, unit = (lambda r, z: 0 * r), (lambda r, z: 1 + 0 * r)
+        return {0: [mode(zero, unit, zero), mode(zero, zero, lambda r, z: r)],
+                1: [mode(unit, zero, lambda r, z: -1 + 0 * r),
                     mode(lambda r, z: z, lambda r, z: -r, lambda r, z: -z)]}.get(number, [])
 
 

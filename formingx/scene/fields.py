@@ -107,9 +107,9 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
         k = int(np.argmax(high - low))
         raise InputError(f"{table.name}: two temperatures, {low[k]:.6g} and {high[k]:.6g}, at"
                          f" {' and '.join('RZ'[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in at[k])}")
-    wanted, spans = points[:, axes], np.ptp(at, axis=0)
+    requested, spans = points[:, axes], np.ptp(at, axis=0)
     if len(axes) == 1:
-        x, near = wanted[:, 0], 1e-9 * spans[0]
+        x, near = requested[:, 0], 1e-9 * spans[0]
         _inside(table.name, points, names, (x >= at[0, 0] - near) & (x <= at[-1, 0] + near))
         return np.interp(x, at[:, 0], low)
     if spans.min() <= 1e-9 * spans.max():
@@ -117,7 +117,7 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
         raise InputError(f"{table.name}: all its points have the same {name}, and the body is not flat: leave the"
                          f" column {name} out if the temperature is the same along it")
     centre = at.mean(0)
-    inner = centre + (wanted - centre) * (1 - 1e-9)         # a point on the outline is inside
+    inner = centre + (requested - centre) * (1 - 1e-9)         # a point on the outline is inside
     try:
         found = LinearNDInterpolator(at / spans, low)(inner / spans)
     except QhullError:

@@ -202,10 +202,10 @@ class _ModifiedNewton:
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0
 
-    def keeps(self, residual: float, wanted: float) -> bool:
+    def keeps(self, residual: float, requested: float) -> bool:
         """Return True if the tangent is kept for the next iteration, from this residual to the one wanted."""
         ahead = residual * self._fall**self._settings.chords
-        return self._allowed and self._fall < self._settings.slow and ahead < wanted
+        return self._allowed and self._fall < self._settings.slow and ahead < requested
 
     def took(self, chord: bool, fall: float) -> None:
         """Note the factor of the residual in an iteration, with an old tangent or a new one."""

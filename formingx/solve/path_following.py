@@ -65,12 +65,12 @@ class Run:
     settings = PathFollowing()
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
-                 at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "", wanted: Any = None):
+                 at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "", requested: Any = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
         self._limit_rule = at_limit_point or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
-        self.aim = Aim(self.curve, targets, wanted)
+        self.aim = Aim(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
         self._ahead = self.settings.snap_through.ahead      # the amount by which the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped reached rest nowhere
@@ -233,9 +233,9 @@ class Run:
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
                 self._failed(failure.reason, self.step.length)
                 self._way = self._way._replace(events=None if failed > 1 else self._way.events)
-                soon = (self._jumps_soon and failed > 1 and length < lengths[0]
+                early = (self._jumps_soon and failed > 1 and length < lengths[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
-                if self._may_jump and (not good or soon):
+                if self._may_jump and (not good or early):
                     lengths.pop(0)
                     for ahead in (reach,) if good else (last, 0.0):
                         with contextlib.suppress(Failure):

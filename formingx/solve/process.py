@@ -140,7 +140,7 @@ class Execution:
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
-    def _trace(self, targets: _Targets, control: float | None, wanted: Target | None = None) -> _Targets:
+    def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
         """Follow the path from a control (None: on from the last state); returns the targets that are still open.
 
         wanted: one that ends it as the last of them does.
@@ -149,7 +149,7 @@ class Execution:
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
             held = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
             step = step or (_HELD if held else _IN_TIME)     # a piece that has begun continues with its own steps
-        run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, wanted)
+        run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, requested)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.aim.open
@@ -256,10 +256,10 @@ class Execution:
             if self.record.last.control < 1.0:
                 self._take_up(replace(self.record.last, control=1.0, kind="target", measures={}, history=[]))
             return through
-        target, wanted = process_time(then), self._stage.until if self._stage.waits else None
-        left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, wanted)
+        target, requested = process_time(then), self._stage.until if self._stage.waits else None
+        left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, requested)
         for waited, bound in left:
-            if waited is wanted and not self.record.ended:
+            if waited is requested and not self.record.ended:
                 last = self.record.last
                 raise ConvergenceError(f"{self._stage.who}: {waited} was not reached within its duration of"
                                        f" {self._stage.duration:g}: it is"

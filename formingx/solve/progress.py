@@ -28,11 +28,11 @@ class Aim:
 
     patience = 500
 
-    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]], wanted: Target | None = None):
+    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]], requested: Target | None = None):
         self._curve, self.open, self._best = curve, list(targets), 0.0
         self.until, self.measure = self.open[-1]
         self.values: list[float] = []
-        self._ends = [target for target in (self.until, wanted) if target is not None]
+        self._ends = [target for target in (self.until, requested) if target is not None]
 
     @property
     def of_control(self) -> bool:

@@ -115,9 +115,9 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(faces, axis=1), axis=2).mean(0))])
     joints = s[::_SAMPLES]
     length = np.diff(joints)
-    wanted = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
+    requested = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
     away = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
-    size = (wanted + _GROWTH * away).min(1)
+    size = (requested + _GROWTH * away).min(1)
     number = np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
     if number[-1] > _MOST:
         raise InputError(f"adapted: share and error ask for {number[-1]:.3g} elements along the sheet, at most {_MOST}"

@@ -124,8 +124,8 @@ class _Segment(NamedTuple):
         more = m - len(self.status)
         if not more:
             return self
-        none = np.zeros((more, self.force.shape[1]))
-        grown = {name: np.concatenate([getattr(self, name), none])
+        blank = np.zeros((more, self.force.shape[1]))
+        grown = {name: np.concatenate([getattr(self, name), blank])
                  for name in ("place", "force", "rate", "extra", "growth")}
         return self._replace(status=np.append(self.status, np.full(more, ContactStatus.FREE)), **grown)
 
@@ -158,8 +158,9 @@ class ContactEventSequence:
                          for face, free in zip(faces, self._free)]
         self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
-        none = np.zeros((0, start[0].shape[1]))
-        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), none, none, none, none, none,
+        blank = np.zeros((0, start[0].shape[1]))
+        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), blank, blank, blank, blank,
+                                 blank,
                                (np.zeros(len(x)), 0.0))]
         self._end: _Segment | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # arrivals that are held; see `EventSettings.work`
@@ -323,7 +324,7 @@ class ContactEventSequence:
 
     def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
         """Return the closure of a point near an arc length, from the positions `at` of the points."""
-        told = None
+        listener = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
             law, by = face.law.part([i]), 0.0
@@ -334,9 +335,9 @@ class ContactEventSequence:
                     break
                 by = max(by - gap / rate, self._pieces[-1].begins - time)
                 near = law.nearest(x + by * w)
-            told = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
+            listener = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
                            bool(np.isinf(np.ravel(law.friction)[0])))
-        return self._comm.bcast(told, root=rank)
+        return self._comm.bcast(listener, root=rank)
 
     def _settle(self, length: float) -> bool:
         """Equilibrate the path at the last closure, and relocate the closure; return False on failure."""

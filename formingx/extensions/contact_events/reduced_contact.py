@@ -126,9 +126,9 @@ class Points:
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
         whole = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * one,
-                                         face.law.elastic_slip * one, face.scale, face.law.pulls * one])
-                        for face, one in zip(self._faces, whole)], new)
+        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * entry,
+                                         face.law.elastic_slip * entry, face.scale, face.law.pulls * entry])
+                        for face, entry in zip(self._faces, whole)], new)
         friction, slip, scale, pulls = more.T
         self.friction = np.append(self.friction, np.where(friction < _SEARCH.rough, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
@@ -137,11 +137,11 @@ class Points:
         self._S = np.concatenate([self._S, known * touched])
         return True
 
-    def at(self, values: Sequence[np.ndarray], who: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
+    def at(self, values: Sequence[np.ndarray], caller: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
         """Return values at these points on all ranks, shape (m, ...), from the owned points of the faces."""
-        who = self.who if who is None else who
-        found = np.zeros((len(who), *values[0].shape[1:]))
-        for k, (rank, f, i) in enumerate(who):
+        caller = self.who if caller is None else caller
+        found = np.zeros((len(caller), *values[0].shape[1:]))
+        for k, (rank, f, i) in enumerate(caller):
             if rank == self._comm.rank:
                 found[k] = values[f][i]
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
@@ -304,14 +304,14 @@ class Points:
         size, held = len(free), status != ContactStatus.FREE
         sticks = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction > 0))
         slides = np.setdiff1d(np.flatnonzero(held), sticks)
-        rows, columns, wanted, c = [], [], [], self._components
+        rows, columns, requested, c = [], [], [], self._components
         for way in (near.normal, near.tangent):
             row = np.zeros((len(sticks), size))
             for i in range(c):
                 row[np.arange(len(sticks)), c * sticks + i] = way[sticks, i]
             rows.append(row)
             columns.append(row.T)
-            wanted.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
+            requested.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
         mu = np.where(self.friction < np.inf, self.friction, 0.0)
         force = near.normal + (mu * status)[:, None] * near.tangent
         into, against = np.zeros((len(slides), size)), np.zeros((size, len(slides)))
@@ -319,7 +319,7 @@ class Points:
             into[np.arange(len(slides)), c * slides + i] = near.normal[slides, i]
             against[c * slides + i, np.arange(len(slides))] = force[slides, i]
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
-        a = np.concatenate([*wanted, np.zeros(len(slides)) if to is None else near.beyond[slides]])
+        a = np.concatenate([*requested, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
         stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _SEARCH.none * np.abs(gives).max(initial=0.0))
         gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves

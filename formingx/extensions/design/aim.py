@@ -42,11 +42,11 @@ class Search:
 SEARCH = Search()
 
 
-def lack(what: str, wanted: float | None, found: float) -> str:
+def lack(what: str, requested: float | None, found: float) -> str:
     """Return the target and the value found, as text, if the target was missed; else ""."""
-    if wanted is None or abs(found / wanted - 1) < SEARCH.kept:
+    if requested is None or abs(found / requested - 1) < SEARCH.kept:
         return ""
-    return f"the {what} that was asked for, {wanted:.5g}, was not reached: {found:.5g}"
+    return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
 
 
 class WallTarget:
@@ -86,11 +86,11 @@ class WallTarget:
         """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
         by = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
-        wanted = wall.mean() if self.wanted is None else self.wanted
-        left = wall / wanted - 1
-        slopes = by / np.reshape(wanted, (-1, 1))
+        requested = wall.mean() if self.wanted is None else self.wanted
+        left = wall / requested - 1
+        slopes = by / np.reshape(requested, (-1, 1))
         if self.wanted is None:
-            slopes -= np.outer(wall / wanted**2, by.mean(0))
+            slopes -= np.outer(wall / requested**2, by.mean(0))
         return self._with_volume(run, left, slopes)
 
     def _with_volume(self, run: DesignRun, left: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -126,7 +126,7 @@ class Answer:
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
         lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
-        lines += [f"no effect: {', '.join(none)}" for none in [self.without_effect()] if none]
+        lines += [f"no effect: {', '.join(absent)}" for absent in [self.without_effect()] if absent]
         lines += [f"the best run: {found.text}" for found in alarming(self.best.path.findings())]
         return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
 

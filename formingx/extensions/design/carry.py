@@ -58,10 +58,10 @@ class _StateTransfer:
         self._plans = [] if self._single else [plan(self.problem.scene, stage) for stage in end]
         self._end = end
         self._until: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
-        for one in neighbours:
-            one.plans = [] if self._single else [plan(one.problem.scene, stage) for stage in one.end]
-            if [_kind(p) for p in one.plans] != [_kind(p) for p in self._plans]:
-                raise Failure(f"parameter {one.name} changes what the stages drive or how they end", [])
+        for entry in neighbours:
+            entry.plans = [] if self._single else [plan(entry.problem.scene, stage) for stage in entry.end]
+            if [_kind(p) for p in entry.plans] != [_kind(p) for p in self._plans]:
+                raise Failure(f"parameter {entry.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
         """Carry the perturbed runs from the first state to the last."""
@@ -87,8 +87,8 @@ class _StateTransfer:
             elif last or history:
                 self._settle(state, before, last)
             if history:
-                for one in self.neighbours:
-                    one.problem.advance(one.x, one.control)
+                for entry in self.neighbours:
+                    entry.problem.advance(entry.x, entry.control)
                 self._put_on_tools(state)
             before = state
         if states[-1].met is None:
@@ -96,8 +96,8 @@ class _StateTransfer:
 
     def _begin(self, state: State) -> None:
         """Set up the first state: the undeformed body, or the body in equilibrium with its loads."""
-        for one in self.neighbours:
-            one.x, one.control = state.x.copy(), state.control
+        for entry in self.neighbours:
+            entry.x, entry.control = state.x.copy(), state.control
         self._late: list[np.ndarray] = []
         self._beside = state
         if np.any(state.x):
@@ -107,27 +107,27 @@ class _StateTransfer:
 
     def _enter(self, setting: Setting) -> None:
         """Begin a stage in each perturbed run from its current state."""
-        for one in self.neighbours:
-            problem, p = one.problem, one.plans[setting.stage]
+        for entry in self.neighbours:
+            problem, p = entry.problem, entry.plans[setting.stage]
             now = problem.setting
-            standing = one.x is not None
+            standing = entry.x is not None
             amplitudes = [0.0] * len(now.base) if not standing else [
-                *now.standing(one.control)[:-1], problem.time_at(one.control)]
-            x = one.x if standing else np.zeros(problem.x.getLocalSize())
+                *now.standing(entry.control)[:-1], problem.time_at(entry.control)]
+            x = entry.x if standing else np.zeros(problem.x.getLocalSize())
             if standing:
                 for number in set(now.off) - set(setting.off):
-                    problem.bring_in(number, x, one.control)
+                    problem.bring_in(number, x, entry.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
-                time = now.base[-1] + now.rate[-1] * one.control if standing else 0.0
+                time = now.base[-1] + now.rate[-1] * entry.control if standing else 0.0
                 then = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
                 base, rate = straight(amplitudes, problem.scales, p.tables, time, then)
-                one.then, control = then, 0.0
+                entry.then, control = then, 0.0
             else:
                 base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=not p.in_flow)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
-            one.control = control
+            entry.control = control
 
     def _settle(self, state: State, before: State, last: bool) -> None:
         """Solve for the perturbed runs at a converged state of the base run."""
@@ -136,13 +136,13 @@ class _StateTransfer:
             for number, face in enumerate(self.problem.contacts):
                 self._late.append(self._arrivals(number, face, state, before))
             self._leave_out(state)
-            for one in self.neighbours:                      # the perturbed runs keep the events of the base run
-                one.x = state.x + (one.x - self._beside.x)
-                one.control = state.control + (one.control - self._beside.control)
+            for entry in self.neighbours:                      # the perturbed runs keep the events of the base run
+                entry.x = state.x + (entry.x - self._beside.x)
+                entry.control = state.control + (entry.control - self._beside.control)
             equation, equations = self._equations(state, last)
             left_over = settle(self.curve, state, self.neighbours, equation, equations)
-            for one in self.neighbours if state is self.path.last else []:
-                one.balance(left_over)
+            for entry in self.neighbours if state is self.path.last else []:
+                entry.balance(left_over)
             self._beside = state
             b = self.curve.newton.b.array_r
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
@@ -151,7 +151,7 @@ class _StateTransfer:
         """Keep points open in the perturbed runs that are open in the base run at the end of the step."""
         n = self.problem.n_owned
         for face, late, *others in zip(self.problem.contacts, self._late,
-                                       *(one.problem.contacts for one in self.neighbours)):
+                                       *(entry.problem.contacts for entry in self.neighbours)):
             if face.present:
                 face.leave_out(late)
                 free = ~face.law.touching(face.positions(state.x[:n], state.control), face.touch)
@@ -161,9 +161,9 @@ class _StateTransfer:
     def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Place the perturbed points whose gap closes in a step; return the mask of closures at its end, shape (n,)."""
         touch, law, n = face.touch, face.law, self.problem.n_owned
-        none = np.zeros(len(face.points), dtype=bool)
+        zero = np.zeros(len(face.points), dtype=bool)
         if touch is None or not law.has_friction or not face.present:
-            return none
+            return zero
         distance = law.distance(face.positions(state.x[:n], state.control))
         arrived = (touch.distance <= -law.theta) & (distance > -law.theta)
         late = arrived & (np.isnan(touch.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
@@ -172,10 +172,10 @@ class _StateTransfer:
         early = np.flatnonzero(arrived & ~late)
         if len(early):
             gap = law.part(early).distance(touch.arrival[early])
-        for one in self.neighbours:
-            mine, arrival = one.problem.contacts[number], touch.arrival.copy()
+        for entry in self.neighbours:
+            mine, arrival = entry.problem.contacts[number], touch.arrival.copy()
             if len(early):
-                there = mine.positions(one.x[:n], one.control)[early] + touch.arrival[early] - start[early]
+                there = mine.positions(entry.x[:n], entry.control)[early] + touch.arrival[early] - start[early]
                 arrival[early] = _onto(mine.law.part(early), there, velocity[early], gap)
             mine.expect_arrivals(arrival)
         return late
@@ -193,8 +193,8 @@ class _StateTransfer:
             free = run.touch.distance <= -face.law.theta
             late = np.flatnonzero(self._late[number] if self._late else 0 * free)
             free[late] = True
-            for one in self.neighbours:
-                mine = one.problem.contacts[number]
+            for entry in self.neighbours:
+                mine = entry.problem.contacts[number]
                 memory = mine.get()
                 assert memory is not None
                 touch = memory.touch._replace(distance=run.touch.distance,
@@ -202,11 +202,12 @@ class _StateTransfer:
                 if len(late):
                     touch = touch._replace(position=touch.position.copy())
                     touch.position[late] = _onto(
-                        mine.law.part(late), mine.positions(one.x[:n], one.control)[late], self._velocity[number][late],
+                        mine.law.part(late), mine.positions(entry.x[:n], entry.control)[late],
+                        self._velocity[number][late],
                         run.touch.distance[late])
                 mine.put(memory._replace(touch=touch, arrived=run.arrived))
-        for one in self.neighbours:
-            one.memory = one.problem.memory
+        for entry in self.neighbours:
+            entry.memory = entry.problem.memory
         self._late = []
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
@@ -221,14 +222,14 @@ class _StateTransfer:
         key = (setting.stage, setting.piece)
         p = None if self._single else self._plans[setting.stage]
         if p is not None and p.by_time and not p.stage.waits:
-            return fixed(state.control), [fixed((one.then - one.problem.setting.base[-1])
-                                                / one.problem.setting.rate[-1]) for one in self.neighbours]
+            return fixed(state.control), [fixed((entry.then - entry.problem.setting.base[-1])
+                                                / entry.problem.setting.rate[-1]) for entry in self.neighbours]
         if p is not None and p.in_flow:
             raise Failure("there is none yet for a stage that follows or holds a measure", [])
         if key not in self._until:
             targets = [(self.problem, self._end if p is None else p.stage.until),
-                       *((one.problem, one.end if p is None else one.plans[setting.stage].stage.until)
-                         for one in self.neighbours)]
+                       *((entry.problem, entry.end if p is None else entry.plans[setting.stage].stage.until)
+                         for entry in self.neighbours)]
             mine, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
             self._until[key] = mine, others
         target = self._end if p is None else p.stage.until
@@ -245,7 +246,7 @@ class _StateTransfer:
             if max(most) > 0:
                 mine = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
                 return _gap(self.problem, face, mine, True), [
-                    _gap(one.problem, one.problem.contacts[number], mine, False) for one in self.neighbours]
+                    _gap(entry.problem, entry.problem.contacts[number], mine, False) for entry in self.neighbours]
         return None, []
 
 

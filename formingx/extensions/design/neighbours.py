@@ -159,11 +159,11 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
     left_over = newton.F.array_r.copy()                      # round-off, and the forces of points kept open
 
     def constraint(k: int) -> float:
-        one = neighbours[k]
+        entry = neighbours[k]
         if equation is None:
-            return float(problem.comm.allreduce(float(g @ (one.x - state.x))) + by_control * (
-                one.control - state.control))
-        return one.constraint(equations[k]) - kept
+            return float(problem.comm.allreduce(float(g @ (entry.x - state.x))) + by_control * (
+                entry.control - state.control))
+        return entry.constraint(equations[k]) - kept
     size = _norm(problem, state.x) + abs(state.control)
     enough = _TOLERANCES.enough_in_contact if problem.has_kinks else _TOLERANCES.enough
     todo, first = list(range(len(neighbours))), np.full(len(neighbours), np.inf)
@@ -173,25 +173,25 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
         if len(todo) > 1:
             dx = -newton.solver.solve_all(rows)
         else:
-            one = neighbours[todo[0]]
-            newton.solver.solve(one.F, one.gradient)
-            dx = -one.gradient.array_r[:, None]
+            entry = neighbours[todo[0]]
+            newton.solver.solve(entry.F, entry.gradient)
+            dx = -entry.gradient.array_r[:, None]
         steps = -(left + problem.comm.allreduce(g @ dx)) / slope
         dx += np.outer(b, steps)
         good = True
         for j, k in enumerate(todo):
-            one = neighbours[k]
+            entry = neighbours[k]
             correction = _norm(problem, dx[:, j]) + abs(steps[j])
             if iteration != 1:                               # this iteration only checks one of them: update none
-                one.x, one.control = one.x + dx[:, j], one.control + steps[j]
-            away = _norm(problem, one.x - state.x) + abs(one.control - state.control)
+                entry.x, entry.control = entry.x + dx[:, j], entry.control + steps[j]
+            away = _norm(problem, entry.x - state.x) + abs(entry.control - state.control)
             if not np.isfinite(correction):
-                raise PerturbedRunFailure(f"with {one.name} a little changed no state is found near", [])
+                raise PerturbedRunFailure(f"with {entry.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
             good &= correction <= max(enough * away, _TOLERANCES.none * size)
             if iteration == _TOLERANCES.iterations - 1 and correction > max(_TOLERANCES.good * away,
                                                                             10 * _TOLERANCES.none * size):
-                raise PerturbedRunFailure(f"with {one.name} a little changed no state is found near", [])
+                raise PerturbedRunFailure(f"with {entry.name} a little changed no state is found near", [])
         if good:
             break
         # the error is now of second order: if the most corrected run has converged, so have the others

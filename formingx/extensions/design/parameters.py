@@ -119,15 +119,15 @@ class Parameters:
             raise InputError("Design: parameters: must be {name: (start, low, high) or fx.spline(...)}, at least one")
         self._given: dict[str, Spline] = {}
         self.names: list[str] = []
-        for name, one in given.items():
+        for name, entry in given.items():
             if not isinstance(name, str):
                 raise InputError(f"Design: parameter {name!r}: must be a name")
-            self._given[name] = one = one if isinstance(one, Spline) else _number(name, one)
-            self.names += [f"{name}[{k}]" for k in range(len(one.start))] if one.profile else [name]
+            self._given[name] = entry = entry if isinstance(entry, Spline) else _number(name, entry)
+            self.names += [f"{name}[{k}]" for k in range(len(entry.start))] if entry.profile else [name]
         all_of = list(self._given.values())
-        self.start = np.concatenate([one.start for one in all_of])
-        self.low = np.concatenate([np.full(len(one.start), one.low) for one in all_of])
-        self.high = np.concatenate([np.full(len(one.start), one.high) for one in all_of])
+        self.start = np.concatenate([entry.start for entry in all_of])
+        self.low = np.concatenate([np.full(len(entry.start), entry.low) for entry in all_of])
+        self.high = np.concatenate([np.full(len(entry.start), entry.high) for entry in all_of])
         width = self.high - self.low
         self.size = np.where(np.isfinite(width) & (width > 0), width, np.where(self.start != 0, abs(self.start), 1.0))
 
@@ -137,13 +137,13 @@ class Parameters:
     @property
     def profiles(self) -> dict[str, tuple[float, float]]:
         """Bounds of the profiles, by name."""
-        return {name: (one.low, one.high) for name, one in self._given.items() if one.profile}
+        return {name: (entry.low, entry.high) for name, entry in self._given.items() if entry.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
         """Return the arguments of the user's function."""
-        parts = np.split(vector, np.cumsum([len(one.start) for one in self._given.values()])[:-1])
-        return {name: Knots(part, one.smooth) if one.profile else float(part[0])
-                for (name, one), part in zip(self._given.items(), parts)}
+        parts = np.split(vector, np.cumsum([len(entry.start) for entry in self._given.values()])[:-1])
+        return {name: Knots(part, entry.smooth) if entry.profile else float(part[0])
+                for (name, entry), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
         """Return the numbers for values of some parameters, the others at their start, shape (n,).
@@ -155,14 +155,14 @@ class Parameters:
         for name in values:
             if name not in self._given:
                 raise InputError(f"Design: parameter {name!r} is not known; known: {', '.join(self._given)}")
-        for name, one in self._given.items():
-            n = len(one.start)
+        for name, entry in self._given.items():
+            n = len(entry.start)
             if name in values:
                 given = values[name]
                 given = given.values if isinstance(given, Knots) else np.atleast_1d(given)
                 if given.shape not in ((n,), (1,)):
                     raise InputError(f"Design: {name} = {values[name]!r}: must be {n} number{'s' * (n > 1)}")
-                given = [finite(f"Design: {name}", one) for one in given.tolist()]
+                given = [finite(f"Design: {name}", entry) for entry in given.tolist()]
                 found[first: first + n] = given
             first += n
         return found

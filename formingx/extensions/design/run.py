@@ -136,7 +136,7 @@ class DesignRun:
                 ways = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
                 made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
             try:
-                carry(self.path, self._end, [one for beside, _ in made for one in beside])
+                carry(self.path, self._end, [entry for beside, _ in made for entry in beside])
             except PerturbedRunFailure as failure:
                 reason = failure.reason
             except Failure as failure:
@@ -171,7 +171,7 @@ class DesignRun:
         """
         here, by = self._here(measure), []
         for beside, apart in self._neighbours:
-            first, *other = (np.atleast_1d(self._at(one, measure)) for one in beside)
+            first, *other = (np.atleast_1d(self._at(entry, measure)) for entry in beside)
             by.append((first - (other[0] if other else here)) / apart)
         return here, np.stack(by, axis=-1)
 
@@ -264,17 +264,17 @@ class DesignRun:
                              " earlier states too, whose derivatives are not kept")
         return whole
 
-    def _at(self, one: PerturbedRun, measure: Any) -> Any:
+    def _at(self, entry: PerturbedRun, measure: Any) -> Any:
         if measure == "volume":
-            return _volume(one.problem)
-        state = one.state(self.path.last)
+            return _volume(entry.problem)
+        state = entry.state(self.path.last)
         if measure == "wall":
-            mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, one.problem))
+            mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, entry.problem))
             same = self.path.problem.comm.allreduce(np.array_equal(mine, its), MPI.LAND)
-            return (self._profiles if same else Profiles(one.problem)).of(state).thickness
-        if one.path is None:
-            one.path = _of_one(state, Record(one.problem, Curve(one.problem, self._tolerances)))
-        return one.path[measure] if isinstance(measure, str) else np.asarray(measure(one.path), dtype=float)
+            return (self._profiles if same else Profiles(entry.problem)).of(state).thickness
+        if entry.path is None:
+            entry.path = _of_one(state, Record(entry.problem, Curve(entry.problem, self._tolerances)))
+        return entry.path[measure] if isinstance(measure, str) else np.asarray(measure(entry.path), dtype=float)
 
 
 def _volume(problem: Any) -> float:
@@ -286,6 +286,6 @@ def _of_one(state: Any, record: Record) -> Path:
     """Return a path of one state."""
     path = Path(record)
     record.segments[-1].states.append(state)
-    for told in record.on_state:
-        told(state)
+    for listener in record.on_state:
+        listener(state)
     return path

@@ -98,7 +98,7 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
     for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
         if isinstance(part, Mapping):
             for name, size in part.items():
-                mine = [k for k, one in enumerate(parameters.names) if one == name or one.startswith(f"{name}[")]
+                mine = [k for k, entry in enumerate(parameters.names) if entry == name or entry.startswith(f"{name}[")]
                 if not mine:
                     raise _unknown(caller, name, parameters)
                 found[mine, mine] += non_negative(f"{caller}: {name}", size) ** 2
@@ -139,5 +139,5 @@ def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 def _unknown(caller: str, name: Any, parameters: Parameters) -> InputError:
     """Return the InputError for an unknown parameter."""
-    known = dict.fromkeys(one.partition("[")[0] for one in parameters.names)
+    known = dict.fromkeys(entry.partition("[")[0] for entry in parameters.names)
     return InputError(f"{caller}: parameter {name!r} is not known; known: {', '.join(known)}")

@@ -82,7 +82,7 @@ class ContactState(NamedTuple):
         return self.pairs[k], share[np.arange(len(x)), k]
 
 
-def take_over(face: FaceContact, worn: ContactState, fields: np.ndarray, control: float) -> None:
+def take_over(face: FaceContact, states: ContactState, fields: np.ndarray, control: float) -> None:
     """Give a new face the pressure and friction per present area of the old one.
 
     The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.
@@ -96,19 +96,19 @@ def take_over(face: FaceContact, worn: ContactState, fields: np.ndarray, control
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)
-    pressure, friction, touches = worn.at(x)
+    pressure, friction, touches = states.at(x)
     share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
     touches &= pressure > 0
     depth = law.depth(np.where(touches, pressure * share, 0.0))
     face.shift_distances(np.where(touches, d - depth, np.maximum(d + theta, 0.0)))
     if not face.remembers:
         return
-    law, none = face.law, np.zeros(len(x))
-    slip, arrived = none, np.zeros(len(x), dtype=bool)
+    law, zero = face.law, np.zeros(len(x))
+    slip, arrived = zero, np.zeros(len(x), dtype=bool)
     if law.has_friction:
-        held = law.tractions(x, Touch(x, depth, none + 1e-9 * theta, x)).tangential
-        slip = np.divide(friction * share * 1e-9 * theta, held, out=none.copy(), where=touches & (held != 0))
-        most = 2 * worn.slip * face.thickness            # no friction without pressure
+        held = law.tractions(x, Touch(x, depth, zero + 1e-9 * theta, x)).tangential
+        slip = np.divide(friction * share * 1e-9 * theta, held, out=zero.copy(), where=touches & (held != 0))
+        most = 2 * states.slip * face.thickness            # no friction without pressure
         slip = np.clip(slip, -most, most)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
     face.put(Memory(Touch(x, distance, slip, x), arrived, np.ones(len(x))))

@@ -156,7 +156,7 @@ class Stability:
         name, unit = problem.shown(0.0)[0], "n" if problem.scene.kinematics.axisymmetric else "k"
         head = (f"stability: {unit} = {', '.join(f'{n:g}' for n in self.numbers)}, {len(self.states)} states; elastic,"
                 f" at fixed {name}")
-        if any(one.relaxes for one in (s.problem for s in self.path.segments)):
+        if any(entry.relaxes for entry in (s.problem for s in self.path.segments)):
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
@@ -229,8 +229,8 @@ class Watch:
         low, high = sorted((count_at(a, kind), count_at(b, kind)))
         expected = not kind.number and not kind.flipped and a.slope * b.slope < 0
         found = [self.of(segment).locate(a, b, kind, index) for index in range(low, high)]
-        folds = [self._is_fold(segment, one) for one in found] if expected else [False] * len(found)
-        return [self._loss(segment, one, fold) for one, fold in zip(found, folds, strict=True)]
+        folds = [self._is_fold(segment, entry) for entry in found] if expected else [False] * len(found)
+        return [self._loss(segment, entry, fold) for entry, fold in zip(found, folds, strict=True)]
 
     def _is_fold(self, segment: Any, found: Located) -> bool:
         """Return True if the mode is the tangent at a limit point: the controlled load does work on it."""
@@ -350,7 +350,7 @@ def _chosen(path: Any, states: Any) -> list[State]:
     there = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
-        if any(all(s is not one for one in path.states) for s in given):
+        if any(all(s is not entry for entry in path.states) for s in given):
             raise InputError("stability: states: must be of this path")
         if not given:
             raise InputError("stability: states: must be at least one")

@@ -284,9 +284,9 @@ class Modes:
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
     """Return the root of the polynomial (fraction over eigenvalue) through the values nearest to 0, if inside."""
-    known = sorted(values, key=lambda one: abs(one[1]))[:4]
+    known = sorted(values, key=lambda entry: abs(entry[1]))[:4]
     for n in range(len(known), 1, -1):
-        s, f = (np.array([one[k] for one in known[:n]]) for k in (0, 1))
+        s, f = (np.array([entry[k] for entry in known[:n]]) for k in (0, 1))
         if len(np.unique(f)) == n:
             guess = sum(s[i] * np.prod([f[j] / (f[j] - f[i]) for j in range(n) if j != i]) for i in range(n))
             if low < guess < high:

@@ -99,8 +99,8 @@ class SecondVariation:
         self._held = self._find_held(number, flipped)
         own = self._held[self._held < self._own]
         off, rows = problem.setting.off, []
-        for thing, row, u in self._means:
-            rows.append((row - m * u) * (thing not in off))
+        for part_item, row, u in self._means:
+            rows.append((row - m * u) * (part_item not in off))
             rows[-1][own] = 0
         self._matrix.hold([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
         self._rows = rows
@@ -164,10 +164,10 @@ class SecondVariation:
             mode = rest.pop(0)
             here = int(np.argmax(abs(mode))) if len(mode) else 0
             parts = self.comm.allgather((float(abs(mode).max(initial=0.0)), first + here,
-                                         [float(one[here]) if len(mode) else 0.0 for one in [mode, *rest]]))
+                                         [float(entry[here]) if len(mode) else 0.0 for entry in [mode, *rest]]))
             _, row, (most, *others) = max(parts, key=lambda part: part[0])
             rows.append(row)
-            rest = [one - other / most * mode for one, other in zip(rest, others, strict=True)]
+            rest = [entry - other / most * mode for entry, other in zip(rest, others, strict=True)]
         if rows:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
@@ -264,17 +264,17 @@ class SecondVariation:
         Constraints in r and in z also act round the axis: a clamped rim, a node, a face with a prescribed displacement.
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
-        for i, thing in enumerate(problem.scene.items):
-            items = [] if i in problem.setting.off else self._forms.constraints(thing)
+        for i, part_item in enumerate(problem.scene.items):
+            items = [] if i in problem.setting.off else self._forms.constraints(part_item)
             for item in items:
                 if isinstance(item, Held):
-                    if isinstance(thing, Symmetry) and thing.mirror and thing.on == flipped:
+                    if isinstance(part_item, Symmetry) and part_item.mirror and part_item.on == flipped:
                         held += [self._dofs(c, item) for c in (1 - item.component, 2)]
                     else:
                         held.append(self._dofs(item.component, item))
                         places[item.component].append(item)
-        none = np.zeros(0, dtype=np.int32)
-        facets = [np.concatenate([none, *(self._forms.mesh.facets_of(item.on) for item in found
+        empty = np.zeros(0, dtype=np.int32)
+        facets = [np.concatenate([empty, *(self._forms.mesh.facets_of(item.on) for item in found
                                           if item.on is not None)]) for found in places.values()]
         both = np.intersect1d(*facets).astype(np.int32)
         gripped = [fem.locate_dofs_topological(self.space.sub(0).sub(2), 1, both)]
@@ -292,8 +292,8 @@ class SecondVariation:
         """Return (item number, row of a mean constraint, correction for m) of each mean and of the mean of V."""
         forms, problem = self._forms, self.problem
         n = problem.n_owned
-        for number, thing in enumerate(problem.scene.items):
-            means = {item.component: item for item in forms.constraints(thing) if not isinstance(item, Held)}
+        for number, part_item in enumerate(problem.scene.items):
+            means = {item.component: item for item in forms.constraints(part_item) if not isinstance(item, Held)}
             for item in means.values():
                 row = np.zeros(self._own)
                 row[self._to_mode[:n]] = problem.assemble(forms.compile(forms.mean_row(item)))
