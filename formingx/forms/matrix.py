@@ -1,7 +1,7 @@
 """A sparse matrix with a few dense rows and columns at the end: tangent and Lagrange multipliers in one.
 
 [K  C^T]   K: compiled form; rows of C: constraints. The multipliers' rows and columns stand at the end of the last
-[C   0 ]   rank's part, so the global numbers of all fields are those of DOLFINx.
+[C   0 ]   rank's part, so all fields keep DOLFINx's global numbers.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class ExtendedMatrix:
     def hold(self, bcs: list, rows: list[np.ndarray]) -> None:
         """Constrain these unknowns from now on.
 
-        bcs: held unknowns (their rows and columns become those of the identity); rows: of C, each the owned part,
+        bcs: held unknowns (their rows and columns become unit vectors); rows: of C, each the owned part,
         shape (n,); one that is 0 on all ranks leaves its multiplier alone, as unknowns held are.
         """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]

@@ -100,7 +100,7 @@ class Material:
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
         """Return the largest principal elastic stretch of each relaxing branch, with the present internal variables.
 
-        UFL scalars; 1 when the branch has relaxed, and that of F itself (without change of volume) before it does.
+        UFL scalars; 1 when the branch has relaxed; the isochoric stretch of F before.
         """
         return []
 

@@ -175,8 +175,9 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     Args:
         inner_radius, length: of the tube, lengths.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out. Each may
-            vary (a programmed wall): a function of Z, or a table {Z: thickness}, linear between its heights. Z is that
-            of the inner face, from -inner_radius at the bottom to `length`; thickness is measured along its normal.
+            vary (a programmed wall): a function of Z, or a table {Z: thickness}, linear between its heights. Z
+            belongs to the inner face, from -inner_radius at the bottom to `length`; thickness is measured along its
+            normal.
         elements: (from the axis to the neck, through each layer), as in `disc`.
         grading: size of the last element at the neck over the first at the axis.
 

@@ -125,7 +125,7 @@ class Problem(Histories, Units):
 
     @property
     def control(self) -> float:
-        """The control that the forms see now; inside `at` that of the state."""
+        """The present control of the forms; inside `at` that of the state."""
         return float(self.forms.control.value)
 
     @property

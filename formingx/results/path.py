@@ -221,7 +221,7 @@ class Path(States):
         """Return the energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth:
         length^2).
 
-        It is that of the whole part, with the tools of all its images where a half or a quarter is modelled.
+        It belongs to the whole part, with the tools of all its images where a half or a quarter is modelled.
 
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade

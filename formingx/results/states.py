@@ -100,8 +100,8 @@ class States:
         """Neighbours between which another path branches off: the tangent's determinant changes its sign without
         limit point.
 
-        Those of which the run warns, from the determinants that its states carry. Modes n = 0 alone, and an odd number
-        of them between two states; `Path.stability` sees all. None with a history.
+        Branch points of which the run warns, from the determinants that its states carry. Modes n = 0 alone, and an
+        odd number of them between two states; `Path.stability` sees all. None with a history.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 

@@ -35,8 +35,8 @@ class MirrorPlanes:
     """The planes of symmetry that cut the body: the whole part is `factor` images of the body.
 
     A `Symmetry` is such a plane if its boundary is flat, lies at an end of the body, and is no guide. The axis of an
-    axisymmetric body is none: results are those of the whole ring. Two parallel planes are none: the body is a strip of
-    an endless one, and results are those of the strip.
+    axisymmetric body is none: results belong to the whole ring. Two parallel planes are none: the body is a strip of
+    an endless one, and results belong to the strip.
 
     Attributes:
         planes: of different normals.

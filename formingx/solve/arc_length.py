@@ -83,7 +83,7 @@ class Curve:
 
     @property
     def iterations(self) -> int:
-        """Newton iterations since `spent` was last asked: those of the step so far."""
+        """Newton iterations since `spent` was last asked: in the step so far."""
         return self._iterations
 
     def moved(self, a: State, b: State) -> float:

@@ -76,8 +76,8 @@ class Diagnosis:
         step: number of the state that could not be reached (1: the first after the start).
         control, aimed: the driven pressure (stress) or travel (length) of the last good state, and where the failed
             attempt had got to.
-        residual: {"displacement", "pressure", "multipliers": norm of the forces left over, over that of the support
-            forces} in the failed attempt; inf where they were not finite.
+        residual: {"displacement", "pressure", "multipliers": norm of the residual over the norm of
+            the support forces} in the failed attempt; inf where they were not finite.
         worst: where the largest force was left over.
         smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
         failed_J, at_failed_J: the same in the failed attempt.
@@ -204,7 +204,7 @@ def limits_passed(problem: Equations, states: Sequence[State]) -> str:
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
     """Return the neighbours between which the determinant of the tangent changes its sign without a limit point.
 
-    The signs are those that the states carry (`State.orientation`). States at fixed control carry none: two
+    The signs are stored in the states (`State.orientation`). States at fixed control carry none: two
     factorisations for each stretch between limit points, which miss an even number of changes. With a history no other
     path begins: none. Collective.
     """
@@ -227,7 +227,7 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
 
 
 def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return neighbours whose orientations differ, limit points left out: there the sign is that of round-off.
+    """Return neighbours whose orientations differ, limit points left out: there the sign is round-off.
 
     Not across a jump or the start of a stage. Where a run went back from a state, its orientation turns with it.
     """

@@ -81,8 +81,8 @@ class LocalSolve:
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
         """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
 
-        border(V): maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns those of
-        the control, shape (m,).
+        border(V): maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns the entries
+        of the control, shape (m,).
         """
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]

@@ -169,9 +169,9 @@ class StressField:
     def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
         """Estimate the error of the stresses at the quadrature points: in each cell and in all; collective.
 
-        sigma_h is the stress there, sigma* that of the fitted F and S (see the module); the integrals are sums over
-        the quadrature points. Where the solution is smooth, the estimate tends to the true error as meshes are refined;
-        at a sharp corner under load it does not fall.
+        sigma_h is the stress there, sigma* the stress of the fitted F and S (see the module); the integrals are sums
+        over the quadrature points. Where the solution is smooth, the estimate tends to the true error as meshes are
+        refined; at a sharp corner under load it does not fall.
 
         Args:
             layer: the cells of one layer only.

@@ -14,7 +14,7 @@ RESOLVED = 0.05
 
 
 class StressError(NamedTuple):
-    """Estimated errors of the Cauchy stress of n cells, those of all ranks; |.| is the root of the sum of all squares.
+    """Estimated errors of the Cauchy stress of n cells of all ranks; |.| is the root of the sum of all squares.
 
     Volumes are reference volumes (axisymmetric: of the whole ring; plane strain: of unit depth); those of the deformed
     cells are the same as far as the volume is kept.

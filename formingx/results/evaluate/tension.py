@@ -37,7 +37,7 @@ class Resultant(NamedTuple):
 class Tension:
     """Finds the smallest principal resultant of a membrane in a state, per deformed length.
 
-    With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, that of a layer of thickness h is
+    With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, the resultant of a layer of thickness h is
     h l3 (l_i P_ii - l3 P_33).
 
     Args:

@@ -116,7 +116,7 @@ def of_folder(folder: Any) -> Status:
 
 
 def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
-    """Return (column, value) of the target that a step aims at: of a pressure, that of the load that is driven."""
+    """Return (column, value) of the target that a step aims at: of a pressure, the column of the controlled load."""
     if "until" not in stepping:
         return None
     name, goal = stepping["until"]
