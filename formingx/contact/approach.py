@@ -27,8 +27,9 @@ class StepLimits:
         cut_off: how deep the way of a point in a step may lead through a tool, over the length of face that is its own.
         places: at most, at which that way is looked at.
         lag: change of the pressure in a step of lagged friction, over the pressure.
-        behind: difference that is allowed between the pressure at the end of the step and the one that limits friction,
-            over the pressure; corrections: solutions of a step, at most, that reduce it.
+        behind: allowed difference between the pressure at the end of the step and the pressure that limits friction,
+            over the pressure.
+        corrections: largest number of solutions of a step that reduce this difference.
         inaccurate: change of the pressure, over `lag`, at which a step is taken again.
         settling: iterations in which such friction settles, however short the step.
         weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
@@ -104,7 +105,11 @@ class Approach:
 
     def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
               length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Along a tangent: arc length at which points arrive, or `length`; where they are then, shapes (n,), (n, c)."""
+        """Return the arc lengths along a tangent at which gaps close, at most `length`, and the positions there.
+
+        Returns:
+            Arc lengths, shape (n,), and positions seen from the tool, shape (n, c), length.
+        """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.touch) & (face.rule.area > 0)
@@ -113,10 +118,15 @@ class Approach:
 
     def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
                 ends: bool) -> None:
-        """Prepare a step of this length: points touch at times (arc length, `length`: not), at places.
+        """Prepare a step: store the predicted positions of the gap closures.
 
-        guessed: which begin where their forces want them, shape (n,); None: none.
-        ends: it is to end where a point touches that sticks (see `touches_by`), which has no friction before.
+        Args:
+            times: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
+            places: positions of the points there, seen from the tool, shape (n, c), length.
+            guessed: mask of points whose first guess is predicted from their forces, shape (n,); None: no points.
+            length: arc length of the step (dimensionless).
+            ends: True if the step ends where a sticking point closes its gap (see `touches_by`). The point has no
+                friction before.
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
@@ -127,9 +137,9 @@ class Approach:
             face.expect_arrivals(places)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """More than twice the new points that a step is meant, or predicted, to bring into contact.
+        """Return True if more than twice the intended, or predicted, number of new points came into contact.
 
-        Of lagged contact: one that is further inside its tool than twice the length of face that is its own.
+        In lagged contact: if a new point is deeper in its tool than twice its tributary length.
         """
         face, theta = self.face, self.face.law.theta
         if face.touch is None:
@@ -222,10 +232,11 @@ class Approach:
         return bool(self._comm.allreduce(found, MPI.LOR))
 
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Part of a step by which the first of the points touched whose slip the step got wrong; 1 if there is none.
+        """Return the part of a step up to the first gap closure of a point with wrong slip; 1 without such points.
 
-        Since it touched its pressure has grown, and it has slid, as it does at the end, along (direction, slope). One
-        that sticks slid too far without friction; under Coulomb's law it slides the other way than it came.
+        Since the gap closed, pressure and slip are taken to grow at their final rates along (direction, slope). The
+        slip of a sticking point is wrong if it slid too far without friction. Under Coulomb's law it is wrong if the
+        final rate opposes the accumulated slip.
         """
         face, law, touch = self.face, self.face.law, self.face.touch
         if touch is None or not law.has_friction:

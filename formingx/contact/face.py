@@ -269,7 +269,7 @@ class FaceContact:
         self._take(Memory(touch, arrived, penalty))
 
     def let_go(self, fields: np.ndarray, control: float) -> bool:
-        """Let go of points that pull at a tool in three dimensions at a state; False if there are none; collective."""
+        """Open points in tension at a tool in three dimensions at a state; return True if any opened. Collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         touch, x = self._memory.touch, self.positions(fields, control)
@@ -282,9 +282,12 @@ class FaceContact:
         return found
 
     def hold_late(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Hold the points that came deeper than `most` (length) into a tool in three dimensions in the step to a state.
+        """Put points that penetrated a tool in three dimensions by more than `most` (length) into contact.
 
-        Each sticks, or slides, from where its way met the tool. False if there are none; collective.
+        Each sticks or slides from the place where its path in the step met the tool. Collective.
+
+        Returns:
+            True if there are such points.
         """
         if self._memory is None or not self.contact.lagged:
             return False
@@ -324,7 +327,11 @@ class FaceContact:
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> Memory:
-        """See `History`; an InputError if a point of the face is not in the data."""
+        """See `History`.
+
+        Raises:
+            InputError: a point of the face is not in the data.
+        """
         from scipy.spatial import cKDTree
         away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)
         if np.any(away > 1e-9 * self._length):

@@ -14,16 +14,18 @@ class Increment:
 
     It is begun for each run of Newton's method ahead of a state, or to look at one. In each iteration
 
-        tractions(x)     for the residual, at the positions x of the points seen from the tool, shape (n, components);
-        linearise(x)     at the same positions: the tangent of the iteration is that of `tractions(x)` from now on;
+        tractions(x)     gives the residual, at the positions x of the points seen from the tool, shape (n, c);
+        linearise(x)     is called at the same positions: `tractions(x)` then contains the tangent of the iteration;
 
-    and then it is asked: `status`, `arrivals`, `taken`, `foretold`, and `expect` says the arguments of the next
-    iteration. Whoever accepts the state begins another increment.
+    and then `status`, `arrivals`, `taken` and `foretold` may be read. `expect` sets the sense of sliding for the next
+    iteration. A new increment begins when the state is accepted.
 
     Args:
-        law: of the contact; touch: their history variables; None without friction.
-        start: positions of the points at the state ahead of which Newton's method begins; None: of none.
-        guessed: which begin where their forces want them, so that the law is linearised there at first, shape (n,).
+        law: contact law.
+        touch: history variables of the points; None without friction.
+        start: positions of the points at the last accepted state, shape (n, c), length; None without such a state.
+        guessed: mask of the points whose first guess is predicted from their forces, shape (n,). The law of these
+            points is first linearised at the guess.
     """
 
     def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
@@ -42,8 +44,14 @@ class Increment:
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
-        """Linearise the law where the last iteration predicted; the amount by which its forces at x change, shape of
-        x."""
+        """Linearise the law at the motion predicted by the last iteration; return the change of the tractions at x.
+
+        Args:
+            x: positions of the points, seen from the tool, shape (n, c), length.
+
+        Returns:
+            Tractions of the linearised law less the tractions of the law itself, shape (n, c), stress.
+        """
         plain = found = self.tractions(x)
         now = self._law.motion(x, self._touch)
         if self._before is not None:
@@ -78,19 +86,21 @@ class Increment:
         return self._now[1].force[points], self._now[1].stiffness[points]
 
     def foretold(self, by: np.ndarray) -> Tractions:
-        """Law linearised at the positions after a motion, shape (n, c), length."""
+        """Return the law linearised at the positions after a motion, shape (n, c), length."""
         return self.ahead(slice(None))(by)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
-        """`foretold` of m of the points: a function for their tractions after a motion, shape (m, c)."""
+        """Return a function that maps a motion of m points, shape (m, c), length, to their tractions."""
         touch = self._touch and Touch(*(part[points] for part in self._touch))
         law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
         return lambda by: law.tractions(x, touch, None, there(by))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return a function for the depth of m points in the ramp after motions, shape (m, c): over its width, shape
-        (m,), and the way through it, shape (m, c), length, 0 where no friction grows in it: without any, or where the
-        body may pull at the tool."""
+        """Return a function that maps motions of m points, shape (m, c), to their depth and path in the ramp.
+
+        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
+        (m, c), length. It is 0 where friction does not grow in the ramp: without friction, and on adhering points.
+        """
         width, there = 2 * self._law.theta, self._foreseen(points)
         grows = self._law.has_friction and not self._law.pulls
 
@@ -106,7 +116,7 @@ class Increment:
         return lambda by: before.to(x + by)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
-        """Return the direction in which points (a mask, shape (n,)) begin to slide."""
+        """Set the sense in which points (a mask, shape (n,)) begin to slide in the next iteration."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property

@@ -1,5 +1,7 @@
-"""Limits to the contact that one step may bring: a step that brings a whole region into contact decides by its
-length where it sticks."""
+"""Limits to the number of points that come into contact in one step.
+
+If a whole region comes into contact in one step, its sticking positions depend on the length of that step.
+"""
 
 from __future__ import annotations
 
@@ -128,9 +130,14 @@ class StepLimit:
                     for c in self.present], default=way.length)
 
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
-        """Return a step is about to be taken; `ends`: it is to end where something comes into contact, see `check`.
+        """Prepare all contacts for the next step; return the deviation from the tangent due to predicted events.
 
-        Returns the change of (x, control) at its end by predicted events, locally owned entries; None: zero.
+        Args:
+            way: the step.
+            ends: True if the step ends at the first gap closure, see `check`.
+
+        Returns:
+            Change of (x, control) at the end of the step, locally owned entries; None: zero.
         """
         n, found = self._n, way.events.closures(way.length) if way.events else None
         for k, approach in enumerate(self.present):
@@ -167,16 +174,26 @@ class StepLimit:
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
     def let_go(self, new: Any) -> bool:
-        """Let go of points in tension at a tool in three dimensions at a state that was found; False if nothing
-        does."""
+        """Open the contact of points in tension at tools in three dimensions, at a converged state.
+
+        Returns:
+            True if any point opened.
+        """
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
-        """Update a converged state by the points that its step brought into tools in three dimensions; False if nothing
-        is left.
+        """Put the points that penetrated tools in three dimensions during a step into contact, at its converged state.
 
-        Points that came into a tool are held: at a target all, else on tools with friction, which begins then. That is
-        limited by the pressure of the state. sweep: how often it was done before.
+        At a target these are the points of all tools, else only the points on tools with friction. Friction begins
+        then, limited by the pressure of the state.
+
+        Args:
+            new: the converged state.
+            at_target: True if the state meets a target.
+            sweep: number of earlier calls for this step.
+
+        Returns:
+            True if anything changed, so that the state must be solved for again.
         """
         n, again = self._n, sweep < LIMITS.corrections
         late = [c.face.hold_late(new.x[:n], new.control, LIMITS.near * c.face.thickness)
