@@ -83,7 +83,7 @@ class Curve:
 
     @property
     def iterations(self) -> int:
-        """Newton iterations since `spent` was last asked: in the step so far."""
+        """Newton iterations of the step so far (since the last call of `spent`)."""
         return self._iterations
 
     def moved(self, a: State, b: State) -> float:
@@ -97,7 +97,11 @@ class Curve:
         return spent
 
     def resume(self, x: Array, control: float) -> State:
-        """Return a state once more, under the setting that the problem has taken, and the tangent there."""
+        """Return a state once more, with the tangent under the present step data of the problem.
+
+        Raises:
+            Failure: the tangent is singular.
+        """
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
         if not self.newton.tangent(self._x, control):
@@ -106,8 +110,11 @@ class Curve:
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
-        """Return the solution of F = 0 and of the constraint, from a guess; raises `Failure`. chords: see
-        `BorderedNewton`."""
+        """Return the solution of F = 0 and of the constraint, from a guess. chords: see `BorderedNewton`.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
         self._x.array_w[:] = x
         self._found = None
         try:
@@ -125,8 +132,8 @@ class Curve:
     def look_ahead(self, state: State) -> None:
         """Make the tangent of an accepted state again: the history variables include it now.
 
-        The factors of its last iteration serve, unless many contact points differ or materials have advanced; or
-        arrivals are predicted with them, as they have to be from a checkpoint, too.
+        The factors of its last iteration are used, unless many contact points differ or materials have advanced.
+        Predicted contact events need new factors, so that a run from a checkpoint finds the same ones.
         """
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
@@ -297,7 +304,11 @@ class Curve:
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
-        """`between` for a target that lies between two states; raises `ConvergenceError`."""
+        """Return the state at a target that lies between two states (see `between`).
+
+        Raises:
+            ConvergenceError: no state was found there.
+        """
         try:
             return self.between(a, b, bound, target.value)
         except Failure as failure:
@@ -307,8 +318,8 @@ class Curve:
     def limit_point(self, a: State, b: State) -> State:
         """Return the state between two where the control is stationary; raises `Failure`.
 
-        The root of the derivative of the cubic through both ends, solved for and repeated on the smaller bracket until
-        the control differs from its extremum by less than 1e-12 of itself, as slope and curvature tell.
+        The cubic through both ends gives the guess, and each state found replaces an end. This is repeated until the
+        control is within 1e-12 of its extremum, relative, as estimated from slope and curvature.
         """
         for _ in range(8):
             chord = self.distance(a, b)
@@ -324,8 +335,8 @@ class Curve:
         """Return the states after `old`, the first of them solved for again with points that came into a tool in three
         dimensions in the step.
 
-        That is held from where it met the tool: at a target, one of (target, its measure), all points are; in any other
-        state those of tools with friction, at the same control.
+        These points stay in contact from the place where they met the tool. At a target, a pair (target, its measure),
+        these are the points of all tools. At other states, at the same control, only tools with friction count.
 
         Raises:
             Failure: no such state was found.

@@ -1,18 +1,19 @@
 """Interfaces through which the solver sees a problem, F(x, control) = 0; it uses nothing else.
 
-x is dimensionless, its rows spread over the ranks ("own part"); so is the control. For each step, in this order:
+x and the control are dimensionless; the rows of x are distributed over the ranks. The calls of a step, in order:
 
-    limit.length, limit.prepare         how long it may be; it is about to be taken
-    begin                               Newton's method begins at the predicted state
-    residual, linearise, tangent,       each iteration: F; F and its active set as the iteration wants them; dF/dx
-      control_derivative                and dF/dcontrol, at the (x, control) of that residual
-    folded, limit.check, step_error     whether the state that it reached will do
-    advance                             it is accepted: the histories take it up
-    tangent(ahead=True)                 that of the next step, where F has a kink at the state
+    limit.length, limit.prepare         Limit the step length. Prepare the contacts.
+    begin                               Start Newton's method at the predicted state.
+    residual                            Compute F. This and the next two lines: in each iteration.
+    linearise                           Compute F and its active set for the linearisation.
+    tangent, control_derivative         Compute dF/dx and dF/dcontrol, at the (x, control) of the residual.
+    folded, limit.check, step_error     Check the state.
+    advance                             Accept the state and update the history variables.
+    tangent(ahead=True)                 Compute the tangent of the next step, which differs if F has a kink.
 
-`at` and `stand` go to another state; `enter` changes the setting between the stages of a process.
-The defaults here suit equations without contact, history, time or units: a class that is derived from
-`Equations` need only give F.
+`state_context` and `restore` return to another state. `enter` changes the step data between the stages of a process.
+The defaults here suit equations without contact, history, time or units. A class derived from `Equations` then only
+defines F.
 """
 
 from __future__ import annotations
@@ -92,14 +93,17 @@ class Increment(Protocol):
         """Return the forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
 
     def foretold(self, by: Array) -> Tractions:
-        """Law at the points after a motion, shape (n, 2), length."""
+        """Return the law at the points after a motion, shape (n, 2), length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
-        """`foretold` of some of the points."""
+        """Return a function that maps a motion of some of the points to their tractions."""
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function for the depth of points in the ramp after motions, over its width, shape (m,); the way
-        through it, shape (m, 2), length, 0 where no friction grows in it."""
+        """Return a function that maps motions of m points to their depth and path in the ramp.
+
+        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
+        (m, 2), length; 0 where friction does not grow in the ramp.
+        """
 
     def expect(self, points: Array, sense: Array) -> None:
         """Set this sense of sliding in the next iteration for the points in a mask, shape (n,)."""
@@ -168,8 +172,10 @@ class Residual(Protocol):
     """F and its derivatives.
 
     Attributes:
-        comm: communicator; x: a vector of unknowns, inside `at` those of the state; matrix: refilled by `tangent`;
-        force_scale: size of the forces that balance in the residual last computed.
+        comm: communicator.
+        x: vector of unknowns; inside `state_context` it holds the state.
+        matrix: tangent, refilled by `tangent`.
+        force_scale: norm of the forces that balance in the residual last computed.
     """
 
     comm: MPI.Intracomm

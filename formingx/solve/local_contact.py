@@ -1,14 +1,14 @@
-"""The few contact points that a step brings, or whose status (free, stick, slide) changes between iterations.
+r"""Local solve of the few contact points whose gap closes, or whose status changes between iterations.
 
-An iteration of Newton's method linearises the law of contact of every point at its status of the iteration before.
-Where the statuses of points depend on each other that can cycle, and where points arrive, at the outer edge of the
-ramp of their law's ramp, it only halves their penetration. For the few points that arrive or change their status the
-body is a compliance C (the inverse tangent, condensed to them): their motions y, to first order, satisfy
+An iteration of Newton's method linearises the contact law of every point at its status (open, stick, slip) of the
+iteration before. The iteration can cycle where the statuses of points depend on each other. Where gaps close, at the
+outer edge of the ramp of the contact law, it only halves the penetration. For these few points the body is a compliance
+C, the inverse tangent condensed to them. Their motions y satisfy, to first order,
 
-    y - y0 + C (f(y) - f0 - S0 y) = 0,
+.. math:: y - y_0 + C \, (f(y) - f_0 - S_0 \, y) = 0,
 
-f the law of contact, f0 + S0 y its linearisation in the iteration, which led to y0. This small problem is solved for
-by itself. With f linear it is Woodbury's formula, by which a tangent follows a few points whose stiffness changes.
+with the contact law f and its linearisation f_0 + S_0 y in the iteration, which led to y_0. This small problem is
+solved by itself. For a linear f it is Woodbury's formula, which updates a tangent for a few changed stiffnesses.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
 
 Border: TypeAlias = Callable[[Array], Array]
-"""What solutions V = K^-1 E, shape (n, m), become in the bordered system, in place; returns those of the control."""
+"""Maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns changes of the control, (m,)."""
 
 @dataclass(frozen=True)
 class LocalContact:
     """Settings of the local problem of a few contact points.
 
     Attributes:
-        most: points that are solved for together; with more, the iteration is left to itself.
-        few: points that change for which solutions with the factors at hand cost less than other factors.
-        iterations: at most this number of, with `full` corrections at first (which may cycle), then with those that
-            stop near the outer edge of the ramp in which contact begins.
-        stays: part of its depth in the ramp at which a point stops that would leave it; least: from this depth, over
-            the width of the ramp, it leaves.
-        behind: depth at which one stops that would come back, over the width; farther: times as deep from one time to
-            the next.
-        accuracy: of positions, over the ramp in which contact begins.
+        most: largest number of points that are solved for together; with more points Newton's method goes on alone.
+        few: number of changed points up to which Woodbury's formula costs less than another factorisation.
+        iterations: largest number of local iterations.
+        full: number of full corrections, which may cycle. Later corrections stop near the outer edge of the ramp.
+        stays: a point that would leave the ramp stops at this part of its depth.
+        least: depth over the width of the ramp from which on a point may leave.
+        behind: depth over the width at which a point that enters the ramp again stops.
+        farther: factor of `behind` from one entry to the next.
+        accuracy: tolerance of positions over the half-width of the ramp.
     """
 
     most: int = 40
@@ -79,10 +79,16 @@ class LocalSolve:
         self._status = now
 
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
-        """Make a correction (dx, in place, and step, of the control) consistent with the law; returns the step.
+        """Correct a Newton update so that points whose status changes satisfy the contact law.
 
-        border(V): maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns the entries
-        of the control, shape (m,).
+        Args:
+            solver: solver with the LU factors of the tangent K.
+            dx: update of x, changed in place.
+            step: update of the control.
+            border: see `Border`.
+
+        Returns:
+            The new update of the control.
         """
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
@@ -120,9 +126,14 @@ K."""
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
     """Return the update of solutions for a tangent that differs from the factorised one at a few points (Woodbury).
 
-    changes: of the stiffness per area of each contact's points, shape (n, 2, 2). None where this number of points
-        change that
-    factors of the other tangent cost less; the update gives None where that is singular.
+    Args:
+        problem: the equations.
+        changes: for each contact, changes of the stiffness per area of its points, shape (n, 2, 2).
+        solver: solver with the LU factors.
+
+    Returns:
+        The update, which gives None for a singular tangent. None if so many points change that another factorisation
+        costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
@@ -195,12 +206,11 @@ class _Points:
         return None
 
     def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> Array:
-        """Motions `new`, after y, that do not cross the outer edge of the ramp at once; `behind` grows of those that
-        came in.
+        """Return the motions `new`, after y, stopped at the outer edge of the ramp; `behind` grows where points enter.
 
-        The stiffness of a sticking point, k s g, falls with the slope s of the ramp from all to nothing next to its
-        outer edge of the ramp. There a point is in equilibrium that is pulled along its tool and hardly pressed to
-        it, and a correction from either side leads far to the other.
+        The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero next to its outer edge. A
+        point that is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot
+        from either side.
         """
         (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
@@ -209,8 +219,7 @@ class _Points:
         return new + ((at - now)[:, None] * way).ravel()
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Solutions V, locally owned rows, shape (n, m), with other stiffnesses per area of locally owned points;
-        None: it is singular."""
+        """Return solutions V, locally owned rows, shape (n, m), for changed stiffnesses per area; None: singular."""
         more = self._gather(np.concatenate(changes))
         y = self._within(more, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:
@@ -229,7 +238,7 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: float) -> Array:
-        """Own points' part of a correction, seen from their tools, flat (collective, also without points)."""
+        """Return the motion of owned points in a correction, seen from their tools, flat. Collective."""
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _taken(self) -> tuple[Array, Array]:

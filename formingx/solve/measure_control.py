@@ -1,7 +1,7 @@
-"""A flow: the controlled quantity is the unknown that makes a measure follow a course in time.
+"""Control by a measure: the controlled quantity is the unknown, and a measure follows an amplitude in time.
 
-A volume of air that is fed, a force that is held. Time is given, step by step, and the state solves F(x, control) = 0
-with the measure at its value for that time: so a pressure passes its maximum as it does in practice.
+Examples: a prescribed volume of air, a constant force. At each given time the state solves F(x, control) = 0 with the
+measure at its prescribed value. A pressure then passes its maximum as it does in practice.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class FlowSteps:
     """Settings of steps along a prescribed amplitude in time.
 
     Attributes:
-        stretched: a step goes to the next time that must be hit if that is no more than this number of steps away:
-            no last step is much shorter than the others.
+        stretched: a step is stretched to the next prescribed time within this number of step lengths. The last step
+            is then never much shorter than the others.
         cut: largest part that is left of a step that is too long: more would be the same step again.
         still: relative change of the controlled quantity that is none, but for round-off.
         located: error of the time of a limit point, over the step that it lies in.
         met: deviation from a target, relative, of the state that is solved for where it was passed.
-        contact: least part of the way of a step to where new contact limits it, else the step is too long.
+        contact: smallest admissible ratio of the step length that new contact allows to the length of the step.
     """
 
     stretched: float = 1.5
@@ -104,7 +104,11 @@ class Flow(Run):
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
-        """Return the state at a time, one step from `old`; raises `Failure`."""
+        """Return the state at a time, one step from `old`.
+
+        Raises:
+            Failure: no such state was found.
+        """
         problem, problem.clock = self.problem, time
         value = float(self._course(time))
         x, control = self._predicted(old, time, value)

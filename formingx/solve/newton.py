@@ -23,16 +23,17 @@ class Newton:
 
     Attributes:
         unloaded: floor of the support forces (over stress times volume over length) in the relative residual.
-        at_rest: floor of the displacements (dimensionless) in the relative correction: near the state of rest on a
-            tool, whose force grows as the square of the penetration, corrections are no smaller than the displacements.
+        at_rest: floor of the displacements (dimensionless) in the relative correction. On a tool whose force grows as
+            the square of the penetration, corrections near the reference configuration are as large as displacements.
         hurried: iterations allowed while the active set of a contact with a history changes, where there is something
             cheaper to try, such as half the step.
         small: corrections (dimensionless displacement) that may grow without a sign of divergence while the active set
-            changes. Iterations with a small correction that visit an active set for the first time do not count
-            against `Tolerances.settling`, up to `exempt` of them: of a slack sheet on a flat plug a hundred points
-            separate one or two at a time. (With a history, which depends on the step, a shorter step is better.)
-        cycles: returns of the active set to one visited before, after which it counts as cycling (solutions took up
-            to 4).
+            changes.
+        exempt: number of iterations with a small correction and a new active set that do not count against
+            `Tolerances.settling`. On a flat plug a hundred points of a slack sheet separate one or two at a time. With
+            a history, a shorter step is better.
+        cycles: number of returns to an earlier active set from which on the iteration counts as cycling. Converged
+            iterations took up to 4.
         diverged: the iteration has diverged, contact or not, where three relative corrections in a row are larger (of
             solutions: below 0.1).
         left_alone: the iteration (from 0) without a local solve of contact: it often corrects the errors of
@@ -56,7 +57,7 @@ class Newton:
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
-    """Return a norm of forces over that of the support forces, at the residual last computed."""
+    """Return a norm of forces relative to the support forces, at the residual last computed."""
     return float(forces / (equations.force_scale + floor))
 
 
@@ -154,11 +155,10 @@ class Tolerances:
         from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an iteration
         could go to and fro.
 
-        Corrections that no longer shrink, below 1e-7, or that are below 1e-11, have met round-off (a flat thin sheet:
-        near 1e-8): then nothing better is to be had, and the residual may be round-off. A
-        residual that no longer shrinks with corrections below the tolerance is at round-off, however large: a stiff
-        penalty (8 mu/eps) times the round-off of the displacements can well exceed the support forces of a thin sheet.
-        (r0/h0 = 1e6: corrections go up and down between 1e-10 and 4e-9, and the residual stays where it is.)
+        Corrections below 1e-7 that no longer shrink, and all below 1e-11, are round-off (a flat thin sheet: near 1e-8).
+        The residual may then be round-off, too. With corrections below the tolerance, a residual that no longer shrinks
+        is round-off, of any size. A stiff penalty (8 mu/eps) times the round-off of the displacements can exceed the
+        support forces of a thin sheet. (r0/h0 = 1e6: corrections vary from 1e-10 to 4e-9, the residual is constant.)
         """
         if not corrections:
             return False
@@ -181,11 +181,11 @@ class Tolerances:
 
 
 class _ModifiedNewton:
-    """Keeps the tangent while a few chord iterations, as many as cost less than another, will do.
+    """Modified Newton method: keeps the tangent while a few chord iterations cost less than a new one.
 
-    (Ortega and Rheinboldt 1970, section 7.1.) For the first iteration of a step the tangent is that of a state before.
-    How far a residual falls with such a tangent is known from the last step that began with one; that is halved for
-    every step since, so that it is tried again.
+    (Ortega and Rheinboldt 1970, section 7.1.) The first iteration of a step uses the tangent of an earlier state. The
+    fall of the residual with such a tangent is taken from the last step that began with one. It is halved for every
+    step since, so that the old tangent is tried again.
     """
 
     def __init__(self, settings: Newton) -> None:
@@ -276,7 +276,7 @@ class BorderedNewton:
         return good
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Make `self.b`, at a solution just found, that of the tangent ahead, by the factors at hand; False: failed."""
+        """Update `self.b` at a converged solution to the tangent ahead, by Woodbury's formula; False if it fails."""
         update = woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
         if found is None:
@@ -356,7 +356,11 @@ class BorderedNewton:
             self.F.array_w += self._drag.forces(x.array_r)
 
     def _check(self, history: list[Iteration], active: _ActiveSet, moved: float) -> None:
-        """Raise `Failure` if the iteration diverges, or takes too long."""
+        """Check the progress of the iteration.
+
+        Raises:
+            Failure: the iteration diverges, cycles or takes too long.
+        """
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > settings.diverged
@@ -385,7 +389,11 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
-        """Make `self.a` the correction of x; returns that of the control."""
+        """Compute the correction: store its part in x in `self.a`, and return the change of the control.
+
+        Raises:
+            Failure: the constraint does not change along the path.
+        """
         c, c_control = constraint(x, control, self.gradient)
         self._slope = self.gradient.dot(self.b) + c_control
         if self._slope == 0 or not np.isfinite(self._slope):
@@ -395,8 +403,7 @@ class BorderedNewton:
         return step
 
     def _border(self, V: Array) -> Array:
-        """Make V = K^-1 E, locally owned rows, shape (n, m), in place, those of the bordered system; the control's
-        part, (m,)."""
+        """Map V = K^-1 E, locally owned rows, shape (n, m), to the bordered system; return control changes, (m,)."""
         steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
         V += np.outer(self.b.array_r, steps)
         return steps

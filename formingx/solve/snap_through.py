@@ -1,14 +1,15 @@
-"""Snap-through: the next state where there is none to go on to, and when a body goes there.
+r"""Snap-through: when a body snaps, and the equilibrium state that it reaches.
 
-Where a process drives one way, a body snaps at a fold of its path, and at a kink beyond which there is no state nearby.
-It reaches equilibrium in the next equilibrium. The way there is followed with vanishing viscosity, at a fixed control,
+If a process drives in one direction, a body snaps at a limit point of its path. It also snaps at a kink beyond which no
+equilibrium is near. The motion to the next equilibrium is computed with vanishing viscosity, at a fixed control,
 
-    F(x) + eta V (x - x_k) = 0,   V that of a viscous stress in proportion to dF, as in a Kelvin-Voigt solid,
+.. math:: F(x) + \eta \, V (x - x_k) = 0,
 
-from one x_k to the next, the histories updated at each. (Kelvin-Voigt damping holds waves of all lengths in proportion
-to their stiffness. Damping in proportion to the mass holds short ones least: points that separate at an edge then need
-1e4 times the viscosity that lets the body reach equilibrium.) eta falls where the body moves smoothly and grows
-where it does not; where it is 0 the body is in equilibrium. The unbalanced force dissipates work on the way.
+from one x_k to the next, with the history variables updated at each. V is the matrix of a viscous stress in proportion
+to dF, as in a Kelvin-Voigt solid. Such damping resists waves of all lengths in proportion to their stiffness. Damping
+in proportion to the mass resists short waves least. Points that separate at an edge then need 1e4 times the viscosity
+with which the body reaches equilibrium. eta falls while the body moves smoothly and grows otherwise. With eta = 0 the
+body is in equilibrium. The unbalanced force dissipates work on the way.
 """
 
 from __future__ import annotations
@@ -33,25 +34,28 @@ log = logging.getLogger("formingx")
 class SnapThrough:
     """Criteria for snap-through, and settings of the path to the next state.
 
-    eta, over the shear modulus, begins low and grows to the smallest that gives a solution: where a state follows after
-    all, only a little viscosity finds it; much would hold the body back while contact separates, and slip
-    meanwhile changes where it ends. (At the brink of release two states may be near, and which is found still
-    depends on eta.) The dissipated energy depends on how far the body moves in a viscous solution and, with
-    friction, where it ends: both are measured in tests/test_jumps.py. Distances are dimensionless, in the mean;
-    forces over the support forces.
+    eta, over the shear modulus, begins low and grows to the smallest value that gives a solution. A little viscosity
+    finds a state that is near. Much viscosity slows the body while contact separates, and slip meanwhile changes the
+    final state. Where contact is about to open two states may be near, and the choice still depends on eta. The
+    dissipated energy depends on the distance moved in a viscous solution, and with friction so does the final state.
+    Both effects are measured in tests/test_jumps.py. Distances are dimensionless mean values. Forces are relative to
+    the support forces.
 
     Attributes:
-        lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also that of
-            the predictor where a kink turns the path back, or where no shorter step is left.
+        lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also the
+            length of the predictor where a kink turns the path back, or where no shorter step is left.
         ahead, furthest: the amount by which the control goes on, at first and at most.
-        eta, least: the first eta, and where it is as good as 0.
+        eta: first value of eta.
+        least: value of eta below which it counts as 0.
         most, most_moving: largest eta before and after the body has begun to move.
-        falls: factor of eta after a solution that took at most `few` iterations; grows, grows_moving: after none was
-            found, before and after the body has begun to move.
-        tolerances: of a viscous solution. (Where contact does not settle soon more viscosity is cheaper than more
-            iterations. Not of looser ones: where the tangent is nearly singular the body seems to rest too soon.)
-        nearest, farthest, share: how far the body is to move in a viscous solution: this share of its way up to there,
-            within bounds. again: how many times as far the first may move it, or it is made again with more viscosity.
+        falls: factor of eta after a solution that took at most `few` iterations.
+        few: see `falls`.
+        grows, grows_moving: factor of eta after a failed solution, before and after the body has begun to move.
+        tolerances: tolerances of a viscous solution. If contact does not settle soon, more viscosity is cheaper than
+            more iterations. With looser tolerances a nearly singular tangent looks like equilibrium too early.
+        nearest, farthest: smallest and largest distance for the body to move in a viscous solution.
+        share: this distance, within the bounds, over the distance moved so far.
+        again: factor of this distance above which the first solution is repeated with more viscosity.
         solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
             (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
         iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
@@ -268,13 +272,16 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
 def at_limit_points(problem: Equations, falls: bool) -> str:
     """Return the rule at limit points of the control: "continue", "snap_through", or "continue_volume".
 
-    The last follows the path while the volume of the air grows, as under volume control, and lets the body snap where
-    that has its maximum, too.
+    The last follows the path while the volume of the air grows, as under volume control. The body snaps where this
+    volume has a maximum, too.
 
-    Time goes one way. With a history so does the controlled quantity, for to follow a fold would be to let it go
-    back; but where a pressure that is put on has its maximum it is the volume of the air that goes on growing. The
-    same holds for a pressure on a body in contact, with a history or without: where contact changes a path may end.
-    `falls`: the controlled quantity is let off.
+    Time goes one way. With a history so does the controlled quantity, as continuing past a limit point would reverse
+    it. Beyond the maximum of an applied pressure, however, the volume of the air goes on growing. The same holds for a
+    pressure on a body in contact, with a history or without, as a path may end where contact changes.
+
+    Args:
+        problem: the equations.
+        falls: True if the controlled quantity is released.
     """
     if problem.drives == "time":
         return "snap_through"
@@ -285,10 +292,15 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
 
 
 def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """Return True if the body snaps from a state: its path leads back. sense: 1 or -1, which way the control goes at
-    first.
+    """Return True if the body snaps from a state, as its path leads back.
 
-    (Right behind the maximum of a pressure that of the volume may follow.)
+    The maximum of the volume may follow right after the maximum of the pressure.
+
+    Args:
+        curve: the solver.
+        old: the state.
+        at_limit_point: the rule, see `at_limit_points`.
+        sense: 1 or -1, initial direction of the control.
     """
     if at_limit_point not in ("snap_through",
                               "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
