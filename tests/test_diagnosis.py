@@ -52,7 +52,7 @@ def test_a_pressure_in_time_beyond_its_maximum():
     stage = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(1.0), duration=0.1)
     error, found = failure(lambda: fx.Process(scene).run([stage], progress=False, accuracy="draft"))
     cause, = found.causes
-    assert f"what is driven has its maximum, a limit point, at process time {found.control:.6g}" in cause
+    assert f"the control reaches a maximum, a limit point, at process time {found.control:.6g}" in cause
     assert "bifurcation" not in str(error) and "enclosed_volume" in found.advice[0]
 
 

@@ -375,7 +375,7 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
     what, limits = facts["what"], facts.get("limit_points", ())
     if what == "process time" and facts["control"] in limits:
         yield Finding("serious", "limit point",
-                      f"what is driven has its maximum, a limit point, at process time {facts['control']:.6g}",
+                      f"the control reaches a maximum, a limit point, at process time {facts['control']:.6g}",
                       "a stage in which something goes on growing, such as"
                       " amplitudes={enclosed_volume: [(time, value), ...]}")
     elif target is not None and limits and abs(facts["control"]) <= max(map(abs, limits)) < abs(target):

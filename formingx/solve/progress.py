@@ -40,7 +40,7 @@ class Aim:
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:
-        """Return the true until the last target, or the one that is wanted, is met."""
+        """Return True until the last target, or the requested one, is met."""
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
