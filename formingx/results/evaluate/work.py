@@ -142,7 +142,7 @@ class Ledger:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """Return the true of a step whose time does not follow the control."""
+        """Return True for a step whose time does not follow the control."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
