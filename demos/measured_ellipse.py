@@ -89,6 +89,7 @@ def largest_change(one, other):
 def draw(path, rows, file):
     """Draw the film's rise as lines of equal height, and the strains at the places under every law."""
     figure, axes = plots.figure(2, width=5)
+    axes[0].get_gridspec().set_width_ratios([1, 2])         # the film is twice as long as wide
     wall = path.wall()
     lines = axes[0].tricontourf(*wall.now[:, :2].T, wall.triangles, wall.now[:, 2], levels=np.arange(0, 13))
     axes[0].plot(*np.array(PLACES).T, "w+", clip_on=False)
@@ -100,7 +101,7 @@ def draw(path, rows, file):
                          label=f"{law.replace('_', ' ')}" if name == "e1" else None)
     axes[1].tick_params(axis="x", rotation=60)
     axes[1].set(xlabel="place x_y, mm", ylabel="Hencky strain across (circles) and along", ylim=(0, None))
-    axes[1].legend(frameon=False, ncols=2, loc="center")
+    axes[1].legend(frameon=False, loc="center left")
     save(figure, file)
 
 
