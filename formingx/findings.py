@@ -1,4 +1,4 @@
-"""Findings: what checks say of a scene, of a run and of its failure, on one scale of severity."""
+"""Findings of checks on a scene, on a run and on its failure, on one scale of severity."""
 
 from __future__ import annotations
 

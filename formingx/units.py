@@ -53,12 +53,12 @@ class Units:
 
     @property
     def area(self) -> str:
-        """The unit of areas, "" if that of length is not said."""
+        """The unit of areas, "" if the unit of length is not given."""
         return self._whole(f"{self.length}2" if self.length else "")
 
     @property
     def volume(self) -> str:
-        """The unit of volumes, "" if that of length is not said."""
+        """The unit of volumes, "" if the unit of length is not given."""
         return self._whole(f"{self.length}3" if self.length else "")
 
     @property

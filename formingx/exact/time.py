@@ -87,12 +87,12 @@ class Body:
         return np.array([self._load(*state) for state in states])
 
     def hold(self, times: Any) -> np.ndarray:
-        """Return the loads at times at which s is what it is now."""
+        """Return the loads at these times while s keeps its present value."""
         s = self.s
         return self.drive(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
-        """s at times at which the load is what it is now."""
+        """Return s at these times while the load keeps its present value."""
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
@@ -137,7 +137,7 @@ class Body:
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
     def _strain_rate(self, s: float) -> np.ndarray:
-        """dw/ds of what does not flow."""
+        """Return dw/ds without flow."""
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _flow(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:

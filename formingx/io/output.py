@@ -15,7 +15,7 @@ from ..errors import place
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
     """Write beside the file, then rename: an earlier file survives a failure, and its mode and owner stay.
 
-    Symbolic links are followed. What is there and is no regular file (a device, a pipe) is written to.
+    Symbolic links are followed. An existing device or pipe is written to directly.
 
     Raises:
         OSError: the file cannot be written; it names the file, and no part is left behind.

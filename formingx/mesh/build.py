@@ -46,17 +46,17 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         accuracy: "draft", "standard" or "fine": how many elements; more of them through sheets that bend near the rim,
             and through layers so thick that they would be more than 1.5 times taller than wide (as for `thickness` =
             `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
-        elements: (along the radius, through each layer), in place of `accuracy`; the latter may be a row, of each layer
-            a count, or the relative sizes of its elements from the bottom up, (60, [[1, 2, 4], 2]); those of a single
-            layer may stand alone, (60, [1, 2, 4]). Each rectangle is two triangles.
+        elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a row with an
+            entry for each layer: a count, or the relative sizes of its elements from the bottom up, as in
+            (60, [[1, 2, 4], 2]). A single layer needs no outer row, (60, [1, 2, 4]). Each rectangle is two triangles.
         grading: size of the last element at the rim over the first at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: size of the elements there over the largest}, for
             example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
 
     Raises:
-        InputError: a size that is not positive, a count that is not a whole number of at least 1, a radius to
-            concentrate at that is not on the disc, fewer elements than there are parts between such radii, or a
-            thickness that is not given all over the disc.
+        InputError: a size is not positive, or a count is not a positive whole number. A radius in `concentrate` is
+            not on the disc. There are fewer elements than intervals between these radii. The thickness is not given
+            at every radius of the disc.
 
     >>> print(fx.mesh.disc(radius=40.0, thickness={"core": 1.0, "skin": 0.2}, elements=(30, (2, 1))))
     180 six-node triangles, R from 0 to 40, Z from 0 to 1.2
@@ -228,8 +228,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
         layers: {layer name: its part of the way from `inner` to `outer`, in any unit}; default one, called `wall`.
 
     Raises:
-        InputError: points that are not finite, too few or not as many as on the other line, lines that cross or meet,
-            a count that is not a whole number of at least 1.
+        InputError: points are not finite, are fewer than 2, or differ in number between the lines. The lines cross or
+            meet. A count is not a positive whole number.
 
     >>> cone = fx.mesh.from_lines([(0, 0), (20, 0), (30, 40)], [(0, -2), (21, -2), (32, 40)], elements=([8, 16], 2))
     >>> print(cone)

@@ -13,7 +13,7 @@ _FLAT = 1e-12                          # of the square of the longest edge: an a
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Look a section over in the reference configuration.
+    """Check the elements of a section in the reference configuration.
 
     Args:
         points: shape (n, 2), length.
@@ -21,8 +21,8 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
         what: begins the message.
 
     Raises:
-        InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each other
-            or meet without sharing their nodes, a body in pieces; the message says where.
+        InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet without
+            sharing their nodes. The body is in pieces. The message gives the position.
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):

@@ -88,7 +88,7 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
     """Return the distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
 
     Raises:
-        InputError: on all ranks, the error of `make`, or what is wrong with the elements of `what`.
+        InputError: `make` raised it, or the elements of `what` are invalid. All ranks raise it.
     """
     error, shape = None, None
     if comm.rank == 0:

@@ -42,9 +42,10 @@ class Mesh:
         cells, facets: its `MeshTags`.
         layers: name to tag.
         boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
-        comm: the communicator that it was made on. (What mpi4py hangs on `domain.comm`, a copy, when objects are
-            passed there is freed with it; inside an exception that would lock up Python's end.)
-        columns: of a disc, a sphere, a parison, or what is `from_lines`; None of others.
+        comm: the communicator on which the mesh was made. Pass Python objects on it, not on its copy `domain.comm`.
+            Data that mpi4py attaches to the copy are freed with it. Inside an exception this would lock up the exit of
+            Python.
+        columns: `Columns` of elements along a disc, a sphere, a parison or a `from_lines` body; None for other meshes.
 
     >>> list(sheet.layers), list(sheet.boundaries), sheet.nodes_of("rim").shape
     (['sheet'], ['axis', 'rim', 'bottom', 'top'], (3, 2))
@@ -70,11 +71,11 @@ class Mesh:
                           f"boundaries: {', '.join(name + of for name, of in edges.items())}"])
 
     def check(self) -> None:
-        """Look the elements over, as reading a mesh does: for meshes whose nodes were moved; collective.
+        """Check the elements of a mesh whose nodes were moved, as on reading a file. Collective.
 
         Raises:
-            InputError: a coordinate that is not finite, an element that is flat or inside out, two that lie over each
-                other or meet without sharing their nodes; the message says where.
+            InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet
+                without sharing their nodes. The message gives the position.
         """
         geometry, nodes = self.domain.geometry, np.asarray(_compat.cell_nodes(self.domain))[own_cells(self.domain)]
         numbers = geometry.index_map().local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
@@ -131,7 +132,7 @@ class Mesh:
             raise InputError(f"{caller}: within = {within!r}: {of!r} has nothing there; its {along} is from"
                              f" {comm.allreduce(lowest.min(initial=np.inf), MPI.MIN):.6g} to"
                              f" {comm.allreduce(highest.max(initial=-np.inf), MPI.MAX):.6g}")
-        # a facet has one tag: those of the part get new ones, which belong to all that the old ones belonged to
+        # a facet has one tag: facets of the part get new tags, which belong to every boundary of the old tags
         first, old = 1 + max(tag for tags in self.boundaries.values() for tag in tags), self.boundaries[of]
         values, places = self.facets.values.copy(), np.searchsorted(self.facets.indices, facets[inside])
         values[places] = first + np.searchsorted(old, values[places])

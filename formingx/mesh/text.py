@@ -1,6 +1,7 @@
 """The text file of a mesh: nodes and six-node triangles, for other solvers.
 
-The file, line by line (blank lines count for nothing, nor does what follows a #; node numbers are any whole numbers):
+The file, line by line. Blank lines and comments (from # to the end of the line) are skipped. Node numbers are any whole
+numbers.
 
     six-node triangles 2                    the format and its version
     numbering corners                       of the six nodes, see below
@@ -10,7 +11,7 @@ The file, line by line (blank lines count for nothing, nor does what follows a #
     1 3 7 1 12 5 4
     boundary 10 bottom                      then as many lines: first, middle and last node of an edge
     3 12 7
-    end                                     whatever is cut off before it is missed (version 1 has none)
+    end                                     marks a complete file (version 1 has no end line)
 
 `numbering corners`: the three corners counter-clockwise, then the middles of the edges 1-2, 2-3, 3-1 (the usual order
 of textbooks and of gmsh). `numbering around`: corner, middle, corner, ... counter-clockwise, so that every edge reads
