@@ -6,7 +6,7 @@ from typing import Any
 
 import dolfinx
 import ufl
-from dolfinx import fem, jit
+from dolfinx import fem, jit, la
 from dolfinx.fem import petsc as fem_petsc
 from ffcx.naming import compute_signature
 from mpi4py import MPI
@@ -96,6 +96,18 @@ def assemble_matrix(matrix: Any, form: Any, bcs: Any, held: float = 1.0) -> None
     """Add a compiled form's entries to a PETSc matrix, but for the rows and columns that `bcs` hold: these get `held`
     on the diagonal, else nothing."""
     fem_petsc.assemble_matrix(matrix, form, bcs, held)  # type: ignore[misc]  # types of another variant
+
+
+def assemble_vector(vector: Any, form: Any) -> Any:
+    """Assemble a compiled linear form into a `la.Vector` and add what other ranks have for this one.
+
+    Returns:
+        The owned entries, shape (n,): a view of the vector.
+    """
+    vector.array[:] = 0
+    fem.assemble_vector(vector.array, form)
+    vector.scatter_reverse(la.InsertMode.add)
+    return vector.array[: vector.index_map.size_local * vector.block_size]
 
 
 def interpolation_points(space: Any) -> Any:

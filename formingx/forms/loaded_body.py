@@ -8,6 +8,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 
+from .. import _compat
 from ..errors import InputError, known
 
 
@@ -82,10 +83,8 @@ class LoadedBody:
         volume over length."""
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
-        vector = la.vector(index_map, 1)
-        fem.assemble_vector(vector.array, form)
-        vector.scatter_reverse(la.InsertMode.add)
-        total = self._forms.comm.allreduce(float(np.abs(vector.array[:index_map.size_local]).sum()))
+        forces = _compat.assemble_vector(la.vector(index_map, 1), form)
+        total = self._forms.comm.allreduce(float(np.abs(forces).sum()))
         if not 0 < total < np.inf:
             raise InputError(f"{load!r}: a load of value 1 on the undeformed body has forces that add up to {total:g},"
                              f" so its size cannot be scaled: give it a method unit(body)")

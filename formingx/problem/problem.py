@@ -16,6 +16,7 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from .. import _compat
 from ..contact.face import FaceContact
 from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
@@ -385,11 +386,7 @@ class Problem(Histories, Units):
 
     def assemble(self, form: Any) -> np.ndarray:
         """Return a compiled linear form at the state last set, owned part, shape (n,)."""
-        array = self._buffer.array
-        array[:] = 0
-        fem.assemble_vector(array, form)
-        self._buffer.scatter_reverse(la.InsertMode.add)
-        return array[: self._n].copy()
+        return _compat.assemble_vector(self._buffer, form).copy()
 
     def assemble_scalar(self, form: Any) -> float:
         """Return a compiled scalar form at the state last set, all ranks."""

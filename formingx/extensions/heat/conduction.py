@@ -326,11 +326,7 @@ class Conduction:
         return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
 
     def _assemble(self, form: Any) -> np.ndarray:
-        array = self._buffer.array
-        array[:] = 0
-        fem.assemble_vector(array, form)
-        self._buffer.scatter_reverse(la.InsertMode.add)
-        return array[: self._n].copy()
+        return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
         """R(T) without points in contact, owned part; leaves T in `T`."""

@@ -265,18 +265,13 @@ class Stresses:
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
-        local = b.array_r.size
         for k in range(_COUNT):
             self._selector.value[:] = np.eye(_COUNT)[k]
-            array = self._vector.array
-            array[:] = 0
-            fem.assemble_vector(array, self._rhs)
-            self._vector.scatter_reverse(la.InsertMode.add)
-            b.array_w[:] = array[:local]
+            b.array_w[:] = owned = _compat.assemble_vector(self._vector, self._rhs)
             self._solver.solve(b, x)
-            array[:local] = x.array_r
+            owned[:] = x.array_r
             self._vector.scatter_forward()
-            nodes[:, :, k] = array.reshape(n, -1)
+            nodes[:, :, k] = self._vector.array.reshape(n, -1)
         return nodes
 
     def raw(self, state: Any, layer: str) -> Stress:
