@@ -1,5 +1,6 @@
 """Lines that whole runs hardly feel, each by itself: found by `benchmarks/mutants.py`."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -219,6 +220,21 @@ def test_a_jump_that_fails_leaves_what_is_remembered():
         with pytest.raises(snap_through.NoEquilibrium):
             snap_through.snap_through(path.record.curve, path.last, 0.01, False, snap_through.SnapThrough(), 1)
         assert all(one is other for one, other in zip(problem.memory, before, strict=True))
+
+
+def test_state_context_restores_history_variables():
+    path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
+        [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
+    problem, before = path.problem, path.problem.memory
+    with problem.state_context(path.states[1]):
+        assert any(inside is not outside for inside, outside in zip(problem.memory, before, strict=True))
+    assert all(restored is held for restored, held in zip(problem.memory, before, strict=True))
+
+
+def test_every_mutant_stands_in_its_file(monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "benchmarks")
+    from mutants import missing
+    assert missing() == []
 
 
 def test_a_state_with_an_element_inside_out_is_none(monkeypatch):
