@@ -66,7 +66,7 @@ def test_a_run_says_how_much_of_the_body_leaves_the_tests(more):
     assert finding.severity == "warning" and "equibiaxial tension, tested at stretches from 1 to 1.6" in finding.text
 
 
-def test_a_run_warns_and_doctor_foresees_it(caplog):
+def test_a_run_warns_and_check_predicts_it(caplog):
     data = fx.treloar1944()
     card = fx.fit(fx.MooneyRivlin, {"uniaxial": data["uniaxial"]}).material
     path = blown(card)

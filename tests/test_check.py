@@ -68,7 +68,7 @@ def test_a_soft_layer_of_long_elements():
         mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.02, "b": 0.02, "c": 0.02}, elements=(along, 1), **mesh)
         hard = fx.NeoHookean(c10=1000.0)
         return fx.check(fx.Scene(mesh=mesh, materials={"a": hard, "b": fx.NeoHookean(c10=1.0), "c": hard},
-                                  supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
+                                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
     assert "1e+03 times softer than 'a' and 0.02 thick, its elements 0.0539 long" in str(layered(20))
     assert layered(50).healthy and layered(20, concentrate={1.0: 0.3}).healthy
 

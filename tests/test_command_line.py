@@ -83,7 +83,7 @@ RUNS = {"trace": "fx.trace(scene, until=fx.pole_height(900.0))", "solve": "fx.so
 
 
 @pytest.mark.parametrize("way", RUNS)
-def test_doctor_looks_at_the_first_run(way, tmp_path, capsys):
+def test_check_looks_at_the_first_run(way, tmp_path, capsys):
     """The fillet is too small for the mesh, a target too far away; nothing is solved, whatever runs the scene."""
     (tmp_path / "script.py").write_text(SCENE + RUNS[way] + "\nprint('solved')\n")
     before = fx.trace, fx.solve, fx.study, fx.Process.run
@@ -94,7 +94,7 @@ def test_doctor_looks_at_the_first_run(way, tmp_path, capsys):
     assert ("pole height = 900" in text) == (way in ("trace", "process"))
 
 
-def test_doctor_of_no_scene(tmp_path, capsys):
+def test_check_of_no_scene(tmp_path, capsys):
     (tmp_path / "script.py").write_text("print(1)")
     assert main(["check", str(tmp_path / "script.py")]) == 2 == main(["check", str(tmp_path / "absent.py")])
     error = capsys.readouterr().err
@@ -106,7 +106,7 @@ def test_doctor_of_no_scene(tmp_path, capsys):
 @pytest.mark.parametrize("text, words", [
     (b"\x89PNG\r\n\x1a\n\0\0", "is no Python: "), (b"scene = (1,\nprint 2\n", "is no Python: .*, line "),
     (b"\0" * 9, "is no Python: "), (b"x = " + b"(" * 10_000, "is no Python: ")])
-def test_doctor_of_what_is_no_python(text, words, tmp_path, capsys):
+def test_check_of_what_is_no_python(text, words, tmp_path, capsys):
     (tmp_path / "script.py").write_bytes(text)
     assert main(["check", str(tmp_path / "script.py")]) == 2
     error = capsys.readouterr().err

@@ -1,6 +1,5 @@
 """Contact: laws against differences, balances, closed forms of stick and of sliding, independence of the step."""
 
-
 import numpy as np
 import pytest
 

@@ -30,9 +30,10 @@ print(fx.__file__, path.counts.steps, *path.profile().thickness)
 
 
 def response_ahead(curve, state):
-    """How the body gives way ahead of a state of a curve."""
+    """Return the linearised response of the body ahead of a state of a curve."""
     assert curve.factorise_ahead(state)
     return Response(curve, state, *(curve.problem.x.duplicate() for _ in range(2)))
+
 
 def test_contact_events_in_one_step():
     """A step with many gap closures gives the walls of one closure a step, in a third of the states."""
@@ -113,7 +114,7 @@ def test_sliding_points_move_as_in_the_tangent():
     (ContactStatus.STICKS, (1.0, 0.3), (0.0, -1.0), ContactStatus.STICKS, (0.0, -1.0)),
     (ContactStatus.STICKS, (0.0, 0.0), (-1.0, 0.0), ContactStatus.FREE, (0.0, 0.0))])   # goes away
 def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
-    """One of unit compliance, mu = 0.3; (normal, tangential)."""
+    """A point of unit compliance with mu = 0.3; forces, motions and rates are (normal, tangential)."""
     face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))
     points = Points([face], 0, 0, None)
     points._C, points._S, points._pulls = np.eye(2), np.zeros((1, 2, 2)), np.zeros(1, dtype=bool)
@@ -176,7 +177,7 @@ def test_iterations_that_go_to_and_fro_are_mixed():
     def piece(x):
         none = np.zeros((0, 2))
         return _Segment(x[0], [x[None]], [np.zeros((1, 2))], np.zeros(0), none, none, none, none, none, (x, x[1]))
-    starts = [fixed + by for by in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
+    starts = [fixed + offset for offset in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
     tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
     found = ContactEventSequence._mixed(SimpleNamespace(_comm=MPI.COMM_SELF), tried)
     np.testing.assert_allclose(found.at[0][0], fixed, atol=1e-9)

@@ -28,7 +28,7 @@ def ball(friction="none"):
     return fx.Contact("top", fx.tools.sphere(radius=4.0).moved(z=4.5), friction, direction=(0, -1), name="plug")
 
 
-def bifurcations(path, about):
+def warnings_about(path, about):
     return [found.text for found in path.findings() if found.about == about and found.severity == "warning"]
 
 
@@ -86,8 +86,9 @@ def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog
     scene = sheet(load=load, contacts=[mould, plug])
     stages = [fx.Stage("blow", control=scene.loads[0], until=fx.pressure(pressure), inactive=[plug])]
     path = fx.Process(scene).run(stages, progress=False)
-    assert [("away from the mould" in text) for text in bifurcations(path, f"pressure = {pressure:g}")] == [True] * away
-    moved, = bifurcations(path, "mould")
+    found = warnings_about(path, f"pressure = {pressure:g}")
+    assert ["away from the mould" in text for text in found] == [True] * away
+    moved, = warnings_about(path, "mould")
     assert ("moved away from this mould" in moved) == away and ("never touched" in moved) == (not away)
     for found in path.findings():
         assert (caplog.text.count(found.text) == 1) == (found.severity != "note")
@@ -151,14 +152,14 @@ def test_a_tool_that_meets_nothing():
     """A plug that is driven the wrong way; one that arrives is not spoken of, nor is a mould that is reached."""
     scene = sheet(contacts=[ball()])
     away = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(-3.0))], progress=False)
-    assert "met nothing on its travel of -3: the gap was" in bifurcations(away, "plug")[0]
-    assert "its first travel is -3" in bifurcations(away, repr(scene.contacts[0]))[0]
+    assert "met nothing on its travel of -3: the gap was" in warnings_about(away, "plug")[0]
+    assert "its first travel is -3" in warnings_about(away, repr(scene.contacts[0]))[0]
     stages = [fx.Stage("plug", control="plug", until=fx.travel(1.0))]
     near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", direction=(0, -1), name="plug")
-    assert bifurcations(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
+    assert warnings_about(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
     reached = fx.trace(sheet(contacts=[fx.Contact("top", fx.tools.plane(2.0), "none", name="mould")]),
                        until=fx.enclosed_volume(500.0), progress=False)
-    assert reached["contact_length"][-1] > 0 and bifurcations(reached, "mould") == []
+    assert reached["contact_length"][-1] > 0 and warnings_about(reached, "mould") == []
 
 
 def test_findings_of_a_scene_belong_to_its_path():

@@ -106,8 +106,8 @@ def test_ogden_on_treloar():
 
 @pytest.mark.parametrize("relative", [False, True])
 def test_standard_errors_are_the_scatter_of_the_fits(relative):
-    """Of 60 fits to the same tests with other noise: the scatter of a constant is its standard error, the covariance
-    that of both, and 95 % of the intervals hold the true one."""
+    """In 60 fits to the same tests with other noise a constant scatters by its standard error, and 95 % of the
+    intervals contain the true constant. The covariance is that of linear least squares."""
     true, l = fx.MooneyRivlin(c10=0.3, c01=0.05), np.linspace(1.1, 3.0, 30)
     noise = 0.01 * np.random.default_rng(1).standard_normal((60, 2, len(l)))
 
@@ -123,11 +123,11 @@ def test_standard_errors_are_the_scatter_of_the_fits(relative):
         assert 0.88 <= np.mean(inside) <= 1
     # the stresses are linear in the constants: the covariance by hand
     data = {m: noisy(m, x) for m, x in zip(("uniaxial", "equibiaxial"), noise[0])}
-    measured_, unit = (np.concatenate(x) for x in zip(*((P, P) for _, P in data.values())))
-    sizes = np.abs(unit) if relative else np.full(60, np.abs(unit).max())
+    stress = np.concatenate([P for _, P in data.values()])
+    sizes = np.abs(stress) if relative else np.full(60, np.abs(stress).max())
     J = np.stack([np.concatenate([fx.MooneyRivlin(c10=a, c01=b).stress(m, l) for m in data])
                   for a, b in ((1.0, 1e-12), (1e-12, 1.0))], axis=1) / sizes[:, None]
-    left = J @ list(fits[0].constants.values()) - measured_ / sizes
+    left = J @ list(fits[0].constants.values()) - stress / sizes
     assert fits[0].covariance == pytest.approx(left @ left / 58 * np.linalg.inv(J.T @ J), rel=1e-5)
     assert fits[0].undetermined == () and fits[0].points == 60
 

@@ -138,7 +138,7 @@ def test_force_of_a_rough_ball():
 
 @pytest.mark.slow
 def test_more_friction_takes_more_force():
-    """A smooth ball slides, at 0 as at next to no friction; no friction holds more than stick does."""
+    """The force grows with friction, from the force of "none" to the force of "stick"."""
     forces = {mu: fx.trace(pushed(mu, 0.2), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
               for mu in ("none", 1e-6, 0.2, 3.0, "stick")}
     none, hardly, some, most, stick = forces.values()
@@ -184,7 +184,7 @@ if path.problem.comm.rank == 0:
 
 
 def test_a_run_goes_on_from_a_checkpoint(tmp_path):
-    """What slides goes on as if the run had not been interrupted."""
+    """A run with sliding points continues as if it had not been interrupted."""
     whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), intermediate=[fx.travel(0.4)], progress=False)
     fx.trace(pushed(0.3, 0.2), until=fx.travel(0.4), progress=False).save(tmp_path)
     scene = pushed(0.3, 0.2)

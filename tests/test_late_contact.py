@@ -46,7 +46,7 @@ def test_a_stage_ends_without_late_contact():
 
 
 def test_a_point_deep_in_a_tool_is_told_in_words():
-    """Of the state that a run ends in it is doubted; a state that is much deeper is none."""
+    """A penetration of 0.2 at the last state is a serious finding; one of 5 makes the state inadmissible."""
     path = fx.trace(draw(16.0), until=fx.travel(12.0), progress=False)
     state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)
     assert serious(path) == [] and path._view(path.segments[-1]).verdict.of(state) == ""

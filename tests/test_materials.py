@@ -230,7 +230,7 @@ def test_inflation_to_the_limit(material, caplog):
     """A step that is far too long leaves the domain, is halved, and the path goes on to 99.8 % of the limit.
 
     (On this mesh the quadrature points come to the limit when the pole itself is at 99.88 % of it; where they lock,
-    one row of elements does not keep its volumes, which ends a run that is not to go on `allow_inadmissible` that.)
+    one row of elements does not keep its volumes, which ends a run without `allow_inadmissible`.)
     """
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
     scene = fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],

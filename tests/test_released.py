@@ -113,8 +113,8 @@ def test_setting_pot_quick(tmp_path):
 RUBBER = fx.NeoHookean(c10=0.5e6)
 WARM = {"sets": fx.Solidification(RUBBER, modulus=8e8, between=(90, 120)),
         "relaxes and sets": fx.Solidification(fx.Viscoelastic(fx.NeoHookean(c10=0.4e6), [(0.4e6, 0.5)],
-                                                    shift=fx.Arrhenius(100e3, 150.0, unit="C")),
-                                    modulus=8e8, between=(90, 120)),
+                                                              shift=fx.Arrhenius(100e3, 150.0, unit="C")),
+                                              modulus=8e8, between=(90, 120)),
         "stiffens": fx.NeoHookean(c10=fx.table({19: 2e6, 151: 0.5e6}))}
 
 

@@ -365,7 +365,7 @@ def test_a_relaxing_block_under_a_ball(monkeypatch, material):
         press = fx.Stage("press", control=scene.contacts[0], until=fx.travel(0.25), duration=0.4)
         more = fx.Stage("more", control=scene.contacts[0], until=fx.travel(0.3), duration=0.1)
         return fx.Process(scene).run([press, fx.Stage("hold", duration=0.2), more], progress=False, **options)
-    twice(monkeypatch, press=0.3, constant=0.45)
+    twice(monkeypatch, press=0.3, hold=0.45)
     whole, path = run(), run(remesh=fx.Remesh(size=0.07, corner=0.07))
     assert [s.stage for s in path.states if s.kind == "remesh"] == ["press", "hold"]
     for stage in ("press", "hold", "more"):

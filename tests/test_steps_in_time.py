@@ -156,7 +156,7 @@ def test_between_states_of_a_flow_there_is_none_to_find():
         path.at(fx.travel(0.987654))
 
 
-def test_doctor_sees_a_modulus_that_pulls_a_cooling_body_back():
+def test_check_sees_a_modulus_that_pulls_a_cooling_body_back():
     """On what is left when all has relaxed; not on a branch that sets, nor on a rubber's."""
     table, rubber = fx.table({20: 6.0, 150: 1.0}), fx.entropic(0.5, 150.0, unit="C")
     sets = fx.Viscoelastic(fx.NeoHookean(c10=rubber), [(20.0, 1e-3)], shift=fx.Arrhenius(200e3, 150.0, unit="C"))

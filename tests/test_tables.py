@@ -97,7 +97,7 @@ def test_constants_that_are_refused(make):
     (lambda t: 3 * np.sin(t) ** 2, 0.0, 5.0), (lambda t: -np.exp(-5 * t), 1.0, 2.0), (lambda t: 7.0, 0.0, 1.0),
     (lambda t: 1e-9 * t**3, -1.0, 1.0)])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
-def test_course(function, start, until, tolerance):
+def test_amplitude(function, start, until, tolerance):
     """Nowhere off by more than the tolerance, ends exact, and the points are as many as its curvature asks for."""
     t, f = np.array(fx.amplitude(function, until, start, tolerance=tolerance)).T
     fine = np.linspace(start, until, 10001)
@@ -109,7 +109,7 @@ def test_course(function, start, until, tolerance):
 @pytest.mark.parametrize("function, words", [
     (lambda t: t > 0.3, "not smooth near t = 0.3"), (lambda t: np.where(t > 0.5, np.nan, t), "not a finite number"),
     (None, "fails")])
-def test_a_course_that_is_none(function, words):
+def test_an_amplitude_that_is_none(function, words):
     with pytest.raises(fx.InputError, match=words):
         fx.amplitude(function, 1.0)
     with pytest.raises(fx.InputError, match="after start"):

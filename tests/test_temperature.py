@@ -163,7 +163,7 @@ def test_a_sheet_cools_while_it_waits():
 
 
 def test_relaxation_times_are_those_in_the_middle_of_a_step():
-    """Of a rate of relaxation the mean over the step counts; a modulus is that at its end."""
+    """Relaxation times are evaluated in the middle of a step, moduli at its end."""
     heat = fx.Cooling(SHEET, [fx.Convection("top", h=100.0, air=20.0)], unit="C")
     melt = fx.Viscoelastic(fx.NeoHookean(c10=fx.table({20: 2.0, 150: 1.0})), [(1.0, 4.0)],
                            shift=fx.Arrhenius(100e3, 150.0, unit="C"))

@@ -147,7 +147,7 @@ def test_tangent_and_control_derivative_in_time(model):
     problem, last = path.problem, path.last
     with problem.state_context(last):
         setting = problem.setting
-        rate = [1.0 if thing in scene.loads else 0.0 for thing in scene.items] + [2.0]
+        rate = [1.0 if item in scene.loads else 0.0 for item in scene.items] + [2.0]
         base = [*setting.standing(last.control)[:-1], last.time + 0.1]
         base = [b - r * last.control for b, r in zip(base, rate)]
         problem.enter(type(setting)(base, rate, []), last.x, last.control)
