@@ -21,7 +21,7 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 STORED = Path(__file__).with_suffix(".json")
 NAMES = sorted(file.stem for file in (ROOT / "demos").glob("*.py") if "main()" in file.read_text())
-SECONDS = 3600                                              # that a demo may take
+SECONDS = 3600                                              # of wall time that a demo may take
 RELATIVE, ABSOLUTE, COUNTED = 1e-4, 1e-9, 0.2               # of numbers; of what a run counts: it depends on round-off
 COUNTS = {"steps", "states", "newton_iterations", "iterations", "cutbacks", "failures", "jumps"}
 TIMES = ("seconds", "workers")
@@ -52,7 +52,7 @@ def numbers(summary: Any, name: str = "") -> dict[str, Any]:
 
 
 def differs(key: str, old: Any, new: Any, relative: float = RELATIVE) -> bool:
-    """True if two values of a key differ by more than their tolerance."""
+    """Return whether two values of a key differ by more than their tolerance."""
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in (old, new)):
         return type(old) is not type(new) or old != new
     if key.rsplit("/", 1)[-1] in COUNTS:
@@ -67,7 +67,7 @@ def differences(old: dict[str, Any], new: dict[str, Any], relative: float = RELA
 
 
 def table(rows: list[tuple[str, str, Any, Any]]) -> str:
-    """Lines of (demo, key, stored value, new value), with the relative difference."""
+    """Return a table of rows (demo, key, stored value, new value), with the relative differences."""
     lines = [f"{'demo and key':60}{'stored':>15}{'now':>15}{'off':>9}"]
     for demo, key, old, new in rows:
         both = all(isinstance(v, int | float) and not isinstance(v, bool) for v in (old, new))
@@ -78,7 +78,7 @@ def table(rows: list[tuple[str, str, Any, Any]]) -> str:
 
 
 def read(folder: Path, demo: str) -> dict[str, Any] | None:
-    """Numbers of the summary that a demo has left in a folder, or None."""
+    """Return the numbers of a demo's summary in a folder, or None if there is no summary."""
     file = folder / demo / "summary.json"
     return numbers(json.loads(file.read_text())) if file.exists() else None
 
@@ -102,7 +102,7 @@ def main() -> int:
     options.add_argument("--against", type=Path, help=f"folder of results to compare with (default: {STORED.name})")
     options.add_argument("--relative", type=float, default=RELATIVE, help="largest relative difference of a number")
     options.add_argument("--only-compare", action="store_true", help="run nothing: compare the results in the folder")
-    options.add_argument("--store", action="store_true", help=f"take the new numbers up in {STORED.name}")
+    options.add_argument("--store", action="store_true", help=f"store the new numbers in {STORED.name}")
     args = options.parse_args()
     if unknown := sorted({*args.demos} - {*NAMES}):
         options.error(f"no such demos: {', '.join(unknown)}; there are {', '.join(NAMES)}")

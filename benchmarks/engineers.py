@@ -3,7 +3,7 @@
     ./fx python3 benchmarks/engineers.py [--against CHECKOUT] [--finest] [--only pot cup] [--json FILE]
 
 Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
-time while paths are followed, in all and by part (contact: laws, arrivals, local problems; tangents; LU factors;
+time while paths are followed, in all and by part (contact: laws, gap closures, local problems; tangents; LU factors;
 solves; rest), forms compiled before; what made steps shorter or fail. `--against` puts the same of another version of
 the package beside it, by that version's own copy of this script. `--finest` adds the largest difference of the walls,
 farther than a thickness from the rim, to one node a step in steps of at most `LARGEST`.

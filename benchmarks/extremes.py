@@ -109,7 +109,7 @@ def rows(quick):
 
 
 def why():
-    """Why the displacement-only penalty breaks: condition of the tangent at rest, and Newton's radius there.
+    """Find the condition of the undeformed body's tangent, and Newton's radius there, for each form of the penalty.
 
     The radius is the longest first step, as deflection over the radius of the sheet, from which Newton converges.
     Returns {name: {eps: {"condition", "negative_eigenvalues", "first_step"}}}.

@@ -340,7 +340,7 @@ def _of_answers() -> dict[str, Callable]:
         stage = fx.Stage("on", control=rng.choice(scene.drivable), until=target(near(0.1, rng) * rng.choice([1, -1])))
         mixed = rng.choice([[stage], [], anything(rng)])
         str(fx.check(scene, targets=rng.choice([[], [fx.pole_stretch(2.0)], anything(rng)]), stages=mixed,
-                      units=rng.choice([fx.Units(length="mm", stress="MPa"), fx.Units(), anything(rng)])))
+                     units=rng.choice([fx.Units(length="mm", stress="MPa"), fx.Units(), anything(rng)])))
 
     def made(rng):
         kind = rng.choice([fx.NeoHookean, fx.MooneyRivlin, fx.Gent, fx.Yeoh, fx.Ogden, fx.Viscoelastic])

@@ -91,7 +91,7 @@ def mesh_for(plug):
 
 
 def run(plug, max_steps=None, through=(), **options):
-    """(path or None, how it ended, elements): "arrived", or why not. through: travels on the way, over its radius."""
+    """Return (path or None, "arrived" or why not, elements). through: travels on the way, over the plug's radius."""
     radius = plug.lengths[0]
     friction, separates = plugs.LAWS.get(plug.law, (plug.law, True))
     mesh = mesh_for(plug)

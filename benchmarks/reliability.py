@@ -227,7 +227,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
                                  "max_steps": ("count", 1000), "allow_inadmissible": ("flag", False)}),
         *_time_and_heat(),
         Call("check", fx.check, {"scene": ("thing", _scene()), "targets": ("several", ()), "stages": ("several", ()),
-                                   "units": ("thing", fx.Units())}),
+                                 "units": ("thing", fx.Units())}),
     ]
 
 

@@ -1,8 +1,8 @@
 """The wall in the corner of a stuck cup: columns of one size, and columns as a pilot run asks for.
 
 The sheet and the cup of `cup` with a corner of an eighth of the thickness (0.0375 cm), stuck where it touches, to 160
-psi: the wall is least where the sheet comes last, beside the corner. What sticks keeps its wall from then on, so that
-the minimum wall leaps with the place of the nodes, by percents on columns of one size. `mesh.adapted` takes a run on 20
+psi: the wall is least where the sheet comes last, beside the corner. A sticking point keeps its wall. The minimum
+wall therefore varies with the place of the nodes, by percents on columns of one size. `mesh.adapted` takes a run on 20
 columns and lets none turn by more than `share` radians as the sheet bends (or over a fillet that it lies on); each mesh
 is made by the run before. Lengths in cm, stresses in psi.
 """
@@ -37,7 +37,7 @@ def disc(columns):
 
 
 def least_walls(path, pressures) -> dict:
-    """{pressure as text: minimum wall over h0, away from the rim}."""
+    """Return {pressure as text: minimum wall over h0, away from the rim}."""
     shapes = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
     return {p: float(shape.wall_ratio[shape.reference_radius < INSIDE * RADIUS].min()) for p, shape in shapes.items()}
 
@@ -75,7 +75,7 @@ def columns(path) -> int:
 
 
 def draw(runs, walls, truth, last):
-    """The minimum wall against columns, and how long they are."""
+    """Draw the minimum wall over the number of columns, and the lengths of the columns."""
     figure, (left, right) = plots.figure(2, width=5.0)
     for k, (name, found) in enumerate(walls.items()):
         left.plot(list(found), [w[last] for w in found.values()], "o-", color=f"C{k}", label=name)

@@ -1,9 +1,9 @@
 """Biaxial tests of two rubbers, predicted from uniaxial and equibiaxial ones, and fitted directly.
 
-Tests of James et al. (1975) and of Kawamura et al. (2001), sources in demos/data: one stretch held at 1.1 to 3.5, the
-other varied. Laws are fitted to the uniaxial test alone, to the uniaxial and the equibiaxial points, and to the biaxial
-tests themselves. Deviations are root mean squares of the misfit over the stress, along the held stretch (2, the larger
-one) and across it (1), of stresses above 5 % of the largest. With --quick, two laws.
+Tests of James et al. (1975) and of Kawamura et al. (2001), sources in demos/data: stretch 2 is constant,
+1.1 to 3.5, stretch 1 is varied. Laws are fitted to the uniaxial test alone, to the uniaxial and the equibiaxial points,
+and to the biaxial tests themselves. Deviations are root mean squares of the misfit over the stress, along stretch 2
+(the larger one) and across it, of stresses above 5 % of the largest. With --quick, two laws.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ LEAST = 0.05                                                                # of
 
 
 def table(name):
-    """{test: columns}: (stretch, stress), and for biaxial tests (stretch 1, stretch 2, stress 1, stress 2)."""
+    """Return {test: columns}: (stretch, stress), and for biaxial tests (stretch 1, stretch 2, stress 1, stress 2)."""
     found = {}
     for _, row in records(DATA / name)[1:]:
         found.setdefault(row[0], []).append([float(cell or "nan") for cell in row[1:]])
@@ -35,22 +35,22 @@ def table(name):
 
 
 def equibiaxial(tests):
-    """(stretch, stress) of the biaxial points whose stretches are alike within 1 %, and of an equibiaxial test."""
+    """Return (stretch, stress) of biaxial points whose stretches agree within 1 %, and of an equibiaxial test."""
     l1, l2, P1, P2 = tests["biaxial"]
     alike = np.abs(l1 / l2 - 1) < 0.01
     l, P = l1[alike], np.where(np.isfinite(P1), P1, P2)[alike]
-    more = tests.get("equibiaxial", (np.zeros(0), np.zeros(0)))
-    return np.append(l, more[0]), np.append(P, more[1])
+    test = tests.get("equibiaxial", (np.zeros(0), np.zeros(0)))
+    return np.append(l, test[0]), np.append(P, test[1])
 
 
 def deviations(material, biaxial):
-    """Root mean squares of the misfit over the stress, along and across, %."""
+    """Return the root mean square of the misfit over the stress, along and across, %."""
     l1, l2, *measured = biaxial
     computed = material.stress("biaxial", np.stack([l1, l2]))
     found = {}
     for name, P, p in zip(("across", "along"), measured, computed):
-        there = np.isfinite(P) & (np.abs(P) > LEAST * np.nanmax(np.abs(P)))
-        found[name] = 100 * float(np.sqrt(np.mean((p[there] / P[there] - 1) ** 2)))
+        counted = np.isfinite(P) & (np.abs(P) > LEAST * np.nanmax(np.abs(P)))
+        found[name] = 100 * float(np.sqrt(np.mean((p[counted] / P[counted] - 1) ** 2)))
     return found
 
 
@@ -87,7 +87,7 @@ def main():
 
 
 def picture(out, best, law):
-    """Stresses over the varied stretch: measured, predicted from the uniaxial test, fitted."""
+    """Draw stresses over the varied stretch: measured, predicted from the uniaxial test, fitted."""
     figure, axes = plots.figure(2, width=5)
     for ax, (rubber, file) in zip(axes, RUBBERS.items()):
         l1, l2, P1, P2 = table(file)["biaxial"]

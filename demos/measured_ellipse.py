@@ -55,10 +55,10 @@ def at(place, points, values, signs, count):
     """
     every = np.concatenate([points * mirror for mirror in ((1, 1), (-1, 1), (1, -1), (-1, -1))])
     found = np.concatenate([values, values * signs, values * signs, values])
-    near = np.argsort(np.hypot(*(every - place).T))[:count]
-    x, y = (every[near] - place).T
+    nearest = np.argsort(np.hypot(*(every - place).T))[:count]
+    x, y = (every[nearest] - place).T
     terms = np.column_stack([np.ones(count), x, y, x * x, x * y, y * y])
-    return np.linalg.lstsq(terms, found[near], rcond=None)[0][0]
+    return np.linalg.lstsq(terms, found[nearest], rcond=None)[0][0]
 
 
 def predicted(path):

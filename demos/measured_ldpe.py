@@ -28,18 +28,18 @@ SOURCE = "github.com/jorge-ramirez-upm/RepTate, folder data/DOW, commit 4aeb671f
 
 
 def table(name):
-    """Columns of a table of measured numbers."""
+    """Return the columns of a table of measured numbers."""
     return np.array([row for _, row in records(DATA / name)[1:]], float).T
 
 
 def extension(card, rate, strains):
-    """True tensile stress at Hencky strains, Pa."""
+    """Return the true tensile stress at Hencky strains, Pa."""
     stretches = np.exp(strains)
     return card.constant_rate("uniaxial", rate, stretches) * stretches
 
 
 def scene_extension(card, rate, accuracy):
-    """The same in a block of one element whose top is pulled."""
+    """Return the true tensile stress at `STRAINS` in a block of one element whose top is pulled, Pa."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=card,
                      supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
                                fx.PrescribedDisplacement("top", "z", name="pull")])
@@ -52,7 +52,7 @@ def scene_extension(card, rate, accuracy):
 
 
 def separable(spectrum, strains, stress, rate):
-    """Stress at another rate by time-strain separability alone, without a form of the damping, Pa.
+    """Return the stress at another rate by time-strain separability alone, without a form of the damping, Pa.
 
     With a stress G(t) H(strain) after a step of strain, the stress of start-up at a rate r is the integral of G(e/r)
     H'(e) over the strain e. So ds_r/de = G(e/r)/G(e/r0) ds_0/de, with s_0 measured at r0.
@@ -135,7 +135,7 @@ def main():
 
 
 def picture(out, omega, storage, loss, spectrum, strains, measured, card, shear_times, shear):
-    """Moduli, extension and shear."""
+    """Draw moduli, extension and shear."""
     figure, (left, middle, right) = plots.figure(3, width=4.2)
     x = omega[:, None] * np.array([tau for _, tau in spectrum.pairs])
     G = np.array([G for G, _ in spectrum.pairs])

@@ -2,9 +2,9 @@
 
 Each law is fitted to the uniaxial, pure-shear and equibiaxial tests of 1944 together (`fx.treloar1944`), by misfits
 relative to the stress (the default) and by absolute ones. The limit pressure of his sheet, simply supported, is
-held against the pressure that the equibiaxial test gives: p = 2 h0 P/(R lambda), the first maximum over the measured
-points, R the radius of the hole. So much a hemispherical cap bears; a cap that keeps one stretch bears the other value
-in the summary. With --quick, Mooney-Rivlin and Ogden alone.
+compared with the pressure that the equibiaxial test gives: p = 2 h0 P/(R lambda), the first maximum over the measured
+points, R the radius of the hole. That is the pressure in a hemispherical cap; the other value in the summary belongs
+to a cap of one stretch. With --quick, Mooney-Rivlin and Ogden alone.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ WAYS = {"relative": True, "absolute": False}
 
 
 def limit(material, elements):
-    """Largest pressure of the sheet up to a pole stretch of 4, kg/cm2: at a limit point, or None."""
+    """Return the largest pressure of the sheet up to a pole stretch of 4, kg/cm2: at a limit point, or None."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=(elements, 1)), materials=material,
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
     path = fx.trace(scene, until=fx.pole_stretch(min(4.0, 0.9 * material.largest_stretch("equibiaxial"))),
@@ -33,13 +33,13 @@ def limit(material, elements):
 
 
 def first_maximum(values):
-    """The first value that is larger than both neighbours."""
+    """Return the first value that is larger than the one before and not smaller than the next."""
     k = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:]))[0] + 1
     return float(values[k])
 
 
 def measured():
-    """{estimate: limit pressure from the equibiaxial test, kg/cm2}."""
+    """Return {estimate: limit pressure from the equibiaxial test, kg/cm2}."""
     l, P = fx.treloar1944()["equibiaxial"]
     rows = l > 1.15                                                         # at small stretches the points scatter
     l, P = l[rows], P[rows] * MPA
@@ -86,7 +86,7 @@ def main():
 
 
 def picture(out, fits, data):
-    """Pressure of a cap of one stretch over the stretch, from the test and from the laws."""
+    """Draw the pressure of a cap of one stretch over the stretch, from the test and from the laws."""
     figure, axes = plots.figure(2, width=5)
     l, P = data["equibiaxial"]
     for ax, (way, each) in zip(axes, fits.items()):

@@ -103,7 +103,7 @@ def membrane_curve(mu, fillet, last) -> Membrane:
 
 
 def at_travels(path, travels) -> dict:
-    """Forces and minimum walls at the travels that a path met."""
+    """Return forces and minimum walls at the travels that a path met."""
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {t: state for t, state in met.items() if state is not None}
     return {

@@ -1,8 +1,9 @@
 """A tray formed by a plug with friction and a vacuum, from a heated sheet that relaxes, with two planes of symmetry.
 
 The sheet is hotter in its middle; its stiffness is a table of the temperature. The plug, a box with rounded edges,
-slides on the sheet (Coulomb's law), waits, and is left out as the vacuum draws the sheet into the mould, which chills
-it: the sheet sticks there. A quarter, and a half for comparison, are solved; all numbers are those of the whole part.
+slides on the sheet (Coulomb's law), waits, and is left out as the vacuum draws the sheet into the mould, where it
+sticks, as on a cold mould (no heat is conducted). A quarter, and a half for comparison, are solved; all numbers are
+those of the whole part.
 Lengths in mm, stresses in MPa, times in s, temperatures in degrees Celsius.
 """
 
@@ -21,12 +22,12 @@ UNITS = fx.Units(length="mm", stress="MPa", time="s")
 
 
 def temperature(x, y):
-    """Hottest in the middle, 25 degrees less in the corners."""
+    """Return the temperature at (x, y), C: hottest in the middle, 25 degrees less in the corners."""
     return 165.0 - 12.5 * ((2 * x / SHEET[0]) ** 2 + (2 * y / SHEET[1]) ** 2)
 
 
 def form(part, size):
-    """The path of a part of the tray: "whole", "half" or "quarter"."""
+    """Return the path of a part of the tray: "whole", "half" or "quarter"."""
     sheet = fx.mesh.sheet(fx.mesh.rectangle(*SHEET, corner=CORNER, part=part), size=size)
     material = fx.Viscoelastic(fx.NeoHookean(c10=fx.table(STIFFNESS)), [(0.15, 0.5)])
     mould = fx.tools.box(half=(72, 42), depth=30, corner=18, fillet=8, lip=3, draft=8)
@@ -44,7 +45,7 @@ def form(part, size):
 
 
 def numbers(path):
-    """What the summary holds of one path: of the whole part."""
+    """Return the summary's numbers of one path, for the whole part."""
     wall, part = path.wall(), path.part(density=DENSITY, units=UNITS)
     return {"weight_g": part.weight, "least_wall_mm": part.min_wall, "least_at_mm": list(part.min_wall_at),
             "plug_force_N": float(np.abs(path["plug_force"]).max()),

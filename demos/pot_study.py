@@ -2,10 +2,10 @@
 
 A sheet of 40 mm radius and 1.2 mm (Mooney, 0.35 and 0.05 MPa: a soft sheet, as an example) is clamped; a plug stretches
 it into a cup mould 60 mm deep, vacuum lifts it off the plug and lays it on the mould, where it stays. An elastic sheet
-remembers the plug only through what the friction of the plug held back and what the mould holds. Evenness is the least
-wall over the mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa. The 60 runs take
-120 s of processor time, shared by the cores. (The design stops at a friction of 0.45: with 0.6 five of the eight runs
-at travels of 48 and 54 ended as the vacuum began, where contact did not settle.)
+remembers the plug only through what the friction of the plug held back and what the mould holds. Evenness is
+`Part.uniformity`: minimum over mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa. The 60 runs
+take 120 s of processor time, shared by the cores. (The design stops at a friction of 0.45: with 0.6 five of the eight
+runs at travels of 48 and 54 ended as the vacuum began, where contact did not settle.)
 """
 
 import os
@@ -39,12 +39,12 @@ def pot(travel, radius, friction, elements=(30, 1)):
 
 
 def uniformity(path):
-    """Least wall over mean wall of the trimmed part."""
+    """Return the minimum wall over the mean wall of the trimmed part."""
     return path.part(trim=TRIM).uniformity
 
 
 def min_wall(path):
-    """Of the trimmed part, mm."""
+    """Return the minimum wall of the trimmed part, mm."""
     return path.part(trim=TRIM).min_wall
 
 

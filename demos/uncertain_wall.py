@@ -2,7 +2,7 @@
 
 Gent's constants come from Treloar's tests (`fx.fit`), with their covariance; the thickness of the sheet scatters by 2 %
 besides. The sheet is blown into a cup, on which it sticks, to a volume of air.
-The band of one run, by its derivatives, is held against samples of the constants, each with a run of its own. (Lengths
+The band of one run, by its derivatives, is compared with samples of the constants, each with a run of its own. (Lengths
 over the radius of the cup, stresses in MPa.) With --quick, a coarser mesh.
 """
 
@@ -18,7 +18,7 @@ SAMPLES, SEED = 40, 1
 
 
 def cup(mu, limit, thickness, elements):
-    """A sheet that sticks to a cup, and the volume at which it ends."""
+    """Return the scene of a sheet that sticks to a cup, and the target of the run."""
     mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=thickness, draft=10.0, fillet=0.3, lip=0.1)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.1, thickness=thickness, elements=elements),
                      materials=fx.Gent(mu=mu, Jm=limit), loads=[fx.Pressure("bottom")],
@@ -50,13 +50,13 @@ def main():
         values = np.array([one.wall if name == "wall" else [one.volume] if name == "volume" else one.path[name][-1:]
                            for one in runs])
         linear = (samples - run.vector) @ run.derivative(name)[1].T
-        left = values - band.value - linear
+        remainder = values - band.value - linear
         sampled = values.std(axis=0, ddof=1)
         key = "force" if name == force else name
         summary["band"][key] = {"value": float(band.value.mean()), "deviation_percent": 100 * float(
             np.sqrt(np.mean(band.deviation**2)) / abs(band.value.mean()))}
         summary["deviation_over_sampled"][key] = float(np.sqrt(np.mean(band.deviation**2) / np.mean(sampled**2)))
-        summary["linear_misfit"][key] = float(np.sqrt(np.mean(left**2) / np.mean((values - band.value) ** 2)))
+        summary["linear_misfit"][key] = float(np.sqrt(np.mean(remainder**2) / np.mean((values - band.value) ** 2)))
         say(f"{key:10} {summary['band'][key]['value']:.5g} ± {summary['band'][key]['deviation_percent']:.2f} %,"
             f" over the deviation of the samples {summary['deviation_over_sampled'][key]:.3f}; the derivatives leave"
             f" {100 * summary['linear_misfit'][key]:.1f} % of the samples' changes")

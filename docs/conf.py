@@ -21,13 +21,14 @@ def notebooks_as_pages(app):
     """Write each notebook of docs/notebooks, with the output that it holds, as Markdown beside it."""
     from nbconvert import MarkdownExporter
     for file in Path(app.srcdir).glob("notebooks/*.ipynb"):
-        text, held = MarkdownExporter().from_filename(file, {"unique_key": file.stem, "output_files_dir": "output"})
-        for name, data in held["outputs"].items():
+        options = {"unique_key": file.stem, "output_files_dir": "output"}
+        text, resources = MarkdownExporter().from_filename(file, options)
+        for name, data in resources["outputs"].items():
             (file.parent / name).parent.mkdir(exist_ok=True)
             (file.parent / name).write_bytes(data)
         file.with_suffix(".md").write_text(f"{text}\nThis page is {{download}}`a notebook <{file.name}>`.\n", "utf-8")
 
 
 def setup(app):
-    """What Sphinx calls first."""
+    """Convert the notebooks when Sphinx has read its configuration."""
     app.connect("config-inited", lambda app, config: notebooks_as_pages(app))
