@@ -374,8 +374,10 @@ def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], 
 
 
 def _resolution(points: np.ndarray, k: int | None) -> float:
-    """Return the distance of the dropped points from the curve through every other point, over column k or across
-    it."""
+    """Return the largest distance of every second point from the curve through the others.
+
+    The distance is at the same value of column k; None: across the curve.
+    """
     if len(points) < 5:
         return float("inf")
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))

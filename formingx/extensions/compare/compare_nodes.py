@@ -18,7 +18,7 @@ from ...results import files
 from ...results.show import plots
 
 _REST = {2: ("R", "Z"), 3: ("X", "Y")}
-"""Columns of reference coordinates, by the components of a displacement; a sheet in space is flat at rest."""
+"""Columns of reference coordinates, by the number of displacement components; a sheet with three is flat at first."""
 
 
 @dataclass(frozen=True)

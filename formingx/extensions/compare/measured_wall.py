@@ -16,7 +16,7 @@ from ...results import files
 from ...results.path import Path
 
 _FAR = 1.0
-"""Distance of a measured point from the computed section, over the wall there, from which it is named."""
+"""Distance of a measured point from the computed section, over the wall there, above which the table shows it."""
 _BEYOND = 0.1
 """Length beyond the end of the computed part, over its length, up to which a point counts as at its end."""
 _WALL = ("wall", "thickness", "wall_thickness")
@@ -108,10 +108,10 @@ class MeasuredWall:
         at, away = self._numbers(profile)
         numbers = np.arange(len(profile.middle))
 
-        def there(values: np.ndarray) -> np.ndarray:
+        def interpolated(values: np.ndarray) -> np.ndarray:
             return np.interp(at, numbers, values)
-        return WallComparison(there(profile.arc_length), there(profile.reference_length), self.wall,
-                              there(profile.wall_thickness), away, path.problem.comm)
+        return WallComparison(interpolated(profile.arc_length), interpolated(profile.reference_length), self.wall,
+                              interpolated(profile.wall_thickness), away, path.problem.comm)
 
     def _numbers(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return the (fractional) point numbers on the middle line, and the distances from it, shape (m,) each."""
@@ -187,15 +187,15 @@ class WallComparison:
         if axes is None:
             from ...figures import figure
             axes = figure(2, width=5)[1]
-        wall, off = axes
+        wall, deviation = axes
         order = np.argsort(self.length)
         wall.plot(self.length[order], self.computed[order], "-", label="computed")
         wall.plot(self.length, self.measured, "ko", ms=4, label="measured")
         wall.set(xlabel="length from the axis", ylabel="wall", ylim=(0, None))
         wall.legend()
-        off.axhline(0, color="0.6", linewidth=1)
-        off.plot(self.length[order], self.deviation_percent[order], "o-", ms=4)
-        off.set(xlabel="length from the axis", ylabel="deviation, %")
+        deviation.axhline(0, color="0.6", linewidth=1)
+        deviation.plot(self.length[order], self.deviation_percent[order], "o-", ms=4)
+        deviation.set(xlabel="length from the axis", ylabel="deviation, %")
         return axes
 
     def to_csv(self, file: Any) -> FilePath:

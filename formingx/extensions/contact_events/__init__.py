@@ -1,6 +1,7 @@
 """Contact events: several gap closures in one step, predicted one after the other.
 
-It extends `forms.step_limit`. Without it, each step ends where a point touches that sticks."""
+It extends `contact.step_limit`. Without it, each step ends where a sticking point touches.
+"""
 
 from ...contact.step_limit import StepLimit
 from .prediction import ContactEventPredictor

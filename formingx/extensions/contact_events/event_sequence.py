@@ -159,11 +159,10 @@ class ContactEventSequence:
         self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
         blank = np.zeros((0, start[0].shape[1]))
-        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), blank, blank, blank, blank,
-                                 blank,
-                               (np.zeros(len(x)), 0.0))]
+        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), blank, blank, blank, blank, blank,
+                                 (np.zeros(len(x)), 0.0))]
         self._end: _Segment | None = None                     # end of the last segment, in equilibrium
-        self._taken = self._work = 0                        # arrivals that are held; see `EventSettings.work`
+        self._taken = self._work = 0                        # closures with a contact force; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
         if not self._take_over():
             self._pieces, self.ends = self._pieces[:1], 0.0
@@ -196,10 +195,10 @@ class ContactEventSequence:
         """
         piece = self._piece(length)
         times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
-        for arrival in self._closures:
-            if arrival.time < length and arrival.rank == self._comm.rank:
-                times[arrival.face][arrival.point] = arrival.time
-                at[arrival.face][arrival.point] = arrival.place
+        for closure in self._closures:
+            if closure.time < length and closure.rank == self._comm.rank:
+                times[closure.face][closure.point] = closure.time
+                at[closure.face][closure.point] = closure.place
         sure = [np.zeros(len(x), dtype=bool) for x in at]
         self._points.spread(piece.of(len(self._points.who)).status != ContactStatus.FREE, sure)
         return times, at, sure
@@ -241,7 +240,7 @@ class ContactEventSequence:
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _take_over(self) -> bool:
-        """Apply own forces to the sliding points of the state; return False without a prediction."""
+        """Apply contact forces to the sliding points of the state; return False without a prediction."""
         x, control = self._way[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
@@ -280,15 +279,15 @@ class ContactEventSequence:
 
     def _hold(self, length: float) -> bool:
         """Apply the contact force of the last closure and add the next segment; return False without a prediction."""
-        last, arrival, end = self._pieces[-1], self._closures[-1], self._end
-        if end is None or arrival.who not in self._points.who and not self._learn(length):
+        last, closure, end = self._pieces[-1], self._closures[-1], self._end
+        if end is None or closure.who not in self._points.who and not self._learn(length):
             return False
         self._taken += 1
-        end, k = end.of(len(self._points.who)), self._points.who.index(arrival.who)
+        end, k = end.of(len(self._points.who)), self._points.who.index(closure.who)
         status, place = end.status.copy(), end.place.copy()
         slips = self._points.at(last.speed)[k] @ self._points.near(end.at, end.force).tangent[k]
         status[k] = ContactStatus.STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
-        place[k] = arrival.place
+        place[k] = closure.place
         return self._turn(end._replace(status=status, place=place), status)
 
     def _find(self, length: float) -> bool:
@@ -324,7 +323,7 @@ class ContactEventSequence:
 
     def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
         """Return the closure of a point near an arc length, from the positions `at` of the points."""
-        listener = None
+        closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
             law, by = face.law.part([i]), 0.0
@@ -335,35 +334,35 @@ class ContactEventSequence:
                     break
                 by = max(by - gap / rate, self._pieces[-1].begins - time)
                 near = law.nearest(x + by * w)
-            listener = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
-                           bool(np.isinf(np.ravel(law.friction)[0])))
-        return self._comm.bcast(listener, root=rank)
+            closure = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
+                                 bool(np.isinf(np.ravel(law.friction)[0])))
+        return self._comm.bcast(closure, root=rank)
 
     def _settle(self, length: float) -> bool:
         """Equilibrate the path at the last closure, and relocate the closure; return False on failure."""
-        last, arrival = self._pieces[-1], self._closures[-1]
-        self._end = end = last.after(arrival.time)
-        if arrival.time - last.begins < _SETTINGS.soon * length:
+        last, closure = self._pieces[-1], self._closures[-1]
+        self._end = end = last.after(closure.time)
+        if closure.time - last.begins < _SETTINGS.soon * length:
             return True
         tried: list[tuple[_Segment, _Segment]] = []
         for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
             if len(tried) == _SETTINGS.iterations or self.exhausted:
                 return False
-            arrival, moved = self._closures[-1], self._moved(arrival.time, end)
+            closure, moved = self._closures[-1], self._moved(closure.time, end)
             if moved is None:
                 return False
-            found = self._meets(*arrival.who, arrival.time, moved.at)
+            found = self._meets(*closure.who, closure.time, moved.at)
             tried.append((end, moved.after(found.time)))
             mixed = self._mixed(tried)
             if mixed is None:
                 return False
             end = mixed
-            found = self._meets(*arrival.who, end.begins, end.at)
-            if not (found.time > last.begins and abs(found.time - arrival.time) < _SETTINGS.late * arrival.time):
+            found = self._meets(*closure.who, end.begins, end.at)
+            if not (found.time > last.begins and abs(found.time - closure.time) < _SETTINGS.late * closure.time):
                 return False
             self._closures[-1], self._end = found, (end := end.after(found.time))
             near = (_SETTINGS.same_place if found.sticks else _SETTINGS.about_there) * found.length
-            if np.linalg.norm(found.place - arrival.place) < near:
+            if np.linalg.norm(found.place - closure.place) < near:
                 times = self._back(end, last, found)
                 if not self._first(times, found.time, end):
                     return True
@@ -428,13 +427,13 @@ class ContactEventSequence:
 
     def _learn(self, length: float) -> bool:
         """Solve for the compliance of the last closure and of the expected next ones; return False without factors."""
-        last, arrival, chosen = self._pieces[-1], self._closures[-1], []
+        last, closure, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):
             times = gap_closures(face.law, last.at[f], last.speed[f], self._free[f], left)
             times[[i for rank, g, i in self._points.who if (rank, g) == (self._comm.rank, f)]] = left
-            if (arrival.rank, arrival.face) == (self._comm.rank, f):
-                times[arrival.point] = -1.0
+            if (closure.rank, closure.face) == (self._comm.rank, f):
+                times[closure.point] = -1.0
             first = np.argsort(times, kind="stable")[: self._batch]
             chosen.append(np.sort(first[times[first] < left]))
         return self._points.learn(chosen)

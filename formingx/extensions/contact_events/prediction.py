@@ -15,7 +15,7 @@ from .response import Response
 log = logging.getLogger("formingx")
 
 SHARE = 0.05
-"""Of the points of a face, that close their gaps in one step at most."""
+"""Largest part of the points of a face that close their gaps in one step."""
 
 
 class ContactEventPredictor:

@@ -125,10 +125,10 @@ class Points:
             by = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
-        whole = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * entry,
-                                         face.law.elastic_slip * entry, face.scale, face.law.pulls * entry])
-                        for face, entry in zip(self._faces, whole)], new)
+        ones = [np.ones(len(face.points)) for face in self._faces]
+        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * unit,
+                                         face.law.elastic_slip * unit, face.scale, face.law.pulls * unit])
+                        for face, unit in zip(self._faces, ones)], new)
         friction, slip, scale, pulls = more.T
         self.friction = np.append(self.friction, np.where(friction < _SEARCH.rough, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
@@ -137,11 +137,16 @@ class Points:
         self._S = np.concatenate([self._S, known * touched])
         return True
 
-    def at(self, values: Sequence[np.ndarray], caller: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
-        """Return values at these points on all ranks, shape (m, ...), from the owned points of the faces."""
-        caller = self.who if caller is None else caller
-        found = np.zeros((len(caller), *values[0].shape[1:]))
-        for k, (rank, f, i) in enumerate(caller):
+    def at(self, values: Sequence[np.ndarray], point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
+        """Return values at points, by default at all these points, on all ranks, shape (m, ...).
+
+        Args:
+            values: for each face, values at its locally owned points.
+            point_ids: (rank, face, point) of each point.
+        """
+        point_ids = self.who if point_ids is None else point_ids
+        found = np.zeros((len(point_ids), *values[0].shape[1:]))
+        for k, (rank, f, i) in enumerate(point_ids):
             if rank == self._comm.rank:
                 found[k] = values[f][i]
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
@@ -153,7 +158,7 @@ class Points:
                 among[f][i] = value
 
     def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion of points onto their tools, shape (m, 2)."""
+        """Return the motion of points to `place` along their tools and to their depth normal to them, shape (m, 2)."""
         along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
@@ -194,7 +199,7 @@ class Points:
                 their tools.
 
         Returns:
-            The forces; NaN if none exist.
+            F and dF - S dx. If no such forces exist, the second is NaN and F is `force`.
         """
         N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
@@ -208,9 +213,9 @@ class Points:
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return the rates of forces and of dF - S dx, and the statuses; None if no statuses satisfy Coulomb's law.
+        """Return the rates of forces and of dF - S dx, and the statuses that satisfy Coulomb's law.
 
-        Statuses that violate it are changed.
+        Statuses that violate it are changed. None: no statuses were found that satisfy it.
         """
         (N, T), here = self.parts(force, near), status != ContactStatus.FREE
         try:
@@ -266,7 +271,7 @@ class Points:
 
     def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
                                                                                                         np.ndarray]:
-        """Return the arc length at which the first point opens or slides, and the statuses then."""
+        """Return the arc length at which the first point opens or slides, and the statuses then; infinite: none."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
         none = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
@@ -304,14 +309,14 @@ class Points:
         size, held = len(free), status != ContactStatus.FREE
         sticks = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction > 0))
         slides = np.setdiff1d(np.flatnonzero(held), sticks)
-        rows, columns, requested, c = [], [], [], self._components
+        rows, columns, prescribed, c = [], [], [], self._components
         for way in (near.normal, near.tangent):
             row = np.zeros((len(sticks), size))
             for i in range(c):
                 row[np.arange(len(sticks)), c * sticks + i] = way[sticks, i]
             rows.append(row)
             columns.append(row.T)
-            requested.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
+            prescribed.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
         mu = np.where(self.friction < np.inf, self.friction, 0.0)
         force = near.normal + (mu * status)[:, None] * near.tangent
         into, against = np.zeros((len(slides), size)), np.zeros((size, len(slides)))
@@ -319,7 +324,7 @@ class Points:
             into[np.arange(len(slides)), c * slides + i] = near.normal[slides, i]
             against[c * slides + i, np.arange(len(slides))] = force[slides, i]
         A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
-        a = np.concatenate([*requested, np.zeros(len(slides)) if to is None else near.beyond[slides]])
+        a = np.concatenate([*prescribed, np.zeros(len(slides)) if to is None else near.beyond[slides]])
         gives = A @ by @ B
         stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _SEARCH.none * np.abs(gives).max(initial=0.0))
         gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves

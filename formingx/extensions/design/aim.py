@@ -84,14 +84,14 @@ class WallTarget:
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
-        by = run.derivative("wall")[1][self.inside]
+        jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
-        requested = wall.mean() if self.wanted is None else self.wanted
-        left = wall / requested - 1
-        slopes = by / np.reshape(requested, (-1, 1))
+        target = wall.mean() if self.wanted is None else self.wanted
+        residual = wall / target - 1
+        slopes = jacobian / np.reshape(target, (-1, 1))
         if self.wanted is None:
-            slopes -= np.outer(wall / requested**2, by.mean(0))
-        return self._with_volume(run, left, slopes)
+            slopes -= np.outer(wall / target**2, jacobian.mean(0))
+        return self._with_volume(run, residual, slopes)
 
     def _with_volume(self, run: DesignRun, left: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Append the weighted residual of a prescribed volume and its derivatives."""
@@ -113,13 +113,14 @@ class WallTarget:
         if self.wanted is None:
             return ""
         wall = run.wall[self.inside]
-        off = wall / self.wanted - 1
-        worst = int(np.argmax(np.abs(off)))
-        if abs(off[worst]) < SEARCH.reached:
+        deviation = wall / self.wanted - 1
+        worst = int(np.argmax(np.abs(deviation)))
+        if abs(deviation[worst]) < SEARCH.reached:
             return ""
         s = run.profile.reference_length[self.inside]
         return (f"the wanted wall was not reached: wanted {_range(self.wanted)}, reached {_range(wall)}; the largest"
-                f" deviation is {100 * off[worst]:+.3g} %, at reference length {s[worst]:.4g}. {self._stop(run)}.")
+                f" deviation is {100 * deviation[worst]:+.3g} %, at reference length {s[worst]:.4g}."
+                f" {self._stop(run)}.")
 
     def _stop(self, run: DesignRun) -> str:
         """Return the bounds or the prescribed volume that prevent the wanted wall, predicted by the derivatives."""
@@ -164,8 +165,8 @@ class MeasuredWallTarget(WallTarget):
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
-        wall, by = run.derivative(self.measured.of_path)
-        return self._with_volume(run, wall / self.measured.wall - 1, by / self.measured.wall[:, None])
+        wall, jacobian = run.derivative(self.measured.of_path)
+        return self._with_volume(run, wall / self.measured.wall - 1, jacobian / self.measured.wall[:, None])
 
     def cost(self, run: DesignRun) -> float:
         """Return the mean square of the relative deviations plus the square of the volume's relative deviation."""
@@ -173,11 +174,12 @@ class MeasuredWallTarget(WallTarget):
         return float(np.mean(left**2) + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
 
-def _deviation(left: np.ndarray, by: np.ndarray, m: int, low: np.ndarray, high: np.ndarray) -> tuple[float, np.ndarray]:
+def _deviation(residual: np.ndarray, jacobian: np.ndarray, m: int, low: np.ndarray,
+               high: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the root mean square of the first m residuals after the best step within bounds, and that step."""
     from scipy.optimize import lsq_linear
-    step = lsq_linear(by, -left, bounds=(low, high)).x
-    return float(np.sqrt(np.mean((left + by @ step)[:m] ** 2))), step
+    step = lsq_linear(jacobian, -residual, bounds=(low, high)).x
+    return float(np.sqrt(np.mean((residual + jacobian @ step)[:m] ** 2))), step
 
 
 def _range(values: np.ndarray) -> str:

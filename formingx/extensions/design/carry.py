@@ -175,8 +175,8 @@ class _StateTransfer:
         for entry in self.neighbours:
             mine, arrival = entry.problem.contacts[number], touch.arrival.copy()
             if len(early):
-                there = mine.positions(entry.x[:n], entry.control)[early] + touch.arrival[early] - start[early]
-                arrival[early] = _onto(mine.law.part(early), there, velocity[early], gap)
+                guess = mine.positions(entry.x[:n], entry.control)[early] + touch.arrival[early] - start[early]
+                arrival[early] = _onto(mine.law.part(early), guess, velocity[early], gap)
             mine.expect_arrivals(arrival)
         return late
 
@@ -281,5 +281,5 @@ def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
     sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
-    by = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
-    return x + by[:, None] * velocity
+    time = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
+    return x + time[:, None] * velocity

@@ -10,9 +10,9 @@ import numpy as np
 from ...errors import InputError, finite
 
 _OPEN = 0.25
-"""Standard error over the range of a parameter above which the wall does not tell it."""
+"""Standard error over the range of a parameter above which the wall leaves it undetermined."""
 _ALIKE = 0.9
-"""Correlation from which two parameters of which the wall says little cannot be told apart."""
+"""Correlation above which two undetermined parameters cannot be told apart."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class Design:
             have exact derivatives.
         parameters: {name: (start, low, high), a start value, or `spline(...)`}. `build` receives a spline as a function
             of a length from 0 to 1.
-        step, tolerances, max_steps: settings of the runs, see `trace`.
+        step, tolerances, max_steps: as in `trace`, for each run.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -61,7 +61,7 @@ class Design:
             raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
                              f" cannot be called with these: {error}") from None
         self._step, self._tolerances, self._most = step, tolerances, max_steps
-        self.paths = 0                                       # runs so far
+        self.paths = 0                                       # number of runs so far
 
     def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
         """Run the design with some values.
@@ -154,8 +154,8 @@ class Design:
                 break
             if not np.any(np.abs(by * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            held = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))     # keeps those without effect
-            step = lsq_linear(np.vstack([by * size, held]), np.append(-left, 0 * size), tol=1e-12,
+            damping = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))  # keeps parameters without effect
+            step = lsq_linear(np.vstack([by * size, damping]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((by @ step) ** 2))
             better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)

@@ -47,7 +47,7 @@ _TOLERANCES = PerturbedTolerances()
 
 
 class PerturbedRunFailure(Failure):
-    """Failure to find a perturbed state near the base run: the change is too large for the contact's thin ramps."""
+    """Failure to find a perturbed state near the base run: the change is too large for the regularised contact."""
 
 
 class PerturbedRun:
@@ -127,7 +127,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
 
     Args:
         curve: the `Curve` of the base run.
-        state: its state.
+        state: the accepted state of the base run.
         neighbours: the perturbed runs; their states are updated in place.
         equation: constraint of the base state; None: the perturbed states lie in the plane normal to its path.
         equations: constraints of the perturbed runs.
@@ -182,7 +182,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
         for j, k in enumerate(todo):
             entry = neighbours[k]
             correction = _norm(problem, dx[:, j]) + abs(steps[j])
-            if iteration != 1:                               # this iteration only checks one of them: update none
+            if iteration != 1:                               # iteration 1 checks one perturbed run, and updates none
                 entry.x, entry.control = entry.x + dx[:, j], entry.control + steps[j]
             away = _norm(problem, entry.x - state.x) + abs(entry.control - state.control)
             if not np.isfinite(correction):

@@ -24,7 +24,7 @@ class Knots:
     Attributes:
         values: values at the knots, shape (k,).
         smooth: True for a cubic spline.
-        places: positions of the knots, shape (k,).
+        coordinates: positions of the knots, shape (k,).
     """
 
     def __init__(self, values: Any, smooth: bool = False):
@@ -94,9 +94,9 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     values = [start] * knots if np.ndim(start) == 0 else several("spline: start", start, "numbers")
     if len(values) != knots:
         raise InputError(f"spline: start has {len(values)} numbers: must be one for each of {knots} knots")
-    at = np.array([finite("spline: start", v) for v in values])
-    _check_bounds("spline", at, low, high)
-    return Spline(at, float(low), float(high), smooth)
+    starts = np.array([finite("spline: start", v) for v in values])
+    _check_bounds("spline", starts, low, high)
+    return Spline(starts, float(low), float(high), smooth)
 
 
 class Parameters:
@@ -140,7 +140,7 @@ class Parameters:
         return {name: (entry.low, entry.high) for name, entry in self._given.items() if entry.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
-        """Return the arguments of the user's function."""
+        """Return the arguments of the user's function, {name: number or `Knots`}."""
         parts = np.split(vector, np.cumsum([len(entry.start) for entry in self._given.values()])[:-1])
         return {name: Knots(part, entry.smooth) if entry.profile else float(part[0])
                 for (name, entry), part in zip(self._given.items(), parts)}
@@ -162,7 +162,7 @@ class Parameters:
                 given = given.values if isinstance(given, Knots) else np.atleast_1d(given)
                 if given.shape not in ((n,), (1,)):
                     raise InputError(f"Design: {name} = {values[name]!r}: must be {n} number{'s' * (n > 1)}")
-                given = [finite(f"Design: {name}", entry) for entry in given.tolist()]
+                given = [finite(f"Design: {name}", number) for number in given.tolist()]
                 found[first: first + n] = given
             first += n
         return found

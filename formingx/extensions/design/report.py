@@ -37,9 +37,9 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
            f"The run before the best predicted its wall to {100 * off:.2g} %.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
-    rows = [[str(k), *(page.number(v) for v in (entry.wall[answer.inside].std() / entry.wall[answer.inside].mean(),
-             entry.wall[answer.inside].min(), entry.wall[answer.inside].mean(), entry.volume))]
-            for k, entry in enumerate(answer.runs, 1)]
+    rows = [[str(k), *(page.number(v) for v in (run.wall[answer.inside].std() / run.wall[answer.inside].mean(),
+             run.wall[answer.inside].min(), run.wall[answer.inside].mean(), run.volume))]
+            for k, run in enumerate(answer.runs, 1)]
     runs = page.table(["run", "unevenness", units.label("wall", "minimum wall"), units.label("wall", "mean wall"),
                        units.label("volume")], rows)
 
@@ -101,12 +101,12 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
     colours = Normalize(min(s.wall_thickness.min() for s in shapes), max(s.wall_thickness.max() for s in shapes))
     wide = float(np.clip(5 * (high - low)[0] / (high - low)[1], 3.0, 9.0))
     drawing, axes = figure(len(runs), width=wide, height=max(5 * wide / 9, 3.2) if wide == 9 else 5.4)
-    for entry, run, shape, name in zip(np.atleast_1d(axes), runs, shapes, names):
+    for panel, run, shape, name in zip(np.atleast_1d(axes), runs, shapes, names):
         tooling, last = Tooling.of_problem(run.path.problem), run.path.last
-        tools(entry, tooling.placed(tooling.travels(last.setting, last.control)), low, high)
-        plots.section(entry, shape, (1, 1), colormaps["viridis_r"](colours(shape.wall_thickness)))
-        entry.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
-                xlabel=units.label("r"), ylabel=units.label("z"), title=name)
+        tools(panel, tooling.placed(tooling.travels(last.setting, last.control)), low, high)
+        plots.section(panel, shape, (1, 1), colormaps["viridis_r"](colours(shape.wall_thickness)))
+        panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
+                  xlabel=units.label("r"), ylabel=units.label("z"), title=name)
     bar = drawing.colorbar(ScalarMappable(colours, "viridis_r"), ax=axes, shrink=0.8, label=units.label("wall"))
     bar.outline.set_visible(False)
     return "<h2>The part</h2>" + page.figure(drawing, "Sections, coloured by the wall.")
@@ -143,17 +143,17 @@ def _patterns(before: Any, best: Any) -> str:
     if not found:
         return ""
     drawing, axes = figure(len(found), width=9 if len(found) == 1 else 5.5, height=3.6)
-    for entry, (name, (low, high)) in zip(np.atleast_1d(axes), found.items()):
+    for panel, (name, (low, high)) in zip(np.atleast_1d(axes), found.items()):
         s = np.linspace(0, 1, 201)
         for run, colour, label in ((before, "0.6", "before"), (best, "C0", "after")):
             profile = run.values[name]
-            entry.plot(s, profile(s), color=colour, label=label)
-            entry.plot(profile.coordinates, profile.values, "o", color=colour, markersize=4)
+            panel.plot(s, profile(s), color=colour, label=label)
+            panel.plot(profile.coordinates, profile.values, "o", color=colour, markersize=4)
         for bound in (low, high):
             if np.isfinite(bound):
-                entry.axhline(bound, color="0.5", linestyle=":", linewidth=1)
-        entry.set(xlabel="part of the length", ylabel=name)
-        entry.legend()
+                panel.axhline(bound, color="0.5", linestyle=":", linewidth=1)
+        panel.set(xlabel="part of the length", ylabel=name)
+        panel.legend()
     return "<h2>The pattern</h2>" + page.figure(drawing, "Profiles and their knots, before and after; dotted: bounds.")
 
 

@@ -92,8 +92,8 @@ class DesignRun:
     """A run of the user's scene for given parameter values.
 
     Attributes:
-        vector: numbers of the parameters, shape (n,).
-        values: values by name.
+        vector: values of the n numbers of the parameters, shape (n,).
+        values: {parameter: number or `Knots`}.
         parameters: the `Parameters` of the design.
         path: the `Path`.
     """
@@ -169,11 +169,11 @@ class DesignRun:
         Raises:
             InputError: the run has no derivative, or the quantity depends on earlier states.
         """
-        here, by = self._here(measure), []
+        value, columns = self._here(measure), []
         for beside, apart in self._neighbours:
-            first, *other = (np.atleast_1d(self._at(entry, measure)) for entry in beside)
-            by.append((first - (other[0] if other else here)) / apart)
-        return here, np.stack(by, axis=-1)
+            first, *other = (np.atleast_1d(self._at(neighbour, measure)) for neighbour in beside)
+            columns.append((first - (other[0] if other else value)) / apart)
+        return value, np.stack(columns, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:
         """Return the derivatives of a quantity as a table; the wall over the reference length.

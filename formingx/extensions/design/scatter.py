@@ -111,8 +111,8 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
             if open_:
                 raise InputError(f"{caller}: the tests of this fit leave {', '.join(open_)} open: no deviation is"
                                  f" known; fit it to more points than it has constants, or a law with fewer constants")
-            at = [parameters.names.index(name) for name in names]
-            found[np.ix_(at, at)] += part.covariance
+            numbers = [parameters.names.index(name) for name in names]
+            found[np.ix_(numbers, numbers)] += part.covariance
         else:
             raise InputError(f"{caller}: {part!r}: must be {{parameter: standard deviation}}, a Fit, or a list of"
                              f" these")

@@ -64,7 +64,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
 
 
 def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
-    """Return the nearest mode and how far it was tested, as text."""
+    """Return the nearest mode and its tested range, as text."""
     mode = mode_of(largest, middle)
     found = tested.ranges.get(mode.replace(" ", "_"))
     if found is not None:
@@ -73,15 +73,17 @@ def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
 
 
 def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
-    """(layer, tests) of each layer whose material tells of its tests."""
+    """Return (layer, tests) of each layer whose material has a record of its tests."""
     found = [(layer, getattr(getattr(material, "base", material), "tested", None))
              for layer, material in scene.materials.items()]
     return [(layer, tested) for layer, tested in found if tested is not None]
 
 
 def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(largest and middle logarithmic strain, (n, 2), reference points, reference volumes, (n,)) at the quadrature
-    points of all ranks."""
+    """Return (largest and middle logarithmic strain, reference points, reference volumes) at all quadrature points.
+
+    The shapes are (n, 2), (n, 2) or (n, 3), and (n,); of all ranks.
+    """
     forms, cells = problem.forms, terms.own_cells
     F = shapes_of(forms, cells, terms.places)
     squares = np.linalg.eigvalsh(F.transpose(0, 2, 1) @ F)[:, ::-1]

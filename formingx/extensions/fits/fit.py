@@ -35,8 +35,8 @@ class Fit(NamedTuple):
     """Result of a fit.
 
     Attributes:
-        material: the material with the fitted constants, in the data's unit of stress. Its `tested` says in which
-            tests, so that runs can warn where they leave them.
+        material: the material with the fitted constants, in the data's unit of stress. Its `tested` is the range of the
+            tests; runs warn of deformations beyond it.
         constants: {name: value} of the fitted constants.
         rms: {test: root mean square of the nominal stress' misfit}, stress; tests in time are numbered.
         rms_total: the same over all points.
@@ -62,7 +62,14 @@ class Fit(NamedTuple):
     data: Any
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """{constant: (lowest, highest)} by Student's t, as if the stresses were linear in the constants."""
+        """Return {constant: (lowest, highest)} by Student's t distribution, for stresses linear in the constants.
+
+        Args:
+            confidence: confidence level, between 0 and 1.
+
+        Raises:
+            InputError: a confidence outside (0, 1).
+        """
         from scipy.stats import t
         if not 0 < (confidence := finite("intervals: confidence", confidence)) < 1:
             raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
@@ -71,9 +78,15 @@ class Fit(NamedTuple):
                 for name, value in self.constants.items()}
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
-        """Draw the data and the material's nominal stress against stretch (held tests: time); returns the axes.
+        """Draw the data and the material's nominal stress against stretch, of relaxation tests against time.
 
-        With tests that are held and tests that are not, two axes are needed: `axes` is then a pair of them.
+        Args:
+            axes: matplotlib axes; a pair if only some of the tests are relaxation tests; default a new figure.
+            unit: unit of stress, for the label.
+            unit_of_time: unit of time, for the label.
+
+        Returns:
+            The matplotlib axes.
         """
         return plotted(self.material, self.data, axes, unit, unit_of_time)
 
@@ -115,10 +128,13 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
         weights: {test: weight} of the squared misfits of its points, or for tests in time one number each; default 1.
         within: (lowest, highest): only points at such stretches count; of biaxial tests both stretches.
 
+    Returns:
+        The `Fit`.
+
     Raises:
-        InputError: data that are not finite, not positive stretches, of different length, fewer than the constants,
-            all at stretch 1, stresses or stretches that are no test's, or beyond every
-            admissible limit.
+        InputError: data that are not finite, stretches that are not positive, arrays of different length, fewer points
+            than constants, or no strain at all. Also an unknown test, stresses whose sign differs from the sign of the
+            strains, or stretches beyond every admissible limit.
 
     >>> stretch = np.array([1.2, 1.6, 2.0])
     >>> found = fx.fit(fx.MooneyRivlin, {"uniaxial": (stretch, 2 * (stretch - stretch**-2) * (0.2 + 0.05 / stretch))})
@@ -137,7 +153,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
 def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
              within: Any) -> Fit:
-    """Fit of a material that relaxes."""
+    """Return the fit of a material that relaxes."""
     tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
     many = len(tests) if isinstance(tests, list | tuple) else 0
     relaxing, constants, used, found = fitted(material, tests, terms, relative, of_numbers(weights, many), within)
@@ -145,18 +161,18 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
     stretches: dict[str, list] = {}
     rates = []
     for i, test in enumerate(used, 1):
-        there = np.isfinite(test.stress)
+        given = np.isfinite(test.stress)
         computed = relaxing.stress(test.mode, test.stretches, times=test.times, between=test.between)
-        misfits.append((computed - test.stress)[there])
-        measured.append(test.stress[there])
-        parts[f"{i} {test.mode}"] = slice(n, n := n + int(there.sum()))
-        stretches.setdefault(test.mode, []).append(test.stretches[there])
+        misfits.append((computed - test.stress)[given])
+        measured.append(test.stress[given])
+        parts[f"{i} {test.mode}"] = slice(n, n := n + int(given.sum()))
+        stretches.setdefault(test.mode, []).append(test.stretches[given])
         steps = np.diff(test.times)
         rates.append(np.abs(np.diff(np.log(test.stretches)))[steps > 0] / steps[steps > 0])
     moved = np.concatenate(rates)
     moved = moved[moved > 0]
-    tested = MeasuredRange.of({mode: np.concatenate(parts) for mode, parts in stretches.items()}, found.undetermined,
-                       (float(moved.min()), float(moved.max())) if len(moved) else None)
+    tested = MeasuredRange.of({mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
+                              (float(moved.min()), float(moved.max())) if len(moved) else None)
     return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, tests)
 
 
@@ -179,7 +195,7 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
 
     def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
-        """(cost, guess, coordinates) after this number of evaluations; the cost is infinite where the stress is."""
+        """Return (cost, guess, coordinates) after this number of evaluations; the cost is infinite where stress is."""
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):
@@ -206,7 +222,11 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
 
 
 def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
-    """{test: (stretch, stress)} of a file; a fourth column is not for a material without time."""
+    """Return {test: (stretch, stress)} of a file.
+
+    Raises:
+        InputError: a fourth column, the time: the material does not relax.
+    """
     found: dict[str, list] = {}
     for mode, columns in read_tests(place("fit: data", file)):
         if len(columns) != 2:

@@ -52,6 +52,9 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
         storage, loss: G' and G'', stress, shape (n,).
         terms: number of times; default two for each decade of frequency.
 
+    Returns:
+        The `Spectrum`.
+
     Raises:
         InputError: arrays of different length, or a number that is not above 0.
 

@@ -25,18 +25,18 @@ _PER_DECADE = 16
 
 
 class TimedTest(NamedTuple):
-    """A homogeneous test in time, the body in the reference configuration before.
+    """A homogeneous test in time of a body that is undeformed before.
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: shape (n,), not falling; a stretch that changes while the time does not is put on at once, and so is the
-            first one, at the first of the times; if that is not 0 and the stretch is held all along, at time 0.
+        times: times, shape (n,), not decreasing. A stretch that changes between equal times is applied at once, and so
+            is the first stretch, at the first time; a constant stretch with a first time above 0 is applied at time 0.
         stretches: shape (n,).
         stress: nominal, shape (n,); not a number where it was not measured.
         between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
 
     >>> held = fx.TimedTest("uniaxial", times=[0.0, 1.0, 5.0], stretches=[1.0, 2.0, 2.0], stress=[0.0, 1.2, 0.9])
-    >>> held.between                                                        # 0 and 1 it grew at a constant rate
+    >>> held.between                                                        # constant rate from time 0 to 1
     'stretch'
     """
 
@@ -48,13 +48,27 @@ class TimedTest(NamedTuple):
 
     @classmethod
     def relaxation(cls, mode: str, stretch: float, times: Any, stress: Any) -> TimedTest:
-        """Return a stretch put on at once at time 0 and held; stress (nominal) at times above 0, rising, shape (n,)."""
+        """Return a relaxation test: a stretch applied at once at time 0 and kept constant.
+
+        Args:
+            mode: see the class.
+            stretch: the stretch.
+            times: times of the stresses, above 0, rising, shape (n,).
+            stress: nominal stress at these times, shape (n,).
+        """
         t = np.append(0.0, np.asarray(times, float))
         return cls(mode, t, np.full(len(t), stretch), np.append(np.nan, stress))
 
     @classmethod
     def constant_rate(cls, mode: str, rate: float, stretches: Any, stress: Any) -> TimedTest:
-        """Stress (nominal) at stretches from 1 on, shape (n,), met at a constant Hencky rate, 1/time, above 0."""
+        """Return a test at a constant Hencky rate from stretch 1.
+
+        Args:
+            mode: see the class.
+            rate: Hencky rate, 1/time, above 0.
+            stretches: stretches, in order, shape (n,).
+            stress: nominal stress at these stretches, shape (n,).
+        """
         l = np.append(1.0, np.asarray(stretches, float))
         times = np.abs(np.log(l)) / positive("TimedTest: rate", rate)
         return cls(mode, times, l, np.append(np.nan, stress), "strain")
@@ -84,7 +98,7 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """Return the tests as arrays; stresses at stretches that are not within are not numbers."""
+    """Return the tests as arrays, with nan for stresses at stretches outside `within`."""
     found = []
     for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         if not isinstance(test, TimedTest):
@@ -126,15 +140,14 @@ class _Data:
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
     def relaxed(self, material: Material | None, constants: Any = None) -> np.ndarray:
-        """Nominal stress of an equilibrium energy at all points, its constants or others; not finite beyond its limit.
-        """
+        """Return the nominal stress of an equilibrium energy at all points, shape (n,); not finite beyond its limit."""
         if material is None:
             return np.zeros(len(self.stress))
         values = material.parameters.values() if constants is None else constants
         return material.response.stress(self._stretches, values)[0]
 
     def stresses(self, material: RelaxingMaterial, constants: np.ndarray) -> np.ndarray:
-        """Nominal stress at all points of a material with other constants, which are not checked."""
+        """Return the nominal stress of a material with other, unchecked constants at all points, shape (n,)."""
         n = len(constants) - 2 * len(material.branches)
         mu, tau = constants[n::2], constants[n + 1::2]
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])

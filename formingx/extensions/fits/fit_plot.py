@@ -41,7 +41,7 @@ def _stretched(material: Any, data: dict, panel: Any) -> None:
 
 
 def _biaxial(material: Any, columns: Any, panel: Any) -> None:
-    """Both stresses over the first stretch; the material's as crosses at the same points."""
+    """Draw both stresses over the first stretch, and the stresses of the material as crosses."""
     l1, l2, *stresses = (np.asarray(x, float) for x in columns)
     computed = material.stress("biaxial", np.stack([l1, l2]))
     for k, (P, found) in enumerate(zip(stresses, computed), 1):

@@ -18,9 +18,9 @@ _UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
 
 
 def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
-    """[(test, columns)] of a CSV file, each test of rows that follow one another; see `fit`.
+    """Return [(test, columns)] of a CSV file; a test ends where its name changes or the time falls; see `fit`.
 
-    Columns is (stretch, stress), or (stretch, stress, time), shape (2 or 3, n); stresses left empty are not numbers.
+    The columns are (stretch, stress) or (stretch, stress, time), shape (2 or 3, n); an empty stress is nan.
 
     Raises:
         InputError: a file that cannot be read, has no rows, a header without these columns or with another unit, or a

@@ -23,6 +23,7 @@ class Points:
         measured: nominal stresses, shape (m,).
         sizes: stress by which each misfit is divided, shape (m,).
         parts: {test: its slice of the stresses}.
+        largest_I1: largest first invariant of C at the points.
 
     Raises:
         InputError: see `fit`.
@@ -69,7 +70,7 @@ class Points:
         return float(np.median(self.measured[shape != 0] / shape[shape != 0]))
 
     def _in_order(self, both: np.ndarray) -> np.ndarray:
-        """Values of both directions, shape (2, n), where they were measured, test by test, shape (m,)."""
+        """Return the measured ones of values in both directions, shape (2, n), test by test, shape (m,)."""
         return np.concatenate([both[:, self._rows == k][self._there[:, self._rows == k]]
                                for k in range(len(self.parts))])
 
@@ -87,7 +88,7 @@ def strains(values: np.ndarray) -> str:
 
 
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
-    """(stretches, stresses) of a test, each of shape (2, n); a stress that was not measured is not a number."""
+    """Return (stretches, stresses) of a test, each of shape (2, n); a stress that was not measured is nan."""
     known("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"
     what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"

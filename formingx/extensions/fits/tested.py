@@ -65,7 +65,7 @@ class MeasuredRange:
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:
-        """Return how far strains (largest and middle), shape (m, 2), are from the tested ones, shape (m,)."""
+        """Return the distance of strains (largest and middle), shape (m, 2), from the tested ones, shape (m,)."""
         corners = self._corners
         after = np.roll(corners, -1, axis=0)
         edges = after - corners
@@ -78,7 +78,7 @@ class MeasuredRange:
         return np.where(np.all(side >= 0, axis=1) & (len(corners) > 2), 0.0, found)
 
     def outside(self, strains: np.ndarray) -> np.ndarray:
-        """Return which strains, shape (m, 2), the tests do not cover, shape (m,)."""
+        """Return the mask, shape (m,), of the strains, shape (m, 2), that the tests do not cover."""
         size = np.hypot(*strains.T)
         return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
 
@@ -98,7 +98,7 @@ class MeasuredRange:
 
     @cached_property
     def _corners(self) -> np.ndarray:
-        """Convex hull of the tested strains and rest, counter-clockwise, shape (k, 2)."""
+        """Convex hull of the tested strains and zero strain, counter-clockwise, shape (k, 2)."""
         return _hull(np.vstack([np.zeros(2), self.strains]))
 
     def __repr__(self) -> str:
@@ -107,9 +107,9 @@ class MeasuredRange:
 
 
 def with_tests(material: Material, **stretches: Any) -> Material:
-    """Return the same material with a record of its tests, from which runs warn where they leave them.
+    """Return the same material with a record of its tests; runs warn of deformations beyond them.
 
-    `fit` keeps this record by itself.
+    `fit` makes this record by itself.
 
     Args:
         material: any material.
@@ -139,7 +139,7 @@ def mode_of(largest: float, middle: float) -> str:
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
-    """Convex hull of points, shape (n, 2): its corners, counter-clockwise (Andrew's chain)."""
+    """Return the corners of the convex hull of points, shape (n, 2), counter-clockwise (Andrew's chain)."""
     ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:
         return np.array(ordered)

@@ -36,8 +36,8 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}
 
     J holds the derivatives of the scaled stresses by the constants at the optimum, and s^2 is the sum of the squared
-    scaled misfits over the points in excess of the constants (Seber and Wild 1989, chapter 5). A standard error is not
-    a number where no points are in excess, and infinite where a constant can be doubled unseen.
+    scaled misfits over the number of points less constants (Seber and Wild 1989, chapter 5). A standard error is nan if
+    there are no more points than constants. It is infinite if a doubled constant changes no stress visibly.
 
     Args:
         stress: called with constants, shape (p,); the stresses at all points, shape (n,), not finite beyond a limit.
@@ -68,7 +68,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
     """Return the derivative of the scaled stresses by constant i, shape (n,); 0 where no change of it can be seen."""
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
-    largest = abs(values[i]) or math.inf                    # further, a power that does not matter would reach
+    largest = abs(values[i]) or math.inf                    # a larger step in an exponent without effect would show
     for _ in range(50):
         if abs(step) > largest:
             break

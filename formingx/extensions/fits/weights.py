@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import InputError, instance, non_negative, pair, several
 
 _LEAST = 0.02
-"""Share of a test's largest stress below which a relative misfit is taken of this share."""
+"""Smallest divisor of a relative misfit, over the largest stress of its test."""
 
 
 def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
@@ -53,7 +53,7 @@ def _weight(name: str, value: Any) -> float:
 
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
-    """Return which stretches, any shape, lie within (lowest, highest); None: all."""
+    """Return the mask of the stretches, any shape, that lie within (lowest, highest); None: all."""
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
     low, high = pair("fit: within", within)

@@ -1,8 +1,7 @@
 """Thermal properties of a body, and the heat that its faces and its interior receive: one law each.
 
 A flux is heat into the body per area of the deformed face and time. All numbers are in one consistent set of units, the
-mesh's unit of length among them. What is said to be "a number or a table over R" may be a `formingx.table` of the
-reference radius.
+mesh's unit of length among them. A "table over R" is a `formingx.table` of the reference radius.
 """
 
 from typing import Any
@@ -99,7 +98,7 @@ class Convection(_Boundary):
         self._between("h", 0.0)
 
     def flux(self, T, absolute_zero, h, air):
-        """Heat into the face, UFL."""
+        """Return the heat flux into the face, UFL."""
         return h * (air - T)
 
 
@@ -126,7 +125,7 @@ class Radiation(_Boundary):
         self._between("view_factor", 0.0, 1.0)
 
     def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
-        """Heat into the face, UFL."""
+        """Return the heat flux into the face, UFL."""
         kelvin = (heater - absolute_zero, T - absolute_zero)
         return view_factor * emissivity * stefan_boltzmann * (kelvin[0] ** 4 - kelvin[1] ** 4)
 
@@ -146,12 +145,12 @@ class HeatFlux(_Boundary):
         super().__init__(on, flux=flux)
 
     def flux(self, T, absolute_zero, flux):
-        """Heat into the face, UFL."""
+        """Return the heat flux into the face, UFL."""
         return flux
 
 
 class FixedTemperature(_Boundary):
-    """A face held at a temperature from the start on.
+    """A face at a prescribed temperature from the start.
 
     Args:
         on: name of the boundary.
@@ -170,12 +169,12 @@ class FixedTemperature(_Boundary):
 class Absorption:
     """Radiation that goes through a face and is absorbed in the depth x below it (Beer and Lambert's law).
 
-    Heat per deformed volume and time: flux coefficient exp(-coefficient x), x the distance to the deformed face. What
-    comes out at the other face is lost.
+    Heat per deformed volume and time: flux coefficient exp(-coefficient x), x the distance to the deformed face.
+    Radiation that leaves through the other face is lost.
 
     Args:
-        on: name of the boundary that it comes in through; for both sides, give two.
-        flux: what enters, heat per time and area.
+        on: name of the boundary through which the radiation enters; for both sides give two laws.
+        flux: radiation that enters, heat per time and area.
         coefficient: 1/length, above 0.
 
     >>> fx.Absorption("top", flux=2e-3, coefficient=1.5)                           # W/mm2, 1/mm

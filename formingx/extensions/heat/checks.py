@@ -19,7 +19,7 @@ _RISES = 2.0               # modulus of the coldest over the modulus of the hott
 
 
 _ALLOWED = 0.01
-"""Error of the temperature in three dimensions, over the span of temperatures, that the check tells of."""
+"""Error of the temperature, over the span of temperatures, above which the check warns."""
 _ONE_LAYER = 0.14
 """Error over the span of temperatures with one layer of elements, its face at another temperature at once. This and the
 next two are measured with one to eight equal layers, after a hundredth of wall^2/diffusivity: see
@@ -32,16 +32,17 @@ _WEAK = 2.0
 
 
 def error_of_layers(layers: float, biot: float) -> float:
-    """Find the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
+    """Return the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
 
     Args:
-        layers: wall over the thickness of the elements at the face. biot: conductance times wall over conductivity.
+        layers: wall over the thickness of the elements at the face.
+        biot: conductance times wall over conductivity.
     """
     return _ONE_LAYER * _share(biot) * layers ** -_ORDER
 
 
 def layers_needed(biot: float) -> int:
-    """Find the number of equal layers of elements for which `error_of_layers` is 1 %."""
+    """Return the number of equal layers of elements for which `error_of_layers` is 1 %."""
     return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
 
 
@@ -77,17 +78,17 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def springs_back(body: Any) -> Iterator[Finding]:
-    """Find a modulus that rises as a stretched body cools pulls it back: it says nothing of the solidified part.
+    """Equilibrium moduli that rise as a stretched body cools: they pull it back in place of fixing its shape.
 
-    (A film that was drawn into a mould, its table of stiffness on the equilibrium energy, came off it again and went
-    back to a third of its height.)
+    (A film was drawn into a mould with a table of stiffness on its equilibrium energy. It came off the mould and shrank
+    to a third of its height.)
     """
     scene = body.scene
     if scene.heat is None:
         return
     low, high = scene.heat.extremes(scene)
     for layer, material in scene.materials.items() if np.isfinite([low, high]).all() else ():
-        if isinstance(material, Solidification):                      # what it adds as it cools is free of stress
+        if isinstance(material, Solidification):            # the stiffness added on cooling is free of stress
             continue
         relaxed = getattr(material, "equilibrium", material)
         for name, value in {} if relaxed is None else relaxed.constants().items():
@@ -115,7 +116,7 @@ def beyond_limits(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def were_beyond_limits(path: Any) -> Iterator[Finding]:
-    """Temperatures that the body had at which a constant is not known, unless its run began with saying so."""
+    """Temperatures of the run at which a constant is not known, unless a check before the run has found them."""
     said = {finding.about for finding in path.record.findings}
     states = path.segments[-1].states
     for k, history in enumerate(path.problem.histories):
@@ -127,30 +128,36 @@ def were_beyond_limits(path: Any) -> Iterator[Finding]:
             yield from (finding for finding in found if finding.about not in said)
 
 
-def _beyond(scene: Any, low: float, high: float, caller: str) -> Iterator[Finding]:
-    """Constants of materials, friction and expansion that are not known all the way from low to high."""
+def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
+    """Yield constants of materials, friction and expansion that are not known all the way from low to high.
+
+    Args:
+        scene: the scene.
+        low, high: temperatures.
+        cause: subject and verb of the message, such as "the run brought it".
+    """
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
     laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]
     laws += [(f"expansion of {layer!r}", "volume", law.specific_volume) for layer, law in scene.expansion.items()]
-    listener = set()
+    reported = set()
     for about, name, law in laws:
         if not isinstance(law, FunctionOfTemperature):
             continue
         span = 1e-9 * (high - low) if np.isfinite(high - low) else 0.0
         for beyond, limit, words in ((low, law.limits[0], "below"), (high, law.limits[1], "above")):
             outside = beyond < limit - span if words == "below" else beyond > limit + span
-            if np.isfinite(beyond) and outside and (about, words, limit) not in listener:
-                listener.add((about, words, limit))
+            if np.isfinite(beyond) and outside and (about, words, limit) not in reported:
+                reported.add((about, words, limit))
                 yield Finding("warning", about,
                               f"{name} = {law!r} is known {'down' if words == 'below' else 'up'} to {limit:.4g}"
-                              f" degrees, and {caller} to {beyond:.4g}: {words} {limit:.4g} it is taken as it is there"
+                              f" degrees, and {cause} to {beyond:.4g}: {words} {limit:.4g} it is taken as it is there"
                               f"{_FROZEN if words == 'below' and 'WLF' in repr(law) else ''}. Give values to there")
 
 
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
-    """Errors of the temperature in three dimensions, of states of the last mesh; collective."""
+    """Discretisation errors of the temperature in states of the last mesh; collective."""
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):
             yield from history.findings(path.segments[-1].states)

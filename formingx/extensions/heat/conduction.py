@@ -34,10 +34,12 @@ _MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants b
 
 
 class Stage(NamedTuple):
-    """Result of an implicit stage: changes of T and of the lines of each touch, and the rates there.
+    """Result of an implicit stage.
 
-    changes, rates: [of T, owned part, shape (n,), then of each touch, shape (its nodes, m)]; rates of heat,
-    M dT/dt. heats: rate of heat through each boundary and source, of the whole body.
+    Attributes:
+        changes: change of T, locally owned entries, shape (n,), then of the lines of each touch, shape (its nodes, m).
+        rates: rates of heat M dT/dt at the end, of the same shapes.
+        heats: rate of heat through each boundary and source, of the whole body.
     """
 
     changes: list[np.ndarray]
@@ -49,12 +51,16 @@ class Conduction:
     """The equations, in a stage of a time step.
 
     Attributes:
-        mesh, comm: where. space: P2 (or of `degree`). T: the `Function` that the forms see. points: of its
-            nodes, (R, Z), owned part.
-        capacity: of the whole body, heat per degree; volume: of the reference body.
-        touches: [`Touch`], one for each ContactWithTool; who changes a conductance in it calls `update`.
-        power: heat that is given at the nodes per time, over `capacity`, owned part, shape (n,), or 0.
-        names: of what gives heat: boundaries and sources, in the order of `Stage.heats`.
+        mesh: the mesh.
+        comm: its MPI communicator.
+        space: P2 function space (or of `degree`).
+        T: the temperature `Function` of the forms.
+        points: positions (R, Z) of its locally owned nodes, shape (n, 2), length.
+        capacity: heat capacity of the whole body, heat per degree.
+        volume: volume of the reference body.
+        touches: a `Touch` for each `ContactWithTool`; call `update` after a change of its conductance.
+        power: heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
+        names: names of the boundaries and sources of heat, in the order of `Stage.heats`.
     """
 
     def __init__(self, mesh: Mesh, materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
@@ -75,9 +81,9 @@ class Conduction:
         self._factored_for: float | None = None
         self._displaced: Any = None
         self._deform()
-        entry = self.constant(1.0)
-        self.volume = self._integral(entry * self._weight * self._dx)
-        self.capacity = self._integral(self._stored(materials, entry, entry))
+        unity = self.constant(1.0)
+        self.volume = self._integral(unity * self._weight * self._dx)
+        self.capacity = self._integral(self._stored(materials, unity, unity))
         self._scale.value = 1 / self.capacity
         self.touches = [self._touch(b) for b in boundaries if isinstance(b, ContactWithTool)]
         self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
@@ -94,11 +100,11 @@ class Conduction:
         return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
 
     def start(self) -> list[np.ndarray]:
-        """Return the state that `T` and the tools have now, faces that are held at theirs: [T, owned part, *lines]."""
+        """Return the present state [T, *lines], T with its prescribed values at fixed faces, locally owned entries."""
         return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
 
     def held(self, T: np.ndarray) -> np.ndarray:
-        """Return a temperature, owned part, with the faces that are held at theirs."""
+        """Return a temperature with the prescribed values at fixed faces, locally owned entries."""
         return np.where(self._held, self._held_at.x.array[: self._n], T)
 
     def update(self) -> None:
@@ -112,7 +118,7 @@ class Conduction:
             depth.x.scatter_forward()
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        """(rates, heats) at a state, as in `Stage`."""
+        """Return (rates, heats) at a state, as in `Stage`."""
         R = self._body_rate(state[0])
         found, through = [R], []
         for touch, lines in zip(self.touches, state[1:], strict=True):
@@ -123,7 +129,13 @@ class Conduction:
         return found, self._heats(through)
 
     def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> Stage:
-        """Solve M change = known + c rates(state + change) for all; guess: of the change of T, shape (n,).
+        """Solve M change = known + c rates(state + change) for the body and all lines.
+
+        Args:
+            state: [T, *lines] at the start.
+            known: known parts, of the same shapes.
+            c: factor of the rates, time.
+            guess: first guess of the change of T, shape (n,).
 
         Raises:
             ConvergenceError: Newton's method found no solution.
@@ -148,9 +160,9 @@ class Conduction:
         raise ConvergenceError("heat: Newton's method did not converge in a step")
 
     def difference(self, known: list[np.ndarray], c: float) -> float:
-        """Largest change, of body and tools, that heat `known` makes in an implicit step: (M - c R') change = known.
+        """Return the largest change, of body and tools, by heat `known` in an implicit step: (M - c R') change = known.
 
-        With the tangent of the last `stage` if that had the same c, else with that at the T last set.
+        The tangent of the last `stage` is reused if it had the same c; else it is assembled at the last T.
         """
         answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.touches, known[1:])]
         self._factorise(c, answers, afresh=False)
@@ -164,20 +176,20 @@ class Conduction:
         return max(sizes)
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
-        """dT/dt, owned part, of rates of heat M dT/dt; 0 where the temperature is held."""
+        """Return dT/dt from rates of heat M dT/dt, locally owned entries; 0 where the temperature is prescribed."""
         self._factorise(0.0, [], afresh=True)
         return self._solve(rate)
 
     def stored(self, change: np.ndarray) -> float:
-        """Heat that a change of T, owned part, stores in the whole body."""
+        """Return the heat that a change of T, locally owned entries, stores in the whole body."""
         return self.capacity * self._sum(self._mass(change))
 
     def held_by(self, missing: np.ndarray) -> np.ndarray:
-        """Heat that each held face gave, of the missing heat at the nodes (degrees of the whole body), owned part."""
+        """Return the heat through each fixed face, from the missing heat at the nodes, locally owned entries."""
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
 
     def mass(self, change: np.ndarray) -> np.ndarray:
-        """M times a change of T, owned part."""
+        """Return M times a change of T, locally owned entries."""
         return self._mass(change)
 
     def destroy(self) -> None:
@@ -198,12 +210,12 @@ class Conduction:
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, through_touches: list[float]) -> np.ndarray:
-        """Rates of heat at the T last set, in the order of `names` but for held faces (see `held_by`)."""
+        """Return the rates of heat at the last T, in the order of `names`, without fixed faces (see `held_by`)."""
         local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
 
     def _deform(self) -> None:
-        """`_weight`, `_area` (of a deformed face per reference length), `_carry` (Grad T to grad T), `_J`."""
+        """Set `_weight`, `_area` (of a deformed face per reference length), `_carry` (Grad T to grad T), `_J`."""
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._carry = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
@@ -218,7 +230,7 @@ class Conduction:
         return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
 
     def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """[(properties, measure)]: layers of one object are one body."""
+        """Return [(properties, measure)]; layers with the same properties object share a measure."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -262,7 +274,7 @@ class Conduction:
         return ds(self.mesh.boundaries[boundary], metadata=metadata)
 
     def _dofs(self, boundary: str) -> np.ndarray:
-        """Local dofs of a boundary, ghosts included."""
+        """Return the local unknowns of a boundary, with ghosts."""
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
     def _fix(self, fixed: list[FixedTemperature]) -> None:
@@ -284,7 +296,7 @@ class Conduction:
         return Touch(contact, own, self.points[own])
 
     def displacements(self) -> Any:
-        """Displacements of the owned nodes, shape (n, 2), or None."""
+        """Return the displacements of the locally owned nodes, shape (n, 2), length, or None."""
         if self._u is None:
             return None
         if self._displaced is None:
@@ -316,7 +328,7 @@ class Conduction:
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """Evaluate such a form, as `power`."""
+        """Return the values of a form of `source` at the nodes, for `power`, locally owned entries."""
         return self._assemble(form)
 
     def _form(self, form: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A face that touches a tool: heat through a contact conductance, into a tool that is as hot as told, or conducts.
+"""Heat through a contact conductance into a tool at a given temperature, or into a conducting tool.
 
 At each node of the face q = conductance (tool - T) flows into the body. A conducting tool has a line of its own below
 each node, one-dimensional, into its depth y: C w_t = k w_yy, -k w_y = -q at its face, w = back at its end. In an
@@ -56,7 +56,7 @@ class ConductingTool:
         return np.interp(np.arange(2 * n + 1) / 2, np.arange(n + 1), self.thickness * ends / ends[-1])
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """(capacity, conductivity) of a line per area, for the temperatures above `back` of all nodes but the last."""
+        """Return (capacity, conductivity) per area of a line, for temperatures above `back`, without the last node."""
         y = self.depths
         M, K = np.zeros((2, len(y), len(y)))
         for e in range(0, len(y) - 1, 2):
@@ -103,7 +103,11 @@ class ContactWithTool:
 class Answer(NamedTuple):
     """Response of the lines in a stage: q = g (free - T); their change is `change` - q `column`.
 
-    free, g: shape (n,); change: shape (n, m); column: shape (m,).
+    Attributes:
+        free: temperature of the tool's face without a flux, shape (n,).
+        g: conductance of contact and line, shape (n,).
+        change: change of the lines without a flux, shape (n, m).
+        column: decrease of a line per flux, shape (m,).
     """
 
     free: np.ndarray
@@ -113,16 +117,18 @@ class Answer(NamedTuple):
 
 
 class Touch:
-    """The n nodes of this rank where a face touches a tool, and the lines below them.
+    """The n nodes of this rank on a face under a tool, and the lines of the tool below them.
 
-    Lines hold temperatures above the tool's back at m nodes, shape (n, m), the face first; m = 0 for a tool that is as
-    hot as told.
+    Lines are temperatures above the tool's back at m nodes, shape (n, m), the face first; m = 0 for a tool at a given
+    temperature.
 
     Attributes:
-        dofs: of the nodes, local, shape (n,). points: (R, Z) of them, shape (n, 2), length.
-        area: of the deformed face that belongs to each, shape (n,).
-        conductance: at each, shape (n,): 0 where it does not touch.
-        back: temperature of the tool's back, or of a tool that is as hot as told. depths: of a line, back included.
+        dofs: local unknowns of the nodes, shape (n,).
+        points: their positions (R, Z), shape (n, 2), length.
+        area: share of each in the deformed face, shape (n,).
+        conductance: contact conductance of each, shape (n,); 0 without contact.
+        back: temperature of the tool's back, or of a tool at a given temperature.
+        depths: depths of the nodes of a line with the back, shape (m + 1,), length.
     """
 
     def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
@@ -140,28 +146,32 @@ class Touch:
 
     @property
     def conducts(self) -> bool:
-        """True if there are lines."""
+        """True if the tool conducts: it has lines."""
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """Return the lines at first, shape (n, m)."""
+        """Return the initial lines, shape (n, m)."""
         return np.full((len(self.dofs), len(self._M)), self._above)
 
     def face(self, lines: np.ndarray) -> np.ndarray:
-        """Temperature of the tool's face at the nodes, shape (n,)."""
+        """Return the temperature of the tool's face at the nodes, shape (n,)."""
         return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
     def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(q, heat per time and area into the nodes of the lines) for body temperatures T, shape (n,)."""
+        """Return (q, heat per time and area into the nodes of the lines) for body temperatures T, shape (n,)."""
         q = self.conductance * (self.face(lines) - T)
         rate = -lines @ self._K
         rate[:, :1] -= q[:, None]
         return q, rate
 
     def answer(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> Answer:
-        """For a stage M w' = known + c rate(lines + w'), known: shape (n, m).
+        """Return the response of the lines in a stage M w' = known + c rate(lines + w').
 
-        `absolute` = False: lines count from 0, not from the tool's back (for differences of temperatures).
+        Args:
+            lines: temperatures above the tool's back, shape (n, m).
+            known: known part, shape (n, m).
+            c: factor of the rate, time.
+            absolute: False: lines count from 0, not from the tool's back (for differences of temperatures).
         """
         back = self.back if absolute else 0.0
         if not self.conducts:
@@ -172,7 +182,7 @@ class Touch:
                       change, column)
 
     def finish(self, answer: Answer, known: np.ndarray, T: np.ndarray, c: float) -> tuple[Any, Any, Any]:
-        """(q, change of the lines, their rate) at the end of a stage, for body temperatures T, shape (n,)."""
+        """Return (q, change of the lines, their rate) at the end of a stage, for body temperatures T, shape (n,)."""
         q = answer.g * (answer.free - T)
         change = answer.change - np.outer(q, answer.column)
         return q, change, (change @ self._M - known) / c

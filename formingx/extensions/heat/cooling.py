@@ -1,4 +1,4 @@
-"""Heat while a body is formed: once per accepted step, in the body as it is deformed then."""
+"""Heat while a body is formed: once per accepted step, in the body as it is deformed half-way through the step."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from .space_error import SpaceError
 
 _MOST_STEPS = 10_000       # of the heat equation in one of the run's
 _WARNS = 2e-3
-"""Error in three dimensions over the span of temperatures above which a run warns: what is promised of stress."""
+"""Discretisation error over the span of temperatures above which a run warns: the promised accuracy of stresses."""
 _LOOKS = 8
-"""States in which the error in three dimensions is estimated, beside the ends of stages."""
+"""Number of states in which the discretisation error is estimated, beside the ends of stages."""
 _NEAR = 1e-2
 """Distance to a tool over the thickness of the body within which a node touches it, for heat: so thin a layer of air
 conducts as well as a contact does. (A sheet that is drawn over a flat face lifts off its middle by less.)"""
@@ -60,9 +60,9 @@ class ToolHeat(NamedTuple):
 class Cooling:
     """The temperature of a scene's body changes while it is formed, as time goes by.
 
-    In each accepted step the heat equation is solved in the body as it is deformed at the end of the step (a staggered
-    scheme, of first order in the step); constants that depend on the temperature have their new values from then on.
-    Steps are shortened so that the temperature, too, is exact in time (`accuracy` of `Process.run`).
+    In each accepted step the heat equation is solved in the body as it is deformed half-way through the step (a
+    staggered scheme, of second order in the step). Temperature-dependent constants have their new values in the next
+    step. Steps are shortened so that the temperature, too, is accurate in time (`accuracy` of `Process.run`).
 
     Args:
         materials: {layer: `ThermalProperties`}, or one for all layers.
@@ -115,8 +115,9 @@ class Cooling:
         short. So a fixed temperature acts through a large conductance (`_CONTINUOUS`).
 
         Args:
-            mesh: of the body. thickness: its largest wall, length.
-            boundaries: laws, or {boundary: temperature at which it is held}.
+            mesh: mesh of the body.
+            thickness: its largest wall, length.
+            boundaries: laws, or {boundary: prescribed temperature}.
         """
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
             boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
@@ -127,15 +128,15 @@ class Cooling:
         return Cooling(self.materials, laws, unit=self.unit, tolerance=self.tolerance, work_to_heat=self.work_to_heat)
 
     def time_through(self, mesh: Any, thickness: float) -> float:
-        """thickness^2/diffusivity, of the slowest layer of a mesh, time."""
+        """Return the diffusion time thickness^2/diffusivity of the slowest layer of a mesh, time."""
         return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
     def history(self, problem: Any) -> CoolingHistory:
-        """History variables of the temperature (`formingx.forms.history.History`)."""
+        """Return the history variables of the temperature (`formingx.forms.history.History`)."""
         return CoolingHistory(self, problem)
 
     def extremes(self, scene: Any) -> tuple[float, float]:
-        """Between which temperatures the body stays if work does not heat it; collective."""
+        """Return the bounds of the temperature of the body if work does not heat it; collective."""
         first = scene.temperature.T.x.array
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
         return _extremes([*np.ravel(ends)], [*self.boundaries, *self._touches(scene)])
@@ -164,9 +165,16 @@ class Cooling:
 
 
 class Memory(NamedTuple):
-    """Process time, and the state of the heat equation: the temperature, locally owned entries, shape (n,), and the
-    lines of each tool; the step in time to continue with, if there is one; heat of dissipated work
-    (`Conduction.power`), locally owned entries, or None; an earlier time, and the temperature then, or None."""
+    """State of the heat equation.
+
+    Attributes:
+        time: process time.
+        temperature: locally owned entries, shape (n,).
+        lines: temperatures of the lines of each tool, see `Touch`.
+        step: time step to continue with, or None.
+        power: heat of dissipated work (`Conduction.power`), locally owned entries, or None.
+        before: an earlier time and the temperature then, or None.
+    """
 
     time: float
     temperature: np.ndarray
@@ -200,7 +208,7 @@ class CoolingHistory:
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
     def _touching(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
-        """(touch, contact, conductance where it touches) of the tools that take heat."""
+        """Return (touch, contact, conductance in contact) of each tool that exchanges heat."""
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
         return [(touch, contact, touch.conductance.copy())
                 for touch, contact in zip(body.touches, contacts, strict=True)]
@@ -257,8 +265,11 @@ class CoolingHistory:
         self._take()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`; heat flows in the body as it is half-way, and half the step through points that touch, or
-        ceases to, in it: which makes the step one of second order."""
+        """See `History`.
+
+        The heat equation is solved in the body half-way through the step. A point that touches or separates in the
+        step has half its conductance. So the step is of second order.
+        """
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
             power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
@@ -357,7 +368,7 @@ class CoolingHistory:
 
 
 def _look_where_it_touches(body: Conduction, touches: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
-    """Let heat through to tools where they touch the body as it stands."""
+    """Set the conductance of the nodes in contact: zero where no tool touches the deformed body."""
     u = body.displacements()
     for touch, contact, conductance in touches:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
@@ -382,7 +393,7 @@ def _equal(a: Any, b: Any) -> bool:
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
-    """Between which a body of these temperatures stays under these laws, by the maximum principle."""
+    """Return the bounds of the temperature of a body under these laws, by the maximum principle."""
     for law in laws:
         if not getattr(law, "temperatures", ()):            # heat from elsewhere
             return -np.inf, np.inf
@@ -395,7 +406,11 @@ def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, fl
 
 
 def _rows(points: np.ndarray, others: Any) -> np.ndarray:
-    """For each point, shape (n, 2), the row of others in which it is; an InputError if it is not there."""
+    """Return the row of `others` at the position of each point, shape (n,).
+
+    Raises:
+        InputError: a point is not among the others.
+    """
     from scipy.spatial import cKDTree
     others = np.reshape(others, (-1, points.shape[-1]))
     if not len(points):

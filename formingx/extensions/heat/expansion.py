@@ -40,14 +40,15 @@ class ThermalExpansion:
         self.stretch(np.array([self.stress_free]))
 
     def volume_ratio(self, temperature: Any) -> np.ndarray:
-        """J_T at temperatures, of their shape."""
+        """Return J_T at temperatures, of the same shape."""
         return self.stretch(temperature) ** 3
 
     def stretch(self, temperature: Any, clamped: bool = False) -> np.ndarray:
-        """J_T^(1/3) at temperatures, of their shape.
+        """Return J_T^(1/3) at temperatures, of the same shape.
 
         Args:
-            clamped: beyond the ends of a table it is that at the end, as in a run.
+            temperature: temperatures, of any shape.
+            clamped: True: beyond the ends of a table its end value is used, as in a run.
 
         Raises:
             InputError: the volume is not above 0, or not known there.

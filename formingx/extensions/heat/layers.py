@@ -18,22 +18,22 @@ from ...mesh.grid import Grid, gathered, to_mesh
 _PART = 0.3
 """Thickness of a layer over the depth that heat has gone: errors are then some 1e-5 of the span of temperatures."""
 _REACH = 7.0
-"""How many times the depth at the last time heat is felt: 1 - erf(7/2) is 7e-7."""
+"""Depth that heat reaches, over the penetration depth at the last time: 1 - erf(7/2) is 7e-7."""
 _SPARE = 0.2
-"""the amount by which of a layer more one may be thicker than that."""
+"""Part of a layer by which the required number of layers is reduced before it is rounded up."""
 _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """Return the mesh, its elements cut into layers below faces; the mesh itself where they are thin enough, or too
-    curved.
+    """Return the mesh with its elements cut into layers below faces. Collective.
 
-    Collective.
+    The mesh itself is returned if its elements are thin enough, or too curved to be cut.
 
     Args:
-        depths: {boundary: depths that heat from there has gone at the first and the last time of interest}, lengths.
-        moved: where points of the body, shape (n, 2), are in the deformed body, in which depths are; None: in the
-            reference configuration.
+        mesh: the mesh.
+        depths: {boundary: penetration depths of heat at the first and the last time of interest}, lengths.
+        moved: function that returns the deformed positions of points, shape (n, 2), between which depths are measured;
+            None: the reference positions.
     """
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
@@ -44,8 +44,14 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
 
 def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
-    """Relative sizes of layers from the bottom up, each 1.26 times the next one towards the faces (of "bottom", "top"),
-    where they are `part` as thick as elements are now, and of the depth that heat has gone; collective."""
+    """Return the relative sizes of layers from the bottom up, graded to the faces by a factor of 1.26; collective.
+
+    Args:
+        mesh: the mesh.
+        faces: "bottom", "top" or both.
+        part: largest thickness of a layer at a face, over the present elements there.
+        depth: penetration depth of heat, length; a layer at a face is at most `_PART` of it.
+    """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_along(grid, face) for face in faces))
     thinnest, longest = min([_PART * depth, *(part * height for height in heights)]), max(lengths)
@@ -60,7 +66,7 @@ def height_at(mesh: Mesh, face: str) -> float:
 
 
 def _along(grid: Grid, face: str) -> tuple[float, float, float]:
-    """Median height of the elements along a boundary, its length, and the area of the mesh."""
+    """Return the median height of the elements along a boundary, its length, and the area of the mesh."""
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
     ends = grid.boundaries[face][:, :2]
@@ -97,7 +103,7 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Distance of points from the edges of a boundary, shape (n,), length."""
+    """Return the distance of points from the edges of a boundary, shape (n,), length."""
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
         along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
@@ -106,7 +112,7 @@ def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Edges, shape (n, 2), each from its end of smaller R (of smaller Z), however nodes are numbered."""
+    """Return edges, shape (n, 2), each from its end of smaller R (at equal R of smaller Z)."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
     return np.where(swap[:, None], edges[:, ::-1], edges)
@@ -122,7 +128,7 @@ class _Nodes:
         self._middles: dict[tuple[int, int], int] = {}
 
     def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
-        """(nodes, places from 0 to 1) of an edge from a to b that runs along a `curve`: ends and middle, or ends."""
+        """Return (nodes, positions from 0 to 1) of an edge from a to b along a `curve` of 2 or 3 nodes, ends first."""
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
         places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])
@@ -133,7 +139,7 @@ class _Nodes:
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
-        """Return the node in the middle of an edge; `point`: where, for the first that asks."""
+        """Return the node in the middle of an edge; the first call makes it at `point`."""
         key = min(a, b), max(a, b)
         if key not in self._middles:
             self._middles[key] = self._new(point)
@@ -149,7 +155,7 @@ class _Nodes:
 
 
 def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Points of a straight edge (two nodes) or of a quadratic one (ends, then middle), shape (n, 2)."""
+    """Return points of a straight edge (two nodes) or of a quadratic one (ends, then middle), shape (n, 2)."""
     s = np.asarray(s, dtype=float)[:, None]
     if len(curve) == 2:
         return (1 - s) * curve[0] + s * curve[1]
@@ -184,7 +190,7 @@ def _rows(table: np.ndarray) -> list[list[int]]:
 
 
 def _parts(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """Return the triangles that one is cut into."""
+    """Return the pieces of a triangle of the grid as rows of node numbers."""
     element, at = grid.points[row], {row[k]: np.eye(3)[k] for k in range(3)}      # area coordinates of nodes
     sides = {}
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):

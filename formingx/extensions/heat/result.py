@@ -36,8 +36,8 @@ class HeatRun:
     At a time between two steps the temperature is a cubic in time; times of output are ends of steps.
 
     Attributes:
-        mesh: that the temperature was computed on: the one given, its elements cut into layers where heat passes faces.
-        outputs: times asked for.
+        mesh: mesh of the computation: the given one, its elements cut into layers where heat passes faces.
+        outputs: requested output times.
         errors_in_space: estimated largest error of the temperature that is due to the mesh, at these times, degrees.
         unit: of temperatures, "C" or "K".
         states: [[T of the nodes, locally owned entries, then the lines of each conducting tool]] of the steps.
@@ -52,7 +52,7 @@ class HeatRun:
         self.errors_in_space: np.ndarray = np.zeros(len(outputs))
 
     def record(self, time: float, step: Any) -> None:
-        """Take up an accepted step (`formingx.extensions.heat.stepping.Step`)."""
+        """Append an accepted step (`formingx.extensions.heat.stepping.Step`)."""
         self.states.append(step.state)
         self._times.append(time)
         self._errors.append(step.error)
@@ -71,7 +71,7 @@ class HeatRun:
 
     @property
     def heat_stored(self) -> np.ndarray:
-        """Heat that the body took up in each step, shape (n,); the first is 0."""
+        """Heat stored by the body in each step, shape (n,); the first is 0."""
         return np.array(self._stored)
 
     @property
@@ -94,9 +94,11 @@ class HeatRun:
         return T
 
     def at(self, points: Any, times: Any = None) -> np.ndarray:
-        """Temperatures at points (R, Z), shape (n, 2), the same on all ranks, at times (default: `outputs`).
+        """Return temperatures at points and times, shape (times, n).
 
-        Shape (times, n).
+        Args:
+            points: positions (R, Z), shape (n, 2), the same on all ranks.
+            times: times; default: `outputs`.
 
         Raises:
             InputError: a point outside the body, a time outside the run.
@@ -106,16 +108,19 @@ class HeatRun:
         return np.array([reader.read(self.temperature(t).x.array) for t in self._chosen(times)])
 
     def through(self, times: Any = None, *, line: Any = None, points: int = _POINTS) -> tuple[np.ndarray, np.ndarray]:
-        """(distance from the first end, temperatures, shape (times, points)) along a straight line through the body.
+        """Return (distance from the first end, temperatures) along a straight line, shapes (points,), (times, points).
 
-        line: its two ends (R, Z); default: from `bottom` to `top` (or `inner` to `outer`) at their first nodes.
+        Args:
+            times: times; default: `outputs`.
+            line: its two ends (R, Z); default: from `bottom` to `top` (or `inner` to `outer`) at their first nodes.
+            points: number of points.
         """
         first, last = np.array(self._ends() if line is None else line, dtype=float).reshape(2, 2)
         s = np.linspace(0, 1, points)
         return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
 
     def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
-        """Mean temperature over such a line, shape (times,), by Simpson's rule."""
+        """Return the mean temperature over a line as in `through`, shape (times,), by Simpson's rule."""
         _, T = self.through(times, line=line)
         weights = np.full(_POINTS, 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
@@ -228,7 +233,7 @@ class HeatRun:
                 for va, vb, da, db in zip(a, b, slope_a, slope_b)]
 
     def _slope(self, k: int) -> list[np.ndarray]:
-        """Change in time at a step, of the parabola through it and its neighbours."""
+        """Return the time derivative at a step of the parabola through it and its neighbours."""
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]

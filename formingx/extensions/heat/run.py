@@ -24,9 +24,9 @@ from .result import HeatRun
 from .space_error import SpaceError
 
 PROMISE = 3e-4
-"""Of the error in three dimensions, over the span of temperatures in a run."""
+"""Allowed discretisation error, over the span of temperatures in a run."""
 _EARLY = 0.01
-"""Part of the time of a run from which on temperatures are as exact as at the times of output."""
+"""Earliest time, over the duration of a run, at which temperatures are as accurate as at the output times."""
 
 _log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (), *,
          start: Any, times: Any, unit: str, kinematics: Any = None, displacement: Any = None, tolerance: float = 1e-3,
          max_steps: int = 10000) -> HeatRun:
-    """Conduction of heat in a body over time, from t = 0.
+    """Compute the conduction of heat in a body over time, from t = 0.
 
     Args:
         mesh: of the body, from `formingx.mesh`. A boundary without a law lets no heat through.
@@ -43,16 +43,19 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
             `Absorption`; several on one boundary add up.
         start: temperature at first: a number, a `table` over R, a function of arrays (R, Z), a CSV file with columns
             R, Z, T, an earlier `HeatRun` (its end), or a DOLFINx Function.
-        times: when to look at it, times above 0 that grow, the last one the end; or the end alone. Steps end there.
+        times: output times, above 0 and increasing; the run ends at the last. Or this end alone. Steps end there.
         unit: of all temperatures, "C" or "K".
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: in the
             reference configuration.
         tolerance: the largest estimated error of one step, degrees.
-        max_steps: more are not taken.
+        max_steps: maximum number of steps.
+
+    Returns:
+        The `HeatRun`.
 
     Raises:
-        InputError: something of this is not allowed.
+        InputError: an argument that is not allowed.
         ConvergenceError: steps became too short, or too many.
 
     >>> sheet = fx.mesh.disc(radius=20.0, thickness=2.0, elements=(4, 2))
@@ -90,8 +93,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """{boundary: depths that heat has gone at the first and the last time of interest}, for boundaries that heat
-    passes."""
+    """Return {boundary: penetration depths of heat at the first and the last time of interest}, lengths."""
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
     first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
@@ -159,7 +161,7 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None:
-    """Estimate the error in three dimensions at the times of output, and say where it is more than is promised."""
+    """Estimate the discretisation error at the output times, and warn if it exceeds the promised one."""
     try:
         run.errors_in_space = np.array([estimate.of(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])
@@ -175,7 +177,11 @@ def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
-    """{layer: `ThermalProperties`} of what a user gave, or an InputError."""
+    """Return {layer: `ThermalProperties`} from the user's argument.
+
+    Raises:
+        InputError: it is not allowed, or a layer has none.
+    """
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
     if not isinstance(materials, Mapping):
@@ -190,7 +196,11 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
-    """Return the laws of the faces that a user gave, or an InputError."""
+    """Return the user's laws of the faces as a list.
+
+    Raises:
+        InputError: a law that is not allowed.
+    """
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     held = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:

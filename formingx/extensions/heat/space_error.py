@@ -1,7 +1,7 @@
-"""An estimate of the error in three dimensions of a temperature: what a space of one degree more would change.
+"""Estimate of the discretisation error of a temperature: its change in a space of one degree more.
 
 The residual of the temperature and of its change in time, tested by cubics, drives a correction over the time that the
-run has taken: (M + t K) e = t (R(T) - M dT/dt). For a varying coefficient on a short length this is the elliptic
+run has taken: (M + t K) e = t (R(T) - M dT/dt). For errors that vary on a short length this is the elliptic
 reconstruction of Makridakis and Nochetto, SIAM J. Numer. Anal. 41 (2003) 1585-1594.
 """
 
@@ -13,7 +13,12 @@ from .contact import Touch
 
 
 class SpaceError:
-    """Estimates for a body; `finer`: the same equations of degree 3, which are destroyed with it."""
+    """Error estimator of a body.
+
+    Args:
+        body: the equations of the run.
+        finer: the same equations of degree 3; `destroy` frees them.
+    """
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
@@ -22,7 +27,7 @@ class SpaceError:
     def of(self, state: list[np.ndarray], time: float) -> float:
         """Return the largest estimated error of a state that was reached after a time, degrees; collective.
 
-        The faces of tools are as hot as they are; their lines do answer to the correction.
+        The faces of tools keep their temperatures; their lines respond to the correction.
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
@@ -36,7 +41,7 @@ class SpaceError:
         self._finer.destroy()
 
     def _faces(self, touch: Touch, finer: Touch, lines: np.ndarray) -> np.ndarray:
-        """Lines at the nodes of the finer space that have only the temperature of the tool's face."""
+        """Return lines at the nodes of the finer space, with the temperature of the tool's face and 0 below it."""
         found = np.zeros((len(finer.dofs), lines.shape[1]))
         if touch.conducts:
             values = np.zeros(len(self._body.points))

@@ -17,10 +17,13 @@ _ERROR = WEIGHTS - np.array([1 - _W, 3 * _W + 1, _D]) / 3
 
 
 class Step(NamedTuple):
-    """A step that was tried.
+    """Result of a trial step.
 
-    state: [T, *lines] at its end; error: estimated, of its own, degrees; stored: heat; heats: through each boundary and
-    source, in the order of `Conduction.names`.
+    Attributes:
+        state: [T, *lines] at its end.
+        error: estimated error of this step, degrees.
+        stored: heat that the body stores in it.
+        heats: heat through each boundary and source, in the order of `Conduction.names`.
     """
 
     state: list[np.ndarray]
@@ -30,7 +33,7 @@ class Step(NamedTuple):
 
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
-    """One step of TR-BDF2 from a state.
+    """Take one step of TR-BDF2 from a state.
 
     Raises:
         ConvergenceError: Newton's method found no solution in a stage.

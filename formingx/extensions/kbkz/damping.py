@@ -9,8 +9,7 @@ import numpy as np
 from ...errors import InputError, finite, positive
 
 _NEAR = 1e-4
-"""Of the square root in Wagner's exponent: below it its slope, infinite in the reference configuration, is that at
-it."""
+"""Smallest square root s in Wagner's exponent for the slope of h, which is infinite at s = 0."""
 
 
 class Damping:
@@ -20,15 +19,15 @@ class Damping:
     """
 
     def __call__(self, I1: Any, I2: Any) -> Any:
-        """h at invariants of any shape."""
+        """Return h at invariants of any shape."""
         return self.derivatives(I1, I2)[0]
 
     def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-        """(h, dh/dI1, dh/dI2) at invariants of any shape."""
+        """Return (h, dh/dI1, dh/dI2) at invariants of any shape."""
         raise NotImplementedError
 
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
-    """{constant: (lowest, highest)} for those that `fit` varies; as the arguments of the class."""
+    """{constant: (lowest, highest)} of the constants that `fit` varies, in the order of the arguments of the class."""
 
     @property
     def of_I1_alone(self) -> bool:
@@ -100,7 +99,9 @@ class DoubleWagner(Damping):
     .. math:: h = f e^{-n_1 s} + (1 - f) e^{-n_2 s}, \qquad s = \sqrt{\alpha I_1 + (1 - \alpha) I_2 - 3}
 
     Args:
-        alpha, f: from 0 to 1. n1, n2: above 0.
+        alpha: share of I1, from 0 to 1.
+        f: share of the first exponential, from 0 to 1.
+        n1, n2: above 0.
 
     >>> fx.DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
     DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
@@ -151,7 +152,7 @@ class SoskeyWinter(Damping):
 
 
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-    """Return the derivatives of the sum of f exp(-n s)."""
+    """Return the sum h of f exp(-n s), with s of I1 and I2, and its derivatives dh/dI1 and dh/dI2."""
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]
     slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _NEAR))

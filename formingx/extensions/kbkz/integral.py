@@ -1,14 +1,13 @@
-"""The stress of a fading memory of all past states, at points: `KBKZ` in a scene.
+"""Stress of a fading memory of all past states at points: `KBKZ` in a scene.
 
-With Cbar = J^(-2/3) C and the past states C_k, at ages that the material feels, the second Piola-Kirchhoff stress is,
-up to a pressure,
+With Cbar = J^(-2/3) C and the past states C_k at reduced ages, the second Piola-Kirchhoff stress is, up to a pressure,
 
     S = sum_k W_k h(I1, I2) C_k^-1,   I1 = Cbar : C_k^-1,   I2 = Cbar^-1 : C_k,   W_k = sum_j G_j w_kj,
 
-w_kj the weights of mode j that are exact where h C_k^-1 goes linearly with the age from state to state. The first
-state, rest, stands for all time before; the last bears no more than a pressure. A form holds S linear in Cbar and the
-step of time, exact where it is refreshed, with the consistent tangent. A symmetric tensor is kept as its entries (11,
-22, 12, 33); arrays are of shape (4, n).
+with the weights w_kj of mode j. They are exact if h C_k^-1 is linear in the age between states. The first state,
+undeformed, represents all earlier time; the last one contributes only a pressure. In a form S is linear in Cbar and in
+the time step, exact where it is refreshed, with the consistent tangent. A symmetric tensor is stored as its entries
+(11, 22, 12, 33); arrays have shape (4, n).
 """
 
 from typing import Any
@@ -19,21 +18,23 @@ from ...materials.tensors import cofactor, entries
 from .past_states import PastStates
 
 _COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
-"""How often an entry is in the tensor."""
+"""Number of times that an entry occurs in the tensor."""
 
 
 class Integral:
     """Past states' weights and stress.
 
     Args:
-        spectrum: [(G, tau), ...]. damping: a `Damping` or None. irreversible: see `KBKZ`. shifted: True if the time
-            that the material feels depends on the temperature.
+        spectrum: [(G, tau), ...], stress and time.
+        damping: a `Damping` or None.
+        irreversible: see `KBKZ`.
+        shifted: True if the reduced time of the material depends on the temperature.
     """
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
                     "past_T": (0.0,) * 4}
-    """What a form holds, at zero: S - T dt, Cbar, dS/dCbar and T = dS/dt where it was refreshed, the entries of S as
-    often as they are in the tensor."""
+    """Initial values of the coefficients of a form: S - T dt, Cbar, dS/dCbar and T = dS/dt where it was refreshed. The
+    entries of S are multiplied by their number in the tensor."""
 
     def __init__(self, spectrum: list[tuple[float, float]], damping: Any, irreversible: bool, shifted: bool):
         self.modulus, self.tau = np.array(spectrum).T
@@ -48,7 +49,7 @@ class Integral:
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """w of the states at these falling ages, the last 0, shape (K,) or (K, n): of shape (K, modes[, n])."""
+        """Return the weights w of states, shape (K, modes[, n]), at falling ages, the last 0, shape (K,) or (K, n)."""
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
         mean = _mean_decay(step)
@@ -56,7 +57,7 @@ class Integral:
         w[0] = np.exp(-x[0])
         w[:-1] += young * (mean - np.exp(-step))
         w[1:] += young * (1 - mean)
-        known = step[:-1] > 0                                   # the way before one that is a parabola
+        known = step[:-1] > 0                                   # a step before allows a parabola
         s = np.where(known, step[1:] / np.where(known, step[:-1], 1), np.inf)
         ends, middle, first = (young[1:] * _bulge(step[1:]) * c for c in _parabola(s))
         w[2:] -= ends
@@ -66,11 +67,16 @@ class Integral:
 
     def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
               near: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(W, dW/dstep) of the states of `weights` a step of the material's time later; shape (K, n or 1).
+        """Return (W, dW/dstep) of the states after a step in reduced time, shape (K, n or 1).
 
-        before: the time between the last two states, 0: not known. The step is exact where h C_k^-1 goes along a
-        parabola through these, which makes it of second order for steps far longer than tau, too (`TransientNetwork`).
-        near: 1, or 0 where the two are far apart, shape (n,).
+        The step is exact if h C_k^-1 is a parabola through the last states. So it is of second order even for steps far
+        longer than tau (`TransientNetwork`).
+
+        Args:
+            weights: result of `weights` for the states.
+            step: step in reduced time.
+            before: reduced time between the last two states; 0: not known.
+            near: 1, or 0 where these two are far apart, shape (n,).
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
@@ -93,11 +99,11 @@ class Integral:
         return W, slope
 
     def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
-        """(C_k^-1, shape (K, 4, n), h, dh/dI1, dh/dI2, shape (K, n)) of past states, shape (K, 4, n), at C."""
+        """Return (C_k^-1, h, dh/dI1, dh/dI2) of past states, shape (K, 4, n), at C; h has shape (K, n)."""
         inverse = _inverse(past)
         if self.damping is None:
-            entry = np.ones((len(past), C.shape[1]))
-            return inverse, entry, 0 * entry, 0 * entry
+            ones = np.ones((len(past), C.shape[1]))
+            return inverse, ones, 0 * ones, 0 * ones
         I1 = np.sum(_COUNT * inverse * C, axis=1)
         I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
         h, h1, h2 = self.damping.derivatives(I1, I2)
@@ -108,7 +114,7 @@ class Integral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                least: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(S, dS/dC, dS/dstep), shapes (4, n), (4, 4, n), (4, n), at C, of past states of weights W, dW/dstep."""
+        """Return (S, dS/dC, dS/dstep), shapes (4, n), (4, 4, n), (4, n), at C, of past states with weights W."""
         inverse, h, h1, h2 = self.damped(C, past, least)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
@@ -127,8 +133,8 @@ class Integral:
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
     def unsymmetric_work(self, C: Any, dC: Any, held: dict[str, Any]) -> Any:
-        """Return the virtual work of the earlier states for the entries dC of a virtual change of Cbar (UFL); 0
-        where refreshed."""
+        """Return the virtual work of the unsymmetric part of dS/dC, which `potential` lacks, for the entries dC of a
+        virtual change of Cbar (UFL); 0 where refreshed."""
         D, change = held["past_D"], _change(C, held)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
@@ -143,7 +149,7 @@ def _change(C: Any, held: dict[str, Any]) -> list[Any]:
 
 
 def _mean_decay(x: np.ndarray) -> np.ndarray:
-    """(1 - e^-x)/x."""
+    """Return (1 - e^-x)/x."""
     return np.where(x < 1e-12, 1.0, -np.expm1(-x) / np.where(x < 1e-12, 1.0, x))
 
 
@@ -166,14 +172,14 @@ def _parabola(s: Any) -> tuple[Any, Any, Any]:
 
 
 def _parabola_slopes(s: Any) -> tuple[Any, Any]:
-    """Return the derivatives of the latter two."""
+    """Return the derivatives by s of the last two results of `_parabola`."""
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
     return slope, slope * s / (1 + s) + share / (1 + s) ** 2
 
 
 def _bulge(x: np.ndarray) -> np.ndarray:
-    """[x - 2 + (x + 2) e^-x]/x^2."""
+    """Return [x - 2 + (x + 2) e^-x]/x^2."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
@@ -181,7 +187,7 @@ def _bulge(x: np.ndarray) -> np.ndarray:
 
 
 def _bulge_slope(x: np.ndarray) -> np.ndarray:
-    """Its derivative."""
+    """Return the derivative of `_bulge`."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008

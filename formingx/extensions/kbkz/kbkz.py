@@ -35,11 +35,11 @@ _STRAIN = 0.25
 
 
 class KBKZ(Relaxing):
-    """The factorised K-BKZ equation, the body in the reference configuration before.
+    """The factorised K-BKZ equation, for a body that is undeformed before the run.
 
     In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h
-    times the stress of a neo-Hookean body of unit modulus, so that time and strain separate. A damped material
-    stores no energy that the state alone would tell, so runs with it have no columns of energies.
+    times the stress of a neo-Hookean body of unit modulus, so that time and strain separate. The state alone does not
+    determine the stored energy of a damped material, so runs with it have no columns of energies.
 
     Args:
         spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.
@@ -108,9 +108,9 @@ class KBKZ(Relaxing):
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
-        """Nominal stress, force over reference area, of a test (`true`: over the area as it is); stress.
+        """Return the nominal stress of a test, force over reference area (`true`: over the present area).
 
-        Error below 1e-8 of it.
+        Its relative error is below 1e-8.
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial", see `Material.stress`, too.
@@ -164,7 +164,7 @@ class KBKZ(Relaxing):
         return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
-        """Nominal stresses of a step to (l1, l2), shape (2, ...)."""
+        """Return the nominal stresses of a step to (l1, l2), shape (2, ...)."""
         if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
         squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
@@ -175,7 +175,7 @@ class KBKZ(Relaxing):
         """Return the stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up
         to 100.
 
-        Put on at once, no more stress is to be had beyond: a damped melt that is stretched faster than it relaxes thins
+        A sudden stretch beyond it carries no more stress: a damped melt that is stretched faster than it relaxes thins
         there without end.
         """
         known(f"{self}: rupture_stretch: mode", mode, MODES)
@@ -185,7 +185,7 @@ class KBKZ(Relaxing):
         return float(l[falls[0]]) if len(falls) else np.inf
 
     def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
-        """tau_1 - tau_3 at the last of the times."""
+        """Return tau_1 - tau_3 at the last of the times."""
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
         rested = self._modulus(now - times[0]) * self._strained(mode, last)
@@ -197,7 +197,7 @@ class KBKZ(Relaxing):
         return float(rested + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
 
     def _ages(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Ages between which the integrand is smooth, rising from 0."""
+        """Return the ages between which the integrand is smooth, rising from 0."""
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANELS)) + 1)
         ages = [np.array([0, whole]), shortest / 2 * _PANELS ** np.arange(count), times[-1] - times]
@@ -209,7 +209,7 @@ class KBKZ(Relaxing):
         return found[found <= whole]
 
     def _strained(self, mode: str, stretch: np.ndarray) -> np.ndarray:
-        """h (B_11 - B_33) of a stretch."""
+        """Return h (B_11 - B_33) of a stretch."""
         square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
         difference = square[..., 0] - square[..., 2]
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))

@@ -19,21 +19,30 @@ from ...materials.tensors import IDENTITY, cofactor, deviator_squared, entries, 
 from ...ranks import gathered
 
 _NOTHING = 3e-7
-"""A past state that the line between its neighbours replaces to this part of the present stress is left out. (Of the
-thousand states of a fine run the omitted parts add up: to 3e-4 of the stress, with 3e-6 to 4e-3.)"""
+"""Error of the present stress, relative, up to which interpolation between its neighbours replaces a past state. (In a
+fine run of a thousand states the errors add up to 3e-4 of the stress; with 3e-6 to 4e-3.)"""
 
 
 class Past(NamedTuple):
-    """A past state: the time that the material has felt until then, a number or shape (n,); the entries of Cbar, shape
-    (4, n), n points of this rank's own cells."""
+    """A past state at n points of the cells of this rank.
+
+    Attributes:
+        felt: reduced time of the material until then, a number or shape (n,).
+        C: entries of Cbar, shape (4, n).
+    """
 
     felt: Any
     C: np.ndarray
 
 
 class Memory(NamedTuple):
-    """Process time of the last accepted state; the states up to it, which memories share; of each state the smallest h
-    since, shape (K, n), or None."""
+    """History variables of a material with past states.
+
+    Attributes:
+        time: process time of the last accepted state.
+        states: the states up to it.
+        least: smallest h of each state since then, shape (K, n), or None.
+    """
 
     time: float
     states: tuple[Past, ...]
@@ -41,10 +50,11 @@ class Memory(NamedTuple):
 
 
 class PastStates:
-    """The past states as a history; it keeps the material's coefficients in the forms up to date (`refresh`).
+    """History variables of a material with past states; `refresh` updates its coefficients in the forms.
 
     Args:
-        forms: the `Formulation`; terms: the `MaterialTerms`.
+        forms: the `Formulation`.
+        terms: the `MaterialTerms` of the material.
     """
 
     rate_dependent = True
@@ -90,7 +100,7 @@ class PastStates:
 
     @np.errstate(over="ignore", invalid="ignore")                   # of a guess far back in time: no state
     def refresh(self) -> None:
-        """Make the coefficients exact at the fields and the time that the forms hold now."""
+        """Update the coefficients of the forms to their present fields and time."""
         C, step, rate = self._now()
         if self._seen and np.array_equal(self._seen[0], C) and np.array_equal(self._seen[1], step):
             return
@@ -139,7 +149,7 @@ class PastStates:
         return found.reshape(-1, X.ufl_shape[0])
 
     def _needed(self, states: list[Past], C: np.ndarray, least: np.ndarray | None) -> list[int]:
-        """Numbers of the states without which the stress at C would change; collective."""
+        """Return the numbers of the states without which the stress at C would change; collective."""
         if len(states) < 5:
             return list(range(len(states)))
         felt, past = np.array([s.felt for s in states]), np.array([s.C for s in states])
@@ -165,7 +175,7 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _now(self) -> tuple[np.ndarray, Any, Any]:
-        """(Cbar, the time that the material has felt since the last state, the latter over that time)."""
+        """Return (Cbar, reduced time since the last state, reduced time per time)."""
         step: Any = self._forms.time_now - self._memory.time
         rate: Any = 1.0
         if not len(self._own):
@@ -177,11 +187,11 @@ class PastStates:
 
     @property
     def material(self) -> Any:
-        """The material that remembers."""
+        """The material."""
         return self._terms.material
 
     def thinnest(self) -> tuple[float, np.ndarray]:
-        """Least stretch at the fields that the forms hold now, and where (reference, length); collective."""
+        """Return the smallest stretch at the present fields and its reference position, length; collective."""
         C = self._now()[0]
         half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
         least = np.minimum(half - apart, C[3])

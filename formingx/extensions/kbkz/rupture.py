@@ -30,7 +30,7 @@ def ruptures(body: Any) -> Iterator[Finding]:
 
 @register("failure")
 def thins(failure: Any) -> Iterator[Finding]:
-    """Return a damped melt that thins without end in the last good state; collective."""
+    """A damped melt that thins without end in the last good state; collective."""
     if failure.last is None:
         return
     problem, drawn = failure.problem, None

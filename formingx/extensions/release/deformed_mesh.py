@@ -77,7 +77,7 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
         place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), points.shape[-1]))
         for t, x, *_ in parts:
             place[t] = x
-        if problem.scene.kinematics.axisymmetric:            # what is on the axis is there to the last bit
+        if problem.scene.kinematics.axisymmetric:            # nodes on the axis have R = 0 exactly
             place[np.abs(place[:, 0]) < 1e-12 * np.ptp(place), 0] = 0.0
         return Grid(place, np.arange(1, len(place) + 1),
                     {name: counter_clockwise(place, np.concatenate([p[2][name] for p in parts])[:, _TO_GRID])

@@ -11,10 +11,12 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
     """Return the elements of a mesh that lie next to the first pieces of a line through it; collective.
 
-    A boundary of which nothing is left, such as the rim, is now where it was cut (one called "trim", if none is gone).
+    The cut edges belong to each boundary that vanishes, such as the rim; else to a new one, "trim".
 
     Args:
-        line: shape (n, 2), length. pieces: how many of its n - 1 pieces.
+        mesh: the mesh.
+        line: points of the line, shape (n, 2), length.
+        pieces: number of its n - 1 segments that are kept.
 
     Raises:
         InputError: nothing is left of a layer.
@@ -52,7 +54,7 @@ def _kept(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 
 def _outline(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
-    """Return {ends of an edge: first, last, middle} of the edges of one triangle alone."""
+    """Return {ends of an edge: first, last, middle} of the edges that belong to a single triangle."""
     found: dict[frozenset[int], list[list[int]]] = {}
     for row in ([int(node) for node in nodes] for nodes in triangles):
         for k, (i, j) in enumerate(_EDGES):

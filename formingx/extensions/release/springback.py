@@ -1,4 +1,4 @@
-"""A part that is released: out of its tools, trimmed, cooled; what it springs back, shrinks and warps."""
+"""Release of a formed part from its tools: springback, shrinkage and warpage, after trimming and cooling."""
 
 from __future__ import annotations
 
@@ -39,10 +39,11 @@ class Springback(KeyNumbers):
     """A part before and after it was released.
 
     Attributes:
-        path: the run from the part in its tools to the part in the reference configuration (`Path`).
-        before, after: its `Wall` then.
+        path: the run from the part in its tools to the released part (`Path`).
+        before: `Wall` of the part in its tools.
+        after: `Wall` of the released part.
         trimmed: radius of the middle line in the tools where it was cut off, length.
-        units: of the labels.
+        units: units of the labels.
     """
 
     path: Path
@@ -58,22 +59,22 @@ class Springback(KeyNumbers):
 
     @property
     def springback(self) -> float:
-        """Height that it had more in its tools, length."""
+        """Height of the part in its tools minus its height after the release, length."""
         return _height(self.before) - self.height
 
     @property
     def min_wall(self) -> float:
-        """Length."""
+        """Minimum wall of the released part, length."""
         return float(self.after.wall.min())
 
     @property
     def diameter(self) -> float:
-        """The largest, outside, length."""
+        """Largest outer diameter of the released part, length."""
         return _diameter(self.after)
 
     @property
     def shrinkage(self) -> float:
-        """1 - diameter over that in its tools."""
+        """Decrease of the largest diameter by the release, over the diameter in the tools."""
         return 1 - self.diameter / _diameter(self.before)
 
     @property
@@ -84,7 +85,7 @@ class Springback(KeyNumbers):
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """(what, its value with its unit), for people."""
+        """Rows of the report: (label, value with unit)."""
         said, before = self._length, self.before
         return [("trimmed at the radius", said(self.trimmed)),
                 ("height (in its tools)", f"{said(self.height)} ({said(_height(before))})"),
@@ -104,7 +105,7 @@ def _diameter(wall: Wall) -> float:
 
 
 def _end(wall: Wall) -> float:
-    """Direction of the last edge of the middle line, degrees from R."""
+    """Return the direction of the last edge of the middle line, degrees from R."""
     (r, z) = wall.profile.middle[-1] - wall.profile.middle[-3]
     return float(np.degrees(np.arctan2(z, r)))
 
@@ -120,14 +121,15 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
 
     Args:
         path: the path of a solid.
-        temperature: of the two faces of the part from the release on; of a scene with `heat=Cooling(...)` only. It acts
-            through a conductance of 1e4 conductivity/wall.
-        trim: as in `Path.part`: the part is cut along the line of nodes next to that.
-        boundaries: instead of a temperature, laws of the faces, as for `Cooling`, for a duration.
-        duration: time for which the part is followed; default with a temperature wall^2/diffusivity, else none.
-        state: of the part in its tools; default the last.
+        temperature: temperature of both faces of the part after the release, only for a scene with `heat=Cooling(...)`.
+            It acts through a conductance of 1e4 conductivity/wall.
+        trim: as in `Path.part`: the part is cut along the nearest line of nodes.
+        boundaries: laws of the faces in place of a temperature, as for `Cooling`; they need a duration.
+        duration: time of cooling or relaxation after the release; default wall^2/diffusivity with a temperature, else
+            none.
+        state: state of the part in its tools; default the last.
         accuracy: see `Process.run`.
-        units: a `formingx.Units`, of the labels.
+        units: a `formingx.Units`, for the labels.
 
     Returns:
         The `Springback`, which prints a table; its own run is `Springback.path`.
@@ -157,7 +159,7 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
 
 def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed: float,
          units: Units) -> Springback:
-    """Let the body go, and let time go by."""
+    """Release the body, then follow it for the time `cools`; return the `Springback`."""
     stages = [Stage("let go"), *([Stage("cool", duration=cools)] if cools else [])]
     record = Record(problem, Curve(problem, Tolerances()))
     path = Path(record, True)
@@ -173,7 +175,7 @@ def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed
 
 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
-    """(how the part cools, or None; how long)."""
+    """Return the cooling of the part or None, and its duration."""
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
             raise InputError("Path.springback: temperature: the scene has no heat=Cooling(...) that could change it:"
@@ -195,7 +197,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
-    """Return the part alone: held on its planes and lines of symmetry, and against rigid motion."""
+    """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion."""
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
     held = {s.component for s in symmetries}
@@ -211,7 +213,7 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
 
 
 class _Still(PinnedNode):
-    """One displacement component of a node stays as it is; a free body pushes nothing there."""
+    """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it."""
 
     def __init__(self, component: int, point: np.ndarray):
         super().__init__(*point)
@@ -230,8 +232,7 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
 
 
 def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """Return the unknowns of the part, locally owned entries; its histories remember the same as the histories of
-    the whole body."""
+    """Return the unknowns of the part, locally owned entries, and transfer the history variables of the whole body."""
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]

@@ -76,27 +76,27 @@ class ContactState(NamedTuple):
     def _near(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the nearest pair of neighbours, shape (n, 2), and the position between its points, shape (n,)."""
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
-        by = x[:, None] - a
-        share = np.clip(np.einsum("nmi,mi->nm", by, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
-        k = np.linalg.norm(by - share[..., None] * (b - a), axis=2).argmin(1)
+        offset = x[:, None] - a
+        share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
+        k = np.linalg.norm(offset - share[..., None] * (b - a), axis=2).argmin(1)
         return self.pairs[k], share[np.arange(len(x)), k]
 
 
-def take_over(face: FaceContact, states: ContactState, fields: np.ndarray, control: float) -> None:
-    """Give a new face the pressure and friction per present area of the old one.
+def take_over(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
+    """Transfer the pressure and friction per present area of the old face to a new one.
 
     The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.
 
     Args:
         face: the face on the new mesh.
-        worn: contact state on the old mesh.
+        old: contact state on the old mesh.
         fields: locally owned unknowns.
         control: value of the control.
     """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)
-    pressure, friction, touches = states.at(x)
+    pressure, friction, touches = old.at(x)
     share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
     touches &= pressure > 0
     depth = law.depth(np.where(touches, pressure * share, 0.0))
@@ -106,9 +106,10 @@ def take_over(face: FaceContact, states: ContactState, fields: np.ndarray, contr
     law, zero = face.law, np.zeros(len(x))
     slip, arrived = zero, np.zeros(len(x), dtype=bool)
     if law.has_friction:
-        held = law.tractions(x, Touch(x, depth, zero + 1e-9 * theta, x)).tangential
-        slip = np.divide(friction * share * 1e-9 * theta, held, out=zero.copy(), where=touches & (held != 0))
-        most = 2 * states.slip * face.thickness            # no friction without pressure
+        tangential = law.tractions(x, Touch(x, depth, zero + 1e-9 * theta, x)).tangential      # of a slip 1e-9 theta
+        slip = np.divide(friction * share * 1e-9 * theta, tangential, out=zero.copy(),
+                         where=touches & (tangential != 0))
+        most = 2 * old.slip * face.thickness               # no friction without pressure
         slip = np.clip(slip, -most, most)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
     face.put(Memory(Touch(x, distance, slip, x), arrived, np.ones(len(x))))

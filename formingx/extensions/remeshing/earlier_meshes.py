@@ -13,7 +13,7 @@ from ...forms.probes import Probe
 from ...mesh.nodes import of_mesh, of_space
 
 _NEAR = 0.02
-"""Of the size of an element: a point so near to the outline lies on it; edges are not where the old ones were."""
+"""Distance from the outline over the element size below which a point is moved onto it: new edges differ from old."""
 
 _PARTS = 16                # of an edge, to find the nearest of its points
 
@@ -84,13 +84,13 @@ class _Onto:
         s = part[:, None] / _PARTS
         bend = 2 * (a + b - 2 * middle)
         for _ in range(4):                                   # Newton's method for the closest point on the parabola
-            slope, off = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
-            rate = (slope * slope + bend * 2 * off).sum(1, keepdims=True)
-            s = np.clip(s - (slope * off).sum(1, keepdims=True) / rate, 0.0, 1.0)
-        slope, off = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
-        outside = slope[:, 0] * off[:, 1] - slope[:, 1] * off[:, 0] > 0          # the body is to the left
-        put = outside | (np.linalg.norm(off, axis=1) < self._near[edge])
-        return x + np.where(put[:, None], off, 0.0)
+            slope, offset = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+            rate = (slope * slope + bend * 2 * offset).sum(1, keepdims=True)
+            s = np.clip(s - (slope * offset).sum(1, keepdims=True) / rate, 0.0, 1.0)
+        slope, offset = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+        outside = slope[:, 0] * offset[:, 1] - slope[:, 1] * offset[:, 0] > 0    # the body is to the left
+        put = outside | (np.linalg.norm(offset, axis=1) < self._near[edge])
+        return x + np.where(put[:, None], offset, 0.0)
 
 
 def _on(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:

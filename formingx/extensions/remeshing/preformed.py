@@ -98,7 +98,7 @@ class Preformed(NamedTuple):
         return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
-        """F_old on the elements of a formulation (UFL, shape (3, 3)), and det F_old."""
+        """Return F_old on the elements of a formulation (UFL, shape (3, 3)), and det F_old."""
         space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
         field, values = fem.Function(space), self._carried(forms)[0]
         field.x.array.reshape(-1, 6)[space.dofmap.list[: len(values)]] = values
@@ -177,8 +177,8 @@ class Preformed(NamedTuple):
             better = within > least[todo]
             for kept, new in ((least, within), (cells, c), (found, at)):
                 kept[todo[better]] = new[better]
-        by = np.maximum(np.column_stack([1 - found.sum(1), found]), 0)
-        return cells, by[:, 1:] / by.sum(1, keepdims=True)
+        area = np.maximum(np.column_stack([1 - found.sum(1), found]), 0)              # area coordinates
+        return cells, area[:, 1:] / area.sum(1, keepdims=True)
 
 
 def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray:
@@ -201,12 +201,12 @@ def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     their means, shape (cells, 6), as far as needed. The result has shape (cells, 6, 6).
     """
     mean = mean[:, None]
-    by, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
+    deviation, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):
-        rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ by, -1, 0)
+        rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ deviation, -1, 0)
         bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _LEAST) | (hoop < _LEAST * mean[..., 3])
                | (np.hypot(along, turned) < _LEAST)).any(1)
         if not bad.any():
             break
-        by[bad] *= 0.7 if k < 10 else 0.0
-    return mean + by
+        deviation[bad] *= 0.7 if k < 10 else 0.0
+    return mean + deviation

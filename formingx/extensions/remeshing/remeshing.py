@@ -102,7 +102,7 @@ class Remesh:
         _follow(path, self, tolerances, part, done)
 
 
-def _check(origin: str, scene: Any, targets: Sequence[Target]) -> None:
+def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
     why = ""
     if scene.mesh.comm.size > 1:
         why = "several ranks (gmsh makes a mesh on one): run without mpirun"
@@ -125,10 +125,10 @@ def _check(origin: str, scene: Any, targets: Sequence[Target]) -> None:
     elif any(type(contact).law is not Contact.law for contact in scene.contacts):
         why = "a law of contact of one's own"
     if why:
-        raise InputError(f"{origin}: remesh: is not available with {why}")
+        raise InputError(f"{caller}: remesh: is not available with {why}")
     for target in targets:
         if not target.name.endswith(("travel", "pressure", "process_time")):
-            raise InputError(f"{origin}: remesh: target {target}: must be a travel, a pressure or a process_time: other"
+            raise InputError(f"{caller}: remesh: target {target}: must be a travel, a pressure or a process_time: other"
                              f" measures change a little at each remeshing, and may jump over their target")
 
 
@@ -148,11 +148,11 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
     """
     record = path.record
     record.on_state.append(lambda state: _look(record, state, remesh))
-    states = bool(record.states) and _worn(record, record.last, remesh)
+    worn = bool(record.states) and _worn(record, record.last, remesh)
     failed: list[State] = []
-    while not (states and done()):
+    while not (worn and done()):
         record.problem.limit.one_by_one()                    # check the mesh at each gap closure
-        if states:
+        if worn:
             try:
                 _take_up(path, remesh, tolerances)
                 failed = []
@@ -171,8 +171,8 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
                 raise                                        # the mesh is not the cause
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _WORN
-        states = record.ended == _WORN
-        if not states:
+        worn = record.ended == _WORN
+        if not worn:
             return
     record.ended = ""
 
@@ -260,8 +260,8 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         edges = outline.edges()
         of = {name: outline.of(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
-        states = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
-    touched = [(c.contact.on, w.position[w.touches] + by) for c, w, by in states]
+        contacts = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
+    touched = [(c.contact.on, w.position[w.touches] + travel) for c, w, travel in contacts]
     order = outline.around("remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
@@ -271,7 +271,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     corners = _corners(edges, names, touched)
     layer, = scene.mesh.layers
     mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
-                    lambda x, names: _outside(x, names, states))
+                    lambda x, names: _outside(x, names, contacts))
     made = scene_on(mesh, Preformed.of(old, state))
     problem = Problem(made)
     problem.limit.one_by_one()
@@ -282,7 +282,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     if not setting.rate[-1]:
         problem.clock = state.time
     carry(old, state, problem, x, control, moved=True)
-    for new, (_, before, _) in zip(problem.contacts, states, strict=True):
+    for new, (_, before, _) in zip(problem.contacts, contacts, strict=True):
         take_over(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
     x = x if setting.fading else _balanced(problem, curve, x, control)      # else fade the residual, too
@@ -337,15 +337,15 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
     return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
 
 
-def _outside(x: np.ndarray, names: frozenset[str], states: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
+def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
     """Return outline points, shape (n, 2), moved out of tools to the depth of neighbouring contacts.
 
-    Straight edges cut corners of the body.
+    New edges cut corners of the old outline, so points on them may lie in a tool.
     """
-    for contact, before, by in states:
+    for contact, before, travel in contacts:
         if contact.contact.on in names:
-            near = contact.contact.tool.nearest(x - by)
-            x = x - before.moved_in(x - by, near.distance)[:, None] * near.normal
+            near = contact.contact.tool.nearest(x - travel)
+            x = x - before.moved_in(x - travel, near.distance)[:, None] * near.normal
     return x
 
 

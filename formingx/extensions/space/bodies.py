@@ -1,7 +1,7 @@
-"""The bodies of a closed surface of triangles: which triangles hang together, and which bodies may be looked at as one.
+"""The bodies of a closed surface of triangles: connected triangles, and groups of bodies that do not overlap.
 
-Where bodies overlap, each has faces inside the other, to which a distance means nothing: the distance of their union
-is the largest (positive inside), exact outside. So each body that may overlap another is looked at by itself.
+Overlapping bodies have faces inside each other, to which a distance is meaningless. The distance of their union is the
+largest of their distances (positive inside), exact outside. So bodies that may overlap are in different groups.
 """
 
 from __future__ import annotations
@@ -79,5 +79,6 @@ def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edg
     return [order[k:k + 2] for k in range(0, len(order) - 1, 2)]
 
 
-def _overlap(entry: np.ndarray, other: np.ndarray) -> bool:
-    return bool((entry[0] <= other[1]).all() and (other[0] <= entry[1]).all())
+def _overlap(box: np.ndarray, other: np.ndarray) -> bool:
+    """Return True if two boxes, (lowest, highest) coordinates, overlap."""
+    return bool((box[0] <= other[1]).all() and (other[0] <= box[1]).all())

@@ -15,7 +15,7 @@ _LARGER = 4.0              # a file's tool over the sheet: one in another unit o
 
 @register("end")
 def compressed(path: Any) -> Iterator[Finding]:
-    """Return a membrane in compression whose energy is not relaxed there; collective."""
+    """Yield a finding if a membrane is in compression without a relaxed energy; collective."""
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
         return
@@ -30,7 +30,7 @@ def compressed(path: Any) -> Iterator[Finding]:
 
 @register("start")
 def too_large(body: Any) -> Iterator[Finding]:
-    """Return a tool from a file that is many times as wide as the sheet: a file has no unit of length."""
+    """Yield findings on tools from files that are many times as wide as the sheet: a file has no unit of length."""
     scene = body.scene
     for contact in scene.contacts:
         if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.direction is None:

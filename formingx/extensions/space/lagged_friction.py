@@ -77,11 +77,11 @@ class LaggedFriction(LaggedStick):
         return super().start(x)._replace(slip=np.zeros_like(x))
 
     def pressure(self, touch: Touch) -> np.ndarray:
-        """Return N at the state that a `Touch` is of, shape (n,), stress."""
+        """Return the pressure N at the state of a `Touch`, shape (n,), stress."""
         return np.asarray(self.k * np.maximum(touch.distance, 0.0))
 
     def pressure_ahead(self, old: Touch) -> np.ndarray:
-        """Return N that limits the friction in the step ahead, shape (n,), stress."""
+        """Return the pressure N_0 that limits friction in the step ahead, shape (n,), stress."""
         if self._ahead is None or self._ahead[0] is not old:
             now, by = np.maximum(old.distance, 0.0), old.arrival - old.position
             depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, by) if by.any() else now
@@ -89,16 +89,16 @@ class LaggedFriction(LaggedStick):
         return self._ahead[1]
 
     def at_pressure(self, old: Touch, pressure: np.ndarray) -> np.ndarray:
-        """Return places, shape (n, 3), from which `pressure_ahead` has some values, shape (n,), stress."""
+        """Return `Touch.arrival`, shape (n, 3), for which `pressure_ahead` returns a pressure, shape (n,), stress."""
         by = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + by[:, None] * self.tool.near(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`; linearised where points are expected.
+        """See `ContactLaw`; linearised at the predicted positions.
 
-        What turns back, by the `sense` of the iteration before, sticks for one iteration: else Newton's method would
-        send it to and fro over the narrow range of elastic slip.
+        A point that turns back against the `sense` of the last iteration sticks for one iteration: else Newton's method
+        would oscillate over the narrow range of elastic slip.
         """
         assert old is not None
         at, zero = x if expected is None else expected.position, np.zeros(len(x))
@@ -142,7 +142,7 @@ class LaggedFriction(LaggedStick):
         return found
 
     def near(self, x: np.ndarray, old: Touch) -> tuple[np.ndarray, Near]:
-        """Return which points touch, their numbers, shape (m,), and where they stand to the tool."""
+        """Return the numbers of the points that touch, shape (m,), and their geometry relative to the tool."""
         rows = np.flatnonzero(self.held(old))
         return rows, self._near(x[rows])
 
@@ -157,14 +157,14 @@ class LaggedFriction(LaggedStick):
         return self.tractions(x, old).stiffness
 
     def _near(self, x: np.ndarray) -> Near:
-        """Return the tool at points, kept for the same points."""
+        """Return the geometry of points relative to the tool; the last result is kept."""
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.tool.near(x)
         return self._last[1]
 
 
 class _Tractions(Tractions):
-    """`Tractions` whose `sense` is the angle of sliding in the tangent plane, 0 of what does not slide."""
+    """`Tractions` whose `sense` is the angle of sliding in the tangent plane, 0 at points that do not slide."""
 
     @property
     def status(self) -> np.ndarray:
@@ -173,7 +173,7 @@ class _Tractions(Tractions):
 
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors across unit vectors, shape (n, 3), from which angles of sliding count."""
+    """Return two unit vectors normal to unit vectors, shape (n, 3) each: the basis of the angles of sliding."""
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

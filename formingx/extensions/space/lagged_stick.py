@@ -1,5 +1,4 @@
-"""Contact in three dimensions, lagged by a step: points in contact are held where it crossed the tool, from the next
-step on.
+"""Contact in three dimensions, lagged by a step: a point that crossed a tool sticks there from the next step on.
 
 A point whose straight way between two accepted states leads into the tool is held by an isotropic penalty, in the
 steps after, at the place where that way crossed the surface (as the user's guide of Polyflow describes of its contact).
@@ -7,10 +6,10 @@ Within a step nothing changes: the law is linear, and Newton's method meets no k
 asks the tool. The price is an error of first order in how far points move in the step in which they arrive: with 1 % of
 the points to a step, walls are within 0.1 % of those of exact stick. The tool must give its signed distance alone.
 
-Constrained unknowns stay so until a stage leaves the tool out. With `separates=True` points that pull at it are
-released of at the end of each step, until none does, the control standing still; a body that snaps off reaches
-equilibrium by a jump. That is proven of elastic sheets. Of relaxing ones it is refused: slack under the plug, points
-separate and touch again at each step, and the run reaches a stop.
+Points in contact stick until a stage leaves the tool out. With `separates=True`, points in tension separate at the end
+of each step, at constant control, until none is left; a body that snaps off reaches equilibrium by a jump. Tests prove
+this for elastic sheets. Relaxing sheets are refused: slack under the plug, their points separate and touch again in
+each step, and the run makes no progress.
 """
 
 from __future__ import annotations
@@ -26,23 +25,24 @@ from ...tools.tool import RigidTool
 _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
 
 _PULLS = 0.01
-"""Part, out of the tool, of the way by which the penalty deforms, from which on a point pulls (sheared along a facet
-it goes out round its edges)."""
+"""Distance outside the tool, over the distance from the sticking position, above which a point is in tension.
+(A point that is sheared along a facet leaves the tool at its edges.)"""
 
 SMALL_GAP = 1e-3
-"""Such a way over theta that is negligible."""
+"""Distance outside the tool, over theta, that is negligible."""
 
 
 class LaggedStick:
     """The `ContactLaw` of this module.
 
-    Of a point that is held `Touch.position` is where, and `distance` is 0; of one that is free they are its position at
-    the last accepted state and its distance, below -theta.
+    For a sticking point, `Touch.position` is the sticking position, and `distance` is 0. For a free point they are its
+    position at the last accepted state and its distance, below -theta.
 
     Args:
-        tool: with its signed distance.
-        k: penalty, stress/length; theta: distance from which on a point counts as touching, length.
-        separates: points separate that pull, see `pulling`.
+        tool: tool with a signed distance.
+        k: penalty, stress/length.
+        theta: distance from which on a point counts as touching, length.
+        separates: True if points in tension separate, see `pulling`.
     """
 
     has_friction = False
@@ -70,8 +70,7 @@ class LaggedStick:
         return old.distance > -self.theta
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Return a mask of sticking points in tension on a separating tool, shape (n,): they are outside, by the
-        penalty."""
+        """Return a mask of sticking points in tension if they may separate, shape (n,): they are outside the tool."""
         away = np.linalg.norm(x - old.position, axis=1)
         most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
         return self.separates & self.held(old) & (-self.distance(x) > most)
@@ -90,14 +89,14 @@ class LaggedStick:
         return found
 
     def start(self, x: np.ndarray) -> Touch:
-        """Let the points that touch at the start stick from the start."""
+        """See `ContactLaw`; the points that touch at the start stick from the start."""
         d = self.distance(x)
         held = d > -self.theta
         return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`; `normal` says 1 of the constraints: normals are not asked for."""
+        """See `ContactLaw`; `normal` is 1 at sticking points, as no normals are computed."""
         assert old is not None
         held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
         force[held] = self.k * (x[held] - old.position[held])
@@ -127,7 +126,7 @@ class LaggedStick:
         return np.zeros(len(d)), np.zeros(len(d))
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """See `ContactLaw`; nothing is held by penetration."""
+        """See `ContactLaw`; no energy is stored by penetration."""
         return np.zeros(len(x))
 
     def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:

@@ -22,12 +22,16 @@ class PartInSpace(PartNumbers):
 
     Attributes:
         volume: length^3.
-        area: of the surface, length^2.
-        draw_ratio: area over that in the reference configuration; mean_wall: volume/area.
-        min_wall: length; min_wall_at: (x, y, z) where; min_wall_reference: (x, y) where it was on the flat sheet.
-        uniformity: minimum over mean wall; variation: standard deviation of the wall over the surface, over its mean.
-        weight: grams if a density in g/cm3 was given; else None. scrap: volume beyond the trim over the volume of
-            the sheet.
+        area: deformed area of the surface, length^2.
+        draw_ratio: deformed over reference area.
+        mean_wall: volume/area, length.
+        min_wall: minimum of the wall, length.
+        min_wall_at: (x, y, z) of this minimum, length.
+        min_wall_reference: its (X, Y) on the flat sheet, length.
+        uniformity: minimum over mean wall.
+        variation: standard deviation of the wall over the surface, over its mean.
+        weight: grams if a density in g/cm3 was given; else None.
+        scrap: volume beyond the trim over the volume of the sheet.
         wrinkled: share of the area in the reference configuration that is in compression.
         basis: what volume, area and weight are given for, as text; "" of a part that was modelled as a whole.
         units: of the labels.
@@ -50,7 +54,7 @@ class PartInSpace(PartNumbers):
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """(what, its value with its unit), for people."""
+        """Rows of a table: (name, value with its unit)."""
         at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.min_wall_at, self.min_wall_reference))
         return self._rows(f"(x, y, z) = ({at}), from (X, Y) = ({rest})", []) + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
@@ -86,7 +90,7 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
 
 
 def _beyond(d: np.ndarray) -> np.ndarray:
-    """Part of triangles' areas where what is d at their corners, shape (m, 3), and linear between, is above 0."""
+    """Return the part of each triangle's area, shape (m,), where a linear field, d at its corners, (m, 3), is > 0."""
     alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
     a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,9 +100,15 @@ def _beyond(d: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, repr=False)
 class FillingInSpace(Sheet):
-    """Filling of a tool, state by state: touching: share of the sheet's area in the reference configuration
-    that is held or nearer to the tool than a tenth of its thickness; gap: the largest distance from it, length;
-    control, states: of the run."""
+    """Filling of a tool in each of n states.
+
+    Attributes:
+        control: name and values of the first column of the run, shape (n,).
+        touching: share of the reference area of the sheet in contact, or nearer to the tool than a tenth of its
+            thickness, shape (n,).
+        gap: largest distance of the sheet from the tool, shape (n,), length.
+        comm: communicator of the run.
+    """
 
     control: tuple[str, np.ndarray]
     touching: np.ndarray

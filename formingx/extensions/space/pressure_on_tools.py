@@ -3,8 +3,8 @@
 The triangles of a sheet are chords of a fillet. Pressure normal to a chord of length l has a tangential part at its
 ends where chords of different lengths meet: on a fillet of radius R it adds p l^2/(4 R) to the tension, an error of
 second order that may exceed the tension itself. The surface that the chords stand for is the tool, which is known. So
-of the force f of the pressure on a node that touches, (n . f) n acts, n being the normal of the tool there. A node
-reaches that as the tool presses on it, so that its forces do not jump where it touches.
+of the force f of the pressure on a node that touches, (n . f) n acts, n being the normal of the tool there. The
+tangential part fades as the contact pressure grows, so that the force does not jump when a node touches.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-_FULL = 1 / 3              # pressure of the tool over that on the sheet, from which on all of it acts so
+_FULL = 1 / 3              # contact over applied pressure from which on all of this acts along the tool's normal
 
 
 class PressureOnTools:
@@ -44,7 +44,7 @@ class PressureOnTools:
             metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
 
     def refresh(self) -> None:
-        """Take the tools' normals at the present displacement; collective."""
+        """Update the points in contact and the tools' normals to the present displacement; collective."""
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
         functions = (self._touches, self._normal, *self._hessian)

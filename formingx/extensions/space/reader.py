@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path as FilePath
 from typing import Any
 
+from ...contact.face import FaceContact
 from ...errors import InputError
-from ...physics.contact import Contact
 from ...results.extend import method_of
 from ...results.path import Path
 from ...solve.state import State
@@ -35,7 +35,7 @@ class SheetReader:
         """Return the whole part of a state in numbers."""
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
-    def filling(self, contact: Contact) -> FillingInSpace:
+    def filling(self, contact: FaceContact) -> FillingInSpace:
         """Return the gaps between the sheet and a tool."""
         return parts.filling(self._path, contact)
 

@@ -14,7 +14,7 @@ from .sheet import Sheet
 from .solid_tool import Swept
 
 _LARGER = 9.0
-"""Sheet over tool, or tool over sheet, that looks like another unit of length. (The sheet may be a quarter.)"""
+"""Ratio of the sizes of sheet and tool that indicates another unit of length. (The sheet may be a quarter.)"""
 
 
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
@@ -64,7 +64,7 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """Raise an InputError for what is not proven in three dimensions."""
+    """Raise an InputError for combinations that are not proven in three dimensions."""
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
                          f" available yet")

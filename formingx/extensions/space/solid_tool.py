@@ -20,7 +20,7 @@ from .bodies import apart
 from .lagged_friction import LaggedFriction, Near
 from .lagged_stick import LaggedStick
 
-_ON_AXIS = 1e-9             # distances from the axis, over the size of a profile, that are none
+_ON_AXIS = 1e-9             # distance from the axis, over the size of a profile, that counts as 0
 _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
@@ -111,7 +111,7 @@ class Swept(SolidTool):
         return self.profile.signed_distance(np.column_stack([self._across(x)[0], x[:, 2]]))
 
     def _across(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """r of points, its gradient, shape (n, 3), and the curvature of the line of one r, shape (n,)."""
+        """Return r of points, its gradient, shape (n, 3), and the curvature of the curve of constant r, shape (n,)."""
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
             axis = "yx".index(self.along)
@@ -183,8 +183,10 @@ class Triangulated(SolidTool):
     """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
 
     Attributes:
-        name: of its file; triangles: how many; volume: of its bodies, length^3 (what two share counts twice); middle:
-            the mean of its points.
+        name: name of its file.
+        triangles: number of triangles.
+        volume: volume of its bodies, length^3 (a volume that two bodies share counts twice).
+        middle: mean of its points, shape (3,), length.
     """
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
@@ -317,7 +319,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points that are the same as one, without triangles that are then none."""
+    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate."""
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
     triangles = same.ravel()[triangles]

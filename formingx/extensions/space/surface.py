@@ -28,7 +28,7 @@ from ...physics.loads import Pressure
 from .pressure_on_tools import PressureOnTools
 
 _REGULAR = 1e-7
-"""That stiffness, over the shear modulus."""
+"""Stiffness of the gradient of the displacement, over the shear modulus."""
 
 
 class Surface(Formulation):
@@ -83,11 +83,11 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return a surface cannot be inside out: J > 0."""
+        """Return a check that always holds, as a surface cannot be inside out: J > 0."""
         return _Always()
 
     def set_stiff(self) -> None:
-        """Apply a small stretch in all directions."""
+        """Set the displacement to a small stretch in all directions."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
@@ -163,6 +163,5 @@ def relaxed(F: Any) -> Any:
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return a mask of compression for a membrane of principal stretches, the larger first, shape (n, 2), shape
-    (n,)."""
+    """Return a mask of compression, shape (n,), of a membrane with principal stretches, the larger first, (n, 2)."""
     return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)

@@ -22,8 +22,8 @@ class WallInSpace(Sheet):
     """The wall of m triangles in one state; all ranks hold all of it.
 
     Attributes:
-        rest, now: of the n nodes, shape (n, 3), length; triangles: nodes of each, shape (m, 3), seen from +z in the
-            reference configuration counter-clockwise.
+        rest, now: reference and deformed positions of the n nodes, shape (n, 3), length.
+        triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
         layers: {name: thickness in the reference configuration, in the middle of each triangle, shape (m,)}.
         comm: of the run.
     """
@@ -51,8 +51,7 @@ class WallInSpace(Sheet):
 
     @property
     def ratio(self) -> np.ndarray:
-        """The wall over the thickness in the reference configuration: rest area over area, as the volume is kept,
-        shape (m,)."""
+        """Deformed over reference thickness, shape (m,): reference over deformed area, as the volume is constant."""
         return self.area_at_rest / self.area
 
     @property
@@ -67,7 +66,7 @@ class WallInSpace(Sheet):
 
     @cached_property
     def stretches(self) -> np.ndarray:
-        """Principal, in the surface, the larger first, shape (m, 2)."""
+        """Principal stretches in the surface, the larger first, shape (m, 2)."""
         a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
         inverse = np.linalg.inv(a[..., :COORDINATES])  # the sheet is flat in the reference configuration
         F = np.einsum("mij,mjk->mki", inverse, b)

@@ -39,10 +39,10 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
         raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
                          " plane: no mesh of the section can have it; give a mode of n = 0")
     grid = gathered(mesh)
-    keys, near = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
+    of_mode, of_mesh = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
         mode.points, grid.points))
-    there = {tuple(key): k for k, key in enumerate(keys.tolist())}
-    found = [there.get(tuple(key), -1) for key in near.tolist()]
+    numbers = {tuple(key): k for k, key in enumerate(of_mode.tolist())}
+    found = [numbers.get(tuple(key), -1) for key in of_mesh.tolist()]
     if min(found) < 0:
         R, Z = grid.points[int(np.argmin(found))]
         raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")

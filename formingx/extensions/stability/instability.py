@@ -233,7 +233,7 @@ class Watch:
         return [self._loss(segment, entry, fold) for entry, fold in zip(found, folds, strict=True)]
 
     def _is_fold(self, segment: Any, found: Located) -> bool:
-        """Return True if the mode is the tangent at a limit point: the controlled load does work on it."""
+        """Return True if the mode is nearly parallel to the tangent of the path, as at a limit point."""
         x, direction = found.x, found.left.direction
         problem = segment.problem
         a, b, c = problem.x.duplicate(), problem.x.duplicate(), problem.x.duplicate()
@@ -347,7 +347,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 
 def _chosen(path: Any, states: Any) -> list[State]:
     """Return the states to examine: evenly spaced ones with both ends of the path, or the given ones."""
-    there = [s for s in path.states if s.kind != "limit point"]
+    regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
         if any(all(s is not entry for entry in path.states) for s in given):
@@ -356,9 +356,9 @@ def _chosen(path: Any, states: Any) -> list[State]:
             raise InputError("stability: states: must be at least one")
         return sorted(given, key=path.states.index)
     everything = isinstance(states, str) and states == "all"
-    number = len(there) if everything else min(count("stability: states", states), len(there))
-    picked = np.unique(np.round(np.linspace(0, len(there) - 1, max(number, 2))).astype(int)) if there else []
-    return [there[k] for k in picked]
+    number = len(regular) if everything else min(count("stability: states", states), len(regular))
+    picked = np.unique(np.round(np.linspace(0, len(regular) - 1, max(number, 2))).astype(int)) if regular else []
+    return [regular[k] for k in picked]
 
 
 def _most_waves(scene: Any) -> float:

@@ -99,8 +99,8 @@ class SecondVariation:
         self._held = self._find_held(number, flipped)
         own = self._held[self._held < self._own]
         off, rows = problem.setting.off, []
-        for part_item, row, u in self._means:
-            rows.append((row - m * u) * (part_item not in off))
+        for number_of_item, row, u in self._means:
+            rows.append((row - m * u) * (number_of_item not in off))
             rows[-1][own] = 0
         self._matrix.hold([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
         self._rows = rows
@@ -134,7 +134,7 @@ class SecondVariation:
         return found
 
     def _find_rigid(self) -> list[np.ndarray]:
-        """Find the unconstrained rigid motions of the body."""
+        """Return the unconstrained rigid motions of the body, normalised, locally owned entries."""
         kinematics, own = self.problem.scene.kinematics, self._held[self._held < self._own]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
@@ -207,7 +207,7 @@ class SecondVariation:
         return form
 
     def _number_unknowns(self) -> None:
-        """Find the nodes, their unknowns, and the corresponding unknowns of the problem."""
+        """Set the nodes, their unknowns, and the corresponding unknowns of the problem."""
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
@@ -264,11 +264,11 @@ class SecondVariation:
         Constraints in r and in z also act round the axis: a clamped rim, a node, a face with a prescribed displacement.
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
-        for i, part_item in enumerate(problem.scene.items):
-            items = [] if i in problem.setting.off else self._forms.constraints(part_item)
+        for i, scene_item in enumerate(problem.scene.items):
+            items = [] if i in problem.setting.off else self._forms.constraints(scene_item)
             for item in items:
                 if isinstance(item, Held):
-                    if isinstance(part_item, Symmetry) and part_item.mirror and part_item.on == flipped:
+                    if isinstance(scene_item, Symmetry) and scene_item.mirror and scene_item.on == flipped:
                         held += [self._dofs(c, item) for c in (1 - item.component, 2)]
                     else:
                         held.append(self._dofs(item.component, item))
@@ -292,8 +292,8 @@ class SecondVariation:
         """Return (item number, row of a mean constraint, correction for m) of each mean and of the mean of V."""
         forms, problem = self._forms, self.problem
         n = problem.n_owned
-        for number, part_item in enumerate(problem.scene.items):
-            means = {item.component: item for item in forms.constraints(part_item) if not isinstance(item, Held)}
+        for number, scene_item in enumerate(problem.scene.items):
+            means = {item.component: item for item in forms.constraints(scene_item) if not isinstance(item, Held)}
             for item in means.values():
                 row = np.zeros(self._own)
                 row[self._to_mode[:n]] = problem.assemble(forms.compile(forms.mean_row(item)))

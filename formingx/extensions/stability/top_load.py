@@ -92,9 +92,9 @@ class TopLoad:
         """Work up to the first buckling or to the largest force, length force."""
         first = self.first
         end = self.at_travel if first is None else -first.control
-        there = int(np.argmax(self.travel >= end * (1 - 1e-12)))
-        x, F = self.travel[: there + 1].copy(), self.force[: there + 1].copy()
-        if there and x[-1] > end:
+        last = int(np.argmax(self.travel >= end * (1 - 1e-12)))
+        x, F = self.travel[: last + 1].copy(), self.force[: last + 1].copy()
+        if last and x[-1] > end:
             x[-1], F[-1] = end, F[-2] + (end - x[-2]) / (x[-1] - x[-2]) * (F[-1] - F[-2])
         return float(np.trapezoid(F, x))
 

@@ -164,11 +164,11 @@ class Study(Sheet):
         self._known(measure)
         values = np.array([run.measures[measure] for run in self.good])
         levels = {name: sorted({run.values[name] for run in self.good}) for name in self.variables}
-        there = {name: np.array([[run.values[name] == level for level in of] for run in self.good], dtype=float)
+        masks = {name: np.array([[run.values[name] == level for level in of] for run in self.good], dtype=float)
                  for name, of in levels.items()}
-        parts = np.split(np.linalg.lstsq(np.hstack(list(there.values())), values)[0],
+        parts = np.split(np.linalg.lstsq(np.hstack(list(masks.values())), values)[0],
                          np.cumsum([len(of) for of in levels.values()])[:-1])
-        usual = [float(column.mean(0) @ part) for column, part in zip(there.values(), parts)]
+        usual = [float(mask.mean(0) @ part) for mask, part in zip(masks.values(), parts)]
         return {name: {level: float(value + sum(usual) - own) for level, value in zip(of, part)}
                 for (name, of), part, own in zip(levels.items(), parts, usual)}
 
@@ -263,7 +263,7 @@ class Study(Sheet):
     def _keep(self, run: StudyRun) -> None:
         """Add a run, and write it to the folder."""
         if self._folder is not None:
-            # numbered last; the values keep the names of simultaneous files apart
+            # the number is one above the largest; the checksum tells files of one number by two processes apart
             last = max((int(file.name[4:9]) for file in _files(self._folder)), default=-1)
             values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())
             file = self._folder / f"run-{last + 1:05d}-{values:08x}.json"
@@ -340,7 +340,7 @@ def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
 
 
 def _pool(executor: futures.Executor | None, workers: int) -> Any:
-    """Yield the user's executor, which stays open, or a pool of processes, which is closed after the block."""
+    """Return a context of the user's executor, which stays open, or of processes, which end with the block."""
     if executor:
         return nullcontext(executor)
     from multiprocessing import get_context  # costs time, which others do not spend
@@ -393,9 +393,9 @@ def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
              "measures": list(task.measure)}
     file = folder / "study.json"
     if file.exists():
-        there = _read(file)
-        if there != about:
-            raise InputError(f"study: folder {str(folder)!r} holds another study: {there}; here: {about}")
+        stored = _read(file)
+        if stored != about:
+            raise InputError(f"study: folder {str(folder)!r} holds another study: {stored}; here: {about}")
     elif folder.exists() and any(folder.iterdir()):
         raise InputError(f"study: folder {str(folder)!r} is there already and holds no study")
     else:
