@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
             _demo(words[1:])
         else:
             options = _parser().parse_args(words)
-            {"compare": _compare, "check": _doctor, "open": _open, "report": _report, "status": _status,
+            {"compare": _compare, "check": _check, "open": _open, "report": _report, "status": _status,
              "watch": _watch, None: lambda _: _say(_overview())}[options.command](options)
     except BrokenPipeError:                                 # a reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 def _overview() -> str:
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
-             "  check SCRIPT              look over the scene of a script before it runs",
+             "  check SCRIPT               look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
              "  open FOLDER                show what is in a checkpoint",
              "  status, watch FOLDER       show how far a run with a checkpoint has come, once or again and again",
@@ -134,7 +134,7 @@ def _demo(words: list[str]) -> None:
         sys.argv, sys.path[:] = before
 
 
-def _doctor(options: argparse.Namespace) -> None:
+def _check(options: argparse.Namespace) -> None:
     from .checks.scripts import look_over
     _say(str(look_over(options.script, options.arguments)))
 

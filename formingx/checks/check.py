@@ -1,9 +1,9 @@
-"""Looks a scene over before it is run: its findings come from the scene, and a good scene gives nothing."""
+"""Check of a scene before a run, or of a run; a good scene has no findings."""
 
 from collections.abc import Sequence
 
 from ..errors import instance, several
-from ..findings import Finding, found_at, worst_first
+from ..findings import Finding, alarming, found_at, worst_first
 from ..measures.targets import Target
 from ..results.path import Path
 from ..scene.scene import Scene
@@ -49,10 +49,11 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     `InputError` of `Scene` already; "serious" here is a target that `trace` refuses.
 
     Args:
-        targets: the targets of the run, to be looked over too.
-        stages: of the process that it will be: their targets and tables.
-        units: for the numbers in the findings.
-        scene: or the `Path` of a run: its `findings` come first, and where another path branches off.
+        scene: the scene, or the `Path` of a run. The findings of a run, without notes, and its branch points are
+            added to the findings on its scene.
+        targets: targets of the run, which are checked, too.
+        stages: stages of the process, whose targets and tables are checked, too.
+        units: units of the numbers in the findings.
 
     Raises:
         InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
@@ -64,7 +65,7 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
         branches = [Finding("warning", "branch point", ANOTHER_PATH % (scene.describe(left), scene.describe(right)))
                     for left, right in scene.branch_points]
         before = check(scene.problem.scene, targets=targets, stages=stages, units=units).findings
-        return Report([*(found for found in scene.findings() if found.severity != "note"), *branches, *before])
+        return Report([*alarming(scene.findings()), *branches, *before])
     instance("check: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
     instance("check: units", units, Units, "a formingx.Units")
     targets = several("check: targets", targets, "targets, such as [pole_stretch(3)]")

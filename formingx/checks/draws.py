@@ -21,8 +21,10 @@ def draws(body: Any) -> Iterator[tuple[str, float]]:
 
 
 def _of_cap(target: Any, radius: float) -> float | None:
-    """Stretch at the pole of a flat disc that is blown to a cap of height h radii, about 1 + h^2: what a thin disc has
-    whose points go at right angles to the caps that they pass through."""
+    """Return the stretch at the pole of a flat disc that is blown to a cap of height h radii, about 1 + h^2, or None.
+
+    A thin disc has it if its points move at right angles to the caps that they pass through.
+    """
     if target.name == "pole_stretch":
         return float(target.value)
     height = abs(target.value) / radius
@@ -36,5 +38,5 @@ def _of_cap(target: Any, radius: float) -> float | None:
 
 
 def _area(line: np.ndarray) -> float:
-    """Return the area that a line, shape (n, 2), sweeps about the axis."""
+    """Return 1/pi times the area that a line, shape (n, 2), sweeps about the axis, length^2."""
     return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

@@ -9,7 +9,7 @@ from ..results.evaluate import edges, resticking, snaps, tension, volume
 
 @register("end")
 def inadmissible(path: Any) -> Iterator[Finding]:
-    """Return the first state that a body cannot have (`State.verdict`)."""
+    """Inadmissible states, from the first one on (`State.verdict`)."""
     bad = next((state for state in path.states if state.verdict), None)
     if bad is not None:
         yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used: {bad.verdict}")

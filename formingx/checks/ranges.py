@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -37,7 +36,7 @@ def moduli(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def friction(body: Body) -> Iterator[Finding]:
-    """Coefficients of friction between rubber on steel and sticking."""
+    """Coefficients of friction above the largest of rubber on steel."""
     for contact in body.scene.contacts:
         if contact.sticks:
             continue
@@ -68,21 +67,13 @@ def weight(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def pressures(body: Body) -> Iterator[Finding]:
-    """Pressures all of which push the body away from every mould before it."""
-    acting = [entry for entry in _driven(body) if entry[1]]
+    """Pressures that all push the body away from every mould in front of it."""
+    acting = [pressure for pressure in body.pressures() if pressure.item is not None and pressure.value]
     found = moulds(body.scene) if acting else []
-    towards = [np.sign(value) * sign_towards(contact, load) for load, value, _ in acting for contact in found]
+    towards = [np.sign(value) * sign_towards(contact, load) for load, _, value, _ in acting for contact in found]
     if max(towards, default=0.0) < 0:
-        load, value, text = acting[0]
+        load, _, value, text = acting[0]
         yield Finding("warning", text,
                       f"it pushes the body away from the mould {found[0].name or found[0].on!r}: {load!r} acts"
                       f" {'on the face of that mould' if value > 0 else 'as suction on the other face'}. Give the"
                       f" pressure to the other face, or turn its sign")
-
-
-def _driven(body: Body) -> list[tuple[Any, float, str]]:
-    """(load, value, words) of all pressures that act or are aimed at, whose load is known."""
-    fixed = [(load, load.value, repr(load)) for load in body.scene.loads
-             if load.quantity == "pressure" and not load.driven]
-    return [*fixed, *((aim.thing, aim.value, aim.text) for aim in body.aims
-                      if aim.quantity == "pressure" and aim.thing is not None)]

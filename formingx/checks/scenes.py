@@ -20,64 +20,63 @@ _PENETRATION = 0.01        # of the thickness
 
 
 @register("scene")
-def _driven(sheet: Body) -> Iterator[Finding]:
-    if not sheet.scene.drivable:
+def _driven(body: Body) -> Iterator[Finding]:
+    if not body.scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process of stages that wait can run; give one"
                                           " load no value, as Pressure('bottom'), or add a"
                                           " PrescribedDisplacement support")
 
 
 @register("scene")
-def _edges(sheet: Body) -> Iterator[Finding]:
+def _edges(body: Body) -> Iterator[Finding]:
     """Edges of a sheet in three dimensions that nothing holds: a flat membrane has no stiffness across them."""
-    if sheet.scene.kinematics.components == 3:
-        held = {support.on for support in sheet.scene.supports}
-        for name in sorted({*sheet.scene.mesh.boundaries} - {"bottom", "top"} - held):
+    if body.scene.kinematics.components == 3:
+        held = {support.on for support in body.scene.supports}
+        for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - held):
             yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
                           f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 
 
 @register("scene")
-def _elements(sheet: Body) -> Iterator[Finding]:
-    if not sheet.scene.model.solid:
+def _elements(body: Body) -> Iterator[Finding]:
+    if not body.scene.model.solid:
         return
-    worst = int(np.argmax(sheet.slenderness))
-    if sheet.slenderness[worst] > _FLATTEST:
-        yield Finding("warning", "mesh", f"an element at {sheet.place(worst)} is {sheet.slenderness[worst]:.3g} times"
+    worst = int(np.argmax(body.slenderness))
+    if body.slenderness[worst] > _FLATTEST:
+        yield Finding("warning", "mesh", f"an element at {body.place(worst)} is {body.slenderness[worst]:.3g} times"
                                          f" longer than high (up to 100 was tried): use more elements along the sheet,"
                                          f" or Membrane() for one so thin")
 
 
 @register("scene")
-def _locking(sheet: Body) -> Iterator[Finding]:
-    found = sheet.scene.model.locking(sheet.scene.mesh)
+def _locking(body: Body) -> Iterator[Finding]:
+    found = body.scene.model.locking(body.scene.mesh)
     if found is not None:
         yield Finding("warning", "mesh", str(found))
 
 
 @register("scene")
-def _layers(sheet: Body) -> Iterator[Finding]:
+def _layers(body: Body) -> Iterator[Finding]:
     """Warn of one element through a thick layer, which cannot show how the strain varies.
 
     Nor can long elements how a soft one is sheared at a rim: hinged, 1000 times softer, it jumped by 66 % with elements
     of 2.5 thicknesses, by 30 % (at the corner, which is singular) with shorter ones, for any number through it.
     """
-    if not sheet.scene.model.solid:
+    if not body.scene.model.solid:
         return
-    scene = sheet.scene
-    bends = scene.contacts or not any(isinstance(s,
-                                                 Symmetry | PrescribedDisplacement)
-                                                 and s.component == 1 for s in scene.supports)
+    scene = body.scene
+    bends = scene.contacts or not any(isinstance(s, Symmetry | PrescribedDisplacement) and s.component == 1
+                                      for s in scene.supports)
     for name in scene.mesh.layers if bends else ():          # between planes that it slides on a slice stays straight
-        mine = sheet.layer == name
-        depth = sheet.area[mine].sum() / sheet.length
-        span = np.ptp(sheet.corners[mine][:, :, 1], axis=1).max(initial=0.0)
-        if depth > 0.2 * sheet.length and span > 0.99 * np.ptp(sheet.corners[mine][:, :, 1]):
-            yield Finding("warning", f"layer {name!r}", f"it is {depth / sheet.length:.3g} of the body's length thick,"
+        mine = body.layer == name
+        depth = body.area[mine].sum() / body.length
+        span = np.ptp(body.corners[mine][:, :, 1], axis=1).max(initial=0.0)
+        if depth > 0.2 * body.length and span > 0.99 * np.ptp(body.corners[mine][:, :, 1]):
+            yield Finding("warning", f"layer {name!r}", f"it is {depth / body.length:.3g} of the body's length thick,"
                                                         f" with one element through it: use two or more")
-    hard, soft = (pick(sheet.moduli, key=sheet.moduli.__getitem__) for pick in (max, min))
-    ratio = sheet.moduli[hard] / sheet.moduli[soft]
-    depth, edge = sheet.area[sheet.layer == soft].sum() / sheet.length, sheet.edge[sheet.layer == soft].min()
+    hard, soft = (pick(body.moduli, key=body.moduli.__getitem__) for pick in (max, min))
+    ratio = body.moduli[hard] / body.moduli[soft]
+    depth, edge = body.area[body.layer == soft].sum() / body.length, body.edge[body.layer == soft].min()
     if 100 < ratio <= 1e5 and edge > _LONGEST * depth:
         yield Finding("warning", f"layer {soft!r}",
                       f"it is {ratio:.3g} times softer than {hard!r} and {depth:.3g} thick, its elements {edge:.3g}"
@@ -85,20 +84,20 @@ def _layers(sheet: Body) -> Iterator[Finding]:
                       f" stretch jumps by up to 70 % from one to the next; use elements no longer than it is thick, at"
                       f" least near the rim (concentrate)")
     if ratio > 1e5:
-        yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {sheet.moduli[hard]:.4g}) is {ratio:.2g}"
-                                              f" times stiffer than {soft!r} ({sheet.moduli[soft]:.4g}): are the units"
+        yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {body.moduli[hard]:.4g}) is {ratio:.2g}"
+                                              f" times stiffer than {soft!r} ({body.moduli[soft]:.4g}): are the units"
                                               f" of stress the same (Pa and MPa)?")
 
 
 @register("scene")
-def _fillets(sheet: Body) -> Iterator[Finding]:
+def _fillets(body: Body) -> Iterator[Finding]:
     """Warn of rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
-    for contact in sheet.scene.contacts:
+    for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
-        nodes = sheet.scene.mesh.nodes_of(contact.on)
-        facets = sheet.scene.mesh.facets_of(contact.on)
-        total = sheet.scene.mesh.comm.allreduce(_own(sheet.scene, facets), MPI.SUM)
+        nodes = body.scene.mesh.nodes_of(contact.on)
+        facets = body.scene.mesh.facets_of(contact.on)
+        total = body.scene.mesh.comm.allreduce(_own(body.scene, facets), MPI.SUM)
         edge = np.hypot(*np.ptp(nodes, axis=0)) / max(total, 1)
         arcs = [p for p in contact.tool.pieces if isinstance(p, Arc) and p.radius > 0]
         if not arcs:
@@ -119,13 +118,13 @@ def _own(scene: Scene, facets: np.ndarray) -> int:
 
 
 @register("scene")
-def _contact_penalties(sheet: Body) -> Iterator[Finding]:
+def _contact_penalties(body: Body) -> Iterator[Finding]:
     """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
-    stress = max(sheet.moduli.values())
-    pressed = sheet.scene.driven is not None and sheet.scene.driven.quantity == "pressure"
-    presses = [abs(t.value) for t in sheet.targets if t.name.endswith("pressure")] if pressed else []
-    for contact in sheet.scene.contacts:
-        traction = max([stress * sheet.thickness / sheet.length, *presses])
+    stress = max(body.moduli.values())
+    pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"
+    presses = [abs(t.value) for t in body.targets if t.name.endswith("pressure")] if pressed else []
+    for contact in body.scene.contacts:
+        traction = max([stress * body.thickness / body.length, *presses])
         depth = traction / (contact.penalty * stress)
         if depth > _PENETRATION:
             why = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
@@ -141,12 +140,12 @@ def _contact_penalties(sheet: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _volume_penalty(sheet: Body) -> Iterator[Finding]:
+def _volume_penalty(body: Body) -> Iterator[Finding]:
     """Warn of volume changes of about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
-    model = sheet.scene.model
+    model = body.scene.model
     if not model.solid:
         return
-    stretch = max([t.value for t in sheet.targets if t.name == "pole_stretch"], default=1.0)
+    stretch = max([t.value for t in body.targets if t.name == "pole_stretch"], default=1.0)
     change = model.eps * stretch**2 / 8
     if change > 0.01:
         yield Finding("warning", repr(type(model).__name__), f"eps = {model.eps:g} lets the volume change by about"
@@ -162,38 +161,38 @@ def _volume_penalty(sheet: Body) -> Iterator[Finding]:
 
 
 @register("start")
-def _units(sheet: Body) -> Iterator[Finding]:
+def _units(body: Body) -> Iterator[Finding]:
     """Sizes that belong together and differ by orders of magnitude."""
-    natural = sheet.natural * sheet.length ** (sheet.scene.kinematics.dimension_of_volume - 1)
-    for target in sheet.targets:
+    natural = body.natural * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
+    for target in body.targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
             yield Finding("warning", str(target), f"it is {abs(target.value) / natural:.2g} times shear modulus x"
                           f" thickness x length = {natural:.3g}: are the units of force, length and stress the same?")
-    for contact in sheet.scene.contacts:
+    for contact in body.scene.contacts:
         tool = contact.tool
-        gap = float(-tool.signed_distance(sheet.scene.mesh.nodes_of(contact.on)).max())
-        if gap > 20 * sheet.length:
+        gap = float(-tool.signed_distance(body.scene.mesh.nodes_of(contact.on)).max())
+        if gap > 20 * body.length:
             yield Finding("warning", repr(contact), f"the tool is {gap:.3g} away from a body of length"
-                          f" {sheet.length:.3g}: are the units of length the same (mm and m)?")
+                          f" {body.length:.3g}: are the units of length the same (mm and m)?")
             continue
         if tool.components == 3:                             # their sizes are looked at by Scene
             continue
         arcs = [p.radius for p in tool.pieces if isinstance(p, Arc) and p.radius > 0]
         shaped = len(tool.pieces) > 2 or tool.closed
-        if shaped and not 0.01 < tool.size / sheet.length < 100 or arcs and min(arcs) > 1e3 * sheet.length:
-            yield Finding("warning", repr(contact), f"the tool is {tool.size:.3g} large, the body {sheet.length:.3g}:"
+        if shaped and not 0.01 < tool.size / body.length < 100 or arcs and min(arcs) > 1e3 * body.length:
+            yield Finding("warning", repr(contact), f"the tool is {tool.size:.3g} large, the body {body.length:.3g}:"
                           f" are the units of length the same (mm and m)?")
 
 
 @register("scene")
-def _targets(sheet: Body) -> Iterator[Finding]:
-    for target in sheet.targets:
-        why = unreachable(sheet.scene, target)
+def _targets(body: Body) -> Iterator[Finding]:
+    for target in body.targets:
+        why = unreachable(body.scene, target)
         if why is not None:                                  # a stage may leave out an item in its way
-            yield Finding("serious" if sheet.scene.driven is not None else "warning", str(target), why)
+            yield Finding("serious" if body.scene.driven is not None else "warning", str(target), why)
         is_length = target.name.endswith(("pole_height", "travel")) or target.name.startswith("u_")
-        if is_length and abs(target.value) > 20 * sheet.length:
-            yield Finding("warning", str(target), f"that is {abs(target.value) / sheet.length:.3g} times the length of"
-                                                  f" the body, {sheet.length:.4g}: are the units of length the same?")
-        if target.name == "pole_stretch" and target.value < 1 and not sheet.scene.contacts:
+        if is_length and abs(target.value) > 20 * body.length:
+            yield Finding("warning", str(target), f"that is {abs(target.value) / body.length:.3g} times the length of"
+                                                  f" the body, {body.length:.4g}: are the units of length the same?")
+        if target.name == "pole_stretch" and target.value < 1 and not body.scene.contacts:
             yield Finding("warning", str(target), "a sheet starts at 1, and its pole stretch grows as it is inflated")

@@ -1,4 +1,4 @@
-"""Checks of pressures, blow ratios and ways of tools: sizes against what the body is and bears."""
+"""Checks of pressures, blow ratios and travels of tools against the size and the strength of the body."""
 
 from __future__ import annotations
 
@@ -35,21 +35,32 @@ _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an ex
 
 
 class Aim(NamedTuple):
-    """A pressure or a travel that a run goes to: of what (None: that is not known), the value, its name."""
+    """Target of a run: a pressure or a travel.
 
-    thing: Any
+    Attributes:
+        item: the load, support or tool; None: not known.
+        quantity: "pressure" or "travel".
+        value: stress or length.
+        text: its name in findings.
+    """
+
+    item: Any
     quantity: str
     value: float
     text: str
 
 
 class Body(Triangles):
-    """The body that is looked over, and what it is to be brought to.
+    """A body before its run, and the targets of the run.
 
     Attributes:
-        moduli: {layer: shear modulus}; natural: a pressure of its size, shear modulus x thickness / length, stress.
-        aims: pressures and travels that the run goes to; targets: all that it aims at;
-            highest: what its stages must not exceed.
+        scene: the scene.
+        moduli: {layer: shear modulus}, stress.
+        natural: shear modulus x thickness / length, the size of pressures that deform a sheet, stress.
+        aims: target pressures and travels, and the largest values of tables (`Aim`).
+        goals: True if there are targets or stages.
+        targets: all targets of the run and of its stages.
+        highest: targets that its stages must not exceed.
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -65,10 +76,10 @@ class Body(Triangles):
             drive = None if stage.control is None else scene.items[scene.number(stage.who, stage.control)]
             for target in (*stage.intermediate, stage.until):
                 self.aims += [] if target is None else self._aim(target, drive)
-            for thing, table in stage.tables:
-                of = scene.items[scene.number(stage.who, thing)]
+            for name, table in stage.tables:
+                of = scene.items[scene.number(stage.who, name)]
                 most = float(table[np.argmax(np.abs(table[:, 1])), 1])
-                self.aims.append(Aim(of, str(of.quantity), most, f"the table of {thing!r} in {stage.who}"))
+                self.aims.append(Aim(of, str(of.quantity), most, f"the table of {name!r} in {stage.who}"))
 
     def say(self, value: float, kind: str) -> str:
         """Return a number as text, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
@@ -83,15 +94,15 @@ class Body(Triangles):
         of = next((t for t in items if name and t.name == name), drive if not name and drive in items else None)
         return [Aim(of, quantity, target.value, str(target))]
 
-    def pressures(self) -> list[tuple[str, float]]:
-        """Return (what, value) of all pressures that act or are aimed at."""
-        fixed = [(repr(load), load.value) for load in self.scene.loads
+    def pressures(self) -> list[Aim]:
+        """Return all pressures that act or are targets."""
+        fixed = [Aim(load, "pressure", load.value, repr(load)) for load in self.scene.loads
                  if load.quantity == "pressure" and not load.driven]
-        return [*fixed, *((aim.text, aim.value) for aim in self.aims if aim.quantity == "pressure")]
+        return [*fixed, *(aim for aim in self.aims if aim.quantity == "pressure")]
 
     @cached_property
     def pushed(self) -> list[Pushed]:
-        """Faces that a pressure pushes at tools that stay, and free ones that a pressure blows up."""
+        """Faces under pressure: towards fixed tools, or of a free sheet that is inflated."""
         found = []
         for load in (load for load in self.scene.loads if load.quantity == "pressure"):
             try:
@@ -138,8 +149,10 @@ class Pushed:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def left(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the smallest pressure of the free tube behind its peak, up to a blow ratio, over that at the peak; the
-        peak."""
+        """Return (ratio, peak), or None if the peak is not known or not passed.
+
+        The ratio is the smallest pressure of the free tube between its peak and a blow ratio, over the peak pressure.
+        """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
             return None
@@ -156,7 +169,7 @@ class Pushed:
 def _pressures(body: Body) -> Found:
     """Pressures that no sheet of this stiffness feels, or that none bears: free, or in a mould."""
     stiff = max(body.moduli.values())
-    for name, value in body.pressures():
+    for _, _, value, name in body.pressures():
         if 0 < abs(value) < _SLIGHT * body.natural:
             yield Finding("warning", name,
                           f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
@@ -178,7 +191,7 @@ def _bears(body: Body) -> Found:
     for pushed in body.pushed:
         if body.scene.contacts or (peak := pushed.peak()) is None:
             continue
-        for name, value in body.pressures():
+        for _, _, value, name in body.pressures():
             if _BEYOND * peak.pressure < abs(value) <= 1e3 * body.natural:
                 yield Finding("warning", name,
                               f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
@@ -213,7 +226,7 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _closing(body: Body) -> Found:
-    """Warn of a mould that the sheet passes by: the free sheet alone bears the pressure."""
+    """Warn of an open mould: a sheet that misses it bears no more than the pressure of a free sheet."""
     for pushed in body.pushed:
         if not pushed.tools:
             continue
@@ -224,10 +237,10 @@ def _closing(body: Body) -> Found:
             continue
         tool = pushed.tools[0].tool
         wall = float((tool.surface()[0] - open_at.mean(0)).dot(_across(pushed, open_at)).max())
-        aims = [aim for aim in body.pressures() if peak is not None and abs(aim[1]) > _BEYOND * peak.pressure]
+        aims = [aim for aim in body.pressures() if peak is not None and abs(aim.value) > _BEYOND * peak.pressure]
         deep = not body.goals and wall > _DEEP * np.ptp(points, axis=0).max()
         if aims or deep:
-            why = f"{aims[0][0]} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
+            why = f"{aims[0].text} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
                 if aims and peak else "a sheet bears little alone"
             yield Finding("warning", repr(pushed.tools[0]),
                           f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
@@ -271,7 +284,7 @@ def _ways(body: Body) -> Found:
         if body.scene.together(i)[0] != i:
             continue
         meets = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
-        aims = [aim.value for aim in body.aims if aim.thing is tool]
+        aims = [aim.value for aim in body.aims if aim.item is tool]
         if any(value < 0 for value in aims):                 # it is taken back, or pulls
             if aims[0] < 0 and tool.separates and tool is not body.scene.driven:       # else the aim is refused
                 yield Finding("warning", repr(tool),

@@ -26,11 +26,12 @@ def untouched(path: Any) -> Iterator[Finding]:
     names = Tooling.of_problem(problem).names
     for name in dict.fromkeys(names):
         contacts = [contact for contact, tool in zip(problem.contacts, names, strict=True) if tool == name]
-        there = [state for state in states if _with(problem, state, contacts)]
-        if len(there) < 2:
+        items = {i for i, item in enumerate(problem.scene.items) if any(item is c.contact for c in contacts)}
+        active = [state for state in states if not items <= set(state.setting.get("off", ()))]
+        if len(active) < 2:
             continue
-        touched = any(_touches(problem, state, contacts) for state in _looked_at(path, there[1:], name))
-        start, end = (_distances(problem, state, contacts) for state in (there[0], there[-1]))
+        touched = any(_touches(problem, state, contacts) for state in _looked_at(path, active[1:], name))
+        start, end = (_distances(problem, state, contacts) for state in (active[0], active[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
         gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
         if law.direction is None and any(entry.contact in before for entry in contacts) and \
@@ -40,26 +41,23 @@ def untouched(path: Any) -> Iterator[Finding]:
                           f" other face, and has it the right sign?")
         elif not touched and law.direction is not None:
             column = problem.scene.column(law) if law in problem.scene.drivable else ""
-            travel = f" of {there[-1].measures[column]:.4g}" if column in there[-1].measures else ""
+            travel = f" of {active[-1].measures[column]:.4g}" if column in active[-1].measures else ""
             yield Finding("warning", tool, f"this tool met nothing on its travel{travel}: {gaps}. A travel above 0 is"
                           f" along direction = ({', '.join(f'{m:g}' for m in law.direction)}); place the tool nearer,"
-                          f" or turn"
-                          f" its direction")
+                          f" or turn its direction")
         elif not touched:
             yield Finding("warning", tool, f"the body never touched this tool: {gaps}")
 
 
 def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states that can show a touch: with a force on the tool, else all, as side walls bear none along Z."""
+    """Return the states that can show a touch: the last with a force on the tool, else all with contact.
+
+    Side walls bear no force along Z.
+    """
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
     touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]
     return forced[-1:] or touching
-
-
-def _with(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    with problem.state_context(state):
-        return any(contact in problem.present for contact in contacts)
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:

@@ -1,4 +1,4 @@
-"""Tools that are moulds before a face, and the side of them on which a pressure acts."""
+"""Moulds in front of a face, and the side on which a pressure acts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..scene.scene import Scene
 from ..tools.tool import RigidTool
 
 _OPPOSITE = {"top": "bottom", "bottom": "top", "inner": "outer", "outer": "inner"}
-_BEFORE = 0.5              # share of the face that must lie before a tool that is its mould
+_BEFORE = 0.5              # share of a face that has the tool in front of it, from which on the tool is its mould
 
 
 def moulds(scene: Scene) -> list[Contact]:
-    """Return the contacts with tools that stay, before at least half of their face in the reference configuration."""
+    """Return the contacts whose fixed tool lies in front of at least half of their undeformed face."""
     return [contact for contact in scene.contacts if contact.direction is None and _is_before(scene, contact)]
 
 
@@ -29,7 +29,7 @@ def sign_towards(contact: Contact, load: Any) -> float:
 def free_way(tool: RigidTool, points: np.ndarray, way: np.ndarray, far: float) -> np.ndarray:
     """Return how far points, shape (n, c), go along unit vectors until they are in a tool; infinity beyond `far`."""
     gone = np.zeros(len(points))
-    for _ in range(1000):                                    # as far at a time as no tool can be nearer
+    for _ in range(1000):                                    # the distance to the tool is a safe advance
         free = -tool.signed_distance(points + gone[:, None] * way)
         if not np.any((free > 1e-6 * far / 100) & (gone < far)):
             break

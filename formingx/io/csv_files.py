@@ -57,7 +57,7 @@ class Table(NamedTuple):
 
 
 def conversion(unit: str, requested: str) -> float:
-    """Return the number of `wanted` units in one `unit`.
+    """Return the number of `requested` units in one `unit`.
 
     Raises:
         InputError: a unit is not known, or they are of different kinds.

@@ -57,7 +57,7 @@ class PartNumbers(KeyNumbers):
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Rows; where: the minimum wall is; more: rows of one kind of part alone."""
+        """Return the rows; where: place of the minimum wall, as text; more: rows of one kind of part alone."""
         rows = [("given for", self.basis)] if self.basis else []
         rows += [(self.weight_label, self._said(self.weight, self.units.weight))] if self.weight is not None else []
         rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ class Path(States):
 
     Attributes:
         record: the solver's record of the run (`formingx.solve.record.Record`).
-        pilot: the path of the run that its mesh was made by (`trace(..., adapt_mesh=True)`); else None.
+        pilot: the path of the first run, to which the mesh was adapted (`trace(..., adapt_mesh=True)`); else None.
 
     >>> path
     Path(9 states, to State('target', pressure=0.045088, pole_height=12, pole_stretch=2.26198, enclosed_volume=2895.08,
@@ -35,7 +36,6 @@ class Path(States):
     """
 
     pilot: Path | None = None
-    _made_reader: Reader | None = None
 
     if TYPE_CHECKING:
         def __getattr__(self, name: str) -> Any:
@@ -47,8 +47,8 @@ class Path(States):
     def findings(self) -> list[Finding]:
         """Return the findings of the checks before and after the run, worst first (`formingx.findings`); collective.
 
-        A finding has a severity ("serious": the results must not be used as they are; "warning": they may be another's
-        than was meant, or less exact than usual; "note"), the subject and the text.
+        A finding has a severity, a subject and a text. "serious": the results must not be used as they are. "warning":
+        the scene may be another than was meant, or a result less exact than usual. "note": neither.
 
         >>> path.findings()
         []
@@ -162,7 +162,7 @@ class Path(States):
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
              units: Units | None = None) -> Any:
-        """Return the formed part in numbers (`Part`): volume, weight, area, minimum wall and where, evenness; print it.
+        """Return the formed part in numbers (`Part`): volume, weight, area, minimum wall, uniformity; print it.
 
         They belong to the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
 
@@ -171,7 +171,7 @@ class Path(States):
             density: of the material in the reference configuration (under `ThermalExpansion` where it is free of
                 stress), in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
             trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
-                the middle line goes beyond it. In space a z, beyond which the part lies.
+                the middle line goes beyond it. In three dimensions a z, beyond which the part lies.
             heights: give the wall at these heights too (`Wall.height`).
             units: a `formingx.Units`.
 
@@ -226,8 +226,8 @@ class Path(States):
         Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
         name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
         ("change"); what new meshes have added ("new_meshes"). Energy of changes of temperature ("heat"). Where it went:
-        "strain_energy", above that at first; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
-        that the body may pull at, above that at first. "unbalanced": the error of the integrals, and of the run; of
+        "strain_energy", above its first value; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
+        that the body may pull at, above their first value. "unbalanced": the error of the integrals, and of the run; of
         more than 0.5 % of the largest part a warning tells, which is one of the `findings` from then on.
         """
         self.section_only("work")
@@ -266,9 +266,7 @@ class Path(States):
         if self.scene.kinematics.components == 3:
             raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
 
-    @property
+    @cached_property
     def _reader(self) -> Reader:
-        """Return the reader of the kinematics, made once."""
-        if self._made_reader is None:
-            self._made_reader = (self.scene.kinematics.reader or SectionReader)(self)
-        return self._made_reader
+        """The reader of the kinematics."""
+        return (self.scene.kinematics.reader or SectionReader)(self)

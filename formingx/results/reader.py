@@ -9,13 +9,13 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..errors import InputError
-from ..physics.contact import Contact
 from ..solve.state import State
 from ..units import Units
 from .evaluate.wall import Walls
 from .numbers import KeyNumbers
 
 if TYPE_CHECKING:
+    from ..contact.face import FaceContact
     from .evaluate.filling import Filling
     from .evaluate.wall import Wall
     from .files.sheet import Sheet
@@ -30,7 +30,7 @@ class Reader(Protocol):
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
         """Return the part in numbers; arguments: see `Path.part`."""
 
-    def filling(self, contact: Contact) -> Sheet:
+    def filling(self, contact: FaceContact) -> Sheet:
         """Return the gap between the body and a tool in every state."""
 
     def view(self, file: object, state: State, grid: float | None) -> None:
@@ -64,7 +64,7 @@ class SectionReader:
         from .evaluate.part import part
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
 
-    def filling(self, contact: Contact) -> Filling:
+    def filling(self, contact: FaceContact) -> Filling:
         """Return the `Filling` of a tool.
 
         Raises:

@@ -38,7 +38,7 @@ class _View:
 
 
 class States:
-    """The states of a run, from the unloaded body to the target: the base of what `Path` is made of.
+    """The states of a run, from the unloaded body to the target: base class of `Path`.
 
     Attributes:
         record: the solver's record of the run (`formingx.solve.record.Record`).
@@ -183,7 +183,7 @@ class States:
                 started = started or left is after
                 if not started or left.setting != right.setting:
                     continue
-                with segment.problem.state_context(left):  # a travel is the travel of the control of the stage
+                with segment.problem.state_context(left):  # a travel belongs to the control of the stage
                     try:
                         bound = target.bind(segment.problem)
                     except InputError as error:
@@ -211,7 +211,7 @@ class States:
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """Return the state between two neighbours that meets a target; the problem stands at the first."""
-        if segment.problem.has_history:                      # what lies between depends on how it is reach
+        if segment.problem.has_history:                      # states between depend on the way to them
             found = self._run_to(segment, left, right, target, bound)
         else:
             found = segment.curve.find(left, right, bound, target)

@@ -65,7 +65,7 @@ class ContactFace:
             self._rest_tangents = _tangents(self.rest[self._edges])
 
     def of(self, state: Any) -> ContactTable:
-        """Return the face in a state; of a tool that takes no part, without pressure."""
+        """Return the contact face in a state; without pressure if its tool is inactive."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()

@@ -57,7 +57,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
 
 
 def findings(edge: Edge | None) -> list[Finding]:
-    """Return the finding on the coarsest edge that the body slides over."""
+    """Return the finding on the coarsest edge over which the body slides, in a list; [] if its elements are small."""
     if edge is None or edge.turn < _TURN:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="

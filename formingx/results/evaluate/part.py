@@ -1,4 +1,4 @@
-"""The formed part in numbers: volume, weight, area, minimum wall, evenness."""
+"""The formed part in numbers: volume, weight, area, minimum wall, uniformity."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Part(PartNumbers):
 
 def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,
          heights: Sequence[float] = (), units: Units = NONE, planes: MirrorPlanes = NO_PLANES) -> Part:
-    """See `Path.part`; planes: of symmetry, that cut the body."""
+    """Return the part in numbers, see `Path.part`; planes: symmetry planes that cut the body."""
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
     units = units if axisymmetric else units.per_depth()

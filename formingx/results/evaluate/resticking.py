@@ -13,7 +13,7 @@ _WALL = 3e-3
 """Change of the wall, over the wall, that steps may cause without a finding."""
 
 _LARGE = 0.1
-"""The same, from which its size is not told: neighbours move, too."""
+"""Change of the wall from which the finding gives no size, since neighbours move, too."""
 
 
 class Resticking(NamedTuple):
@@ -33,7 +33,9 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the point of a run that stuck again furthest from where it stuck before, or None; collective.
+    """Return the point whose positions of sticking are furthest apart in a run, or None; collective.
+
+    Of a remeshed run the states on the last mesh count.
 
     A point that sticks again elsewhere changes the stretch beside it by `shift`. Whether it lifts off may depend on
     small changes of the forces, so this is also the size of the error by the steps.
@@ -43,9 +45,9 @@ def furthest(path: Any) -> Resticking | None:
         definition = getattr(contact, "contact", None)
         if definition is None or definition.lagged or not (definition.sticks and definition.separates):
             continue
-        touches = [state.memory[number].touch for state in path.states
+        touches = [state.memory[number].touch for state in path.segments[-1].states
                    if len(state.memory) > number and state.memory[number] is not None]
-        rows = gathered(contact.comm, np.column_stack([contact.points, *_shifts(contact, touches)]))
+        rows = gathered(contact.comm, np.column_stack([contact.points, _shifts(contact, touches)]))
         again = rows[rows[:, 2] > 0]
         if len(again):
             r, z, shift = again[np.argmax(again[:, 2])]
@@ -53,18 +55,16 @@ def furthest(path: Any) -> Resticking | None:
     return max(found, key=lambda item: item.shift, default=None)
 
 
-def _shifts(contact: Any, touches: list[Any]) -> list[np.ndarray]:
-    """Return the shift of each own point over its length of face, shape (n,), in a list."""
+def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
+    """Return the shift of each own point over its length of face, shape (n,)."""
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
     for touch in touches:
-        if len(touch.distance) != len(total):               # of another mesh
-            continue
         touching = touch.distance > -contact.law.theta
         again = touching & ~stuck & ~np.isnan(last[:, 0])
         total[again] += np.linalg.norm(touch.position[again] - last[again], axis=1)
         last[touching], stuck = touch.position[touching], touching
-    return [np.divide(total, contact.rule.lengths, out=np.zeros(len(total)), where=contact.rule.lengths > 0)]
+    return np.divide(total, contact.rule.lengths, out=np.zeros(len(total)), where=contact.rule.lengths > 0)
 
 
 def findings(item: Resticking | None) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""Snap-through with a history: where a body reaches equilibrium, of several places, then depends on the way there."""
+"""Snap-through with history variables: which of several equilibria a body reaches depends on the way there."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 
 RESOLVED = 0.05
-"""How much larger than found, in parts of it, a stress peak may be by its estimated errors."""
+"""Relative amount by which sigma_1 and its estimated error may exceed the stress peak of a converged result."""
 
 
 class StressError(NamedTuple):

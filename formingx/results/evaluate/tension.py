@@ -21,8 +21,13 @@ _COMPRESSED = 1e-3
 
 
 class Resultant(NamedTuple):
-    """The least principal stress resultant of a membrane: its direction ("meridional" or "hoop"), its value over shear
-    modulus times thickness, and the reference point (R, Z) of the mid-surface where it is, length."""
+    """Smallest principal stress resultant of a membrane.
+
+    Attributes:
+        direction: "meridional" or "hoop".
+        value: over shear modulus times thickness.
+        point: reference point (R, Z) of the mid-surface where it is, length.
+    """
 
     direction: str
     value: float
@@ -35,7 +40,7 @@ class Resultant(NamedTuple):
 
 
 class Tension:
-    """Finds the smallest principal resultant of a membrane in a state, per deformed length.
+    """Smallest principal resultant of a membrane in a state, per deformed length.
 
     With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, the resultant of a layer of thickness h is
     h l3 (l_i P_ii - l3 P_33).

@@ -56,14 +56,21 @@ _LIMITS = Limits()
 
 
 class Depth(NamedTuple):
-    """Penetration of a body into a tool: over the allowed one, depth (length), place (r, z), the contact, its name."""
+    """Penetration of a body into a tool.
+
+    Attributes:
+        share: depth over the allowed depth.
+        depth: length.
+        place: deformed position, shape (2,) or (3,), length.
+        contact: the `FaceContact`.
+        name: of the tool, or of the face that touches it.
+    """
 
     share: float
     depth: float
     place: np.ndarray
     contact: Any
     name: str
-
 
     @property
     def words(self) -> str:
@@ -97,11 +104,11 @@ class Verdict:
         with self._problem.state_context(state):
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
-                off = _off(contact, state, self._images)
-                if off > _LIMITS.warns:
+                error = _force_error(contact, state, self._images)
+                if error > _LIMITS.warns:
                     name = _name(contact)
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
-                                         f" about {100 * off:.2g} %: {_harder(contact, off)}."))
+                                         f" about {100 * error:.2g} %: {_harder(contact, error)}."))
             for cut in self._deepest(edges, state, own=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
                                      f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
@@ -138,11 +145,11 @@ class Verdict:
                        f" it, {100 * sunk.share * _LIMITS.sunk:.2g} % of the wall that is left there: give Contact a"
                        f" penalty of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
             for contact in problem.present:
-                off = _off(contact, state, self._images)
+                error = _force_error(contact, state, self._images)
                 felt = resultants.penetration(contact, state.x, state.control) > _LIMITS.felt * contact.thickness
-                if off > _LIMITS.ends and felt:
+                if error > _LIMITS.ends and felt:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
-                           f" about {100 * off:.2g} %: {_harder(contact, off)}")
+                           f" about {100 * error:.2g} %: {_harder(contact, error)}")
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and cannot hold"
                            f" it: it is behind the tool")
@@ -151,7 +158,7 @@ class Verdict:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
     def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Return the deepest points in tools: `own`: on the face of the contact, for a warning; or on any face."""
+        """Yield the deepest points in tools; own: on the face of the contact, for a warning; else on any face."""
         points, length = along(edges), _lengths(edges)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
@@ -164,8 +171,11 @@ class Verdict:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
-        """Return the contact point of each tool in three dimensions that is deepest, over the tolerance (length), if
-        it is too deep."""
+        """Yield the deepest contact point of each tool in three dimensions if its penetration is above `allowed`.
+
+        Args:
+            allowed: of a contact, the allowed penetration of its points, shape (n,) or a number, length.
+        """
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
@@ -198,17 +208,19 @@ def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
 
 
 def _most_inside(contact: Any) -> np.ndarray:
-    """Return the allowed penetration of the points of a contact, shape (n,), length: of the sticking ones, as they
-    are."""
+    """Return the allowed penetration of contact points, shape (n,), length; infinite for lagged points that touch
+    since this step, on which no force acts yet."""
     most = _LIMITS.inside * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
-def _off(contact: Any, state: State, images: int) -> float:
-    """Return the amount by which penetration changes the force F on a tool, relative; collective.
+def _force_error(contact: Any, state: State, images: int) -> float:
+    """Return the relative change of the force F on a tool by penetration; 0 for a tool that stays; collective.
 
-    Advance of the tool into the body, 2 E/F (E: energy of penetration), times dF/dtravel, over F. On one that stays air
-    presses: it is as large as that. images: of the body in the part, whose energy the state tells.
+    The tool advances by 2 E/F into the body (E: energy of penetration). This times dF/dtravel, over F, is the change.
+
+    Args:
+        images: number of images of the modelled body in the whole part, to which `strain_energy` belongs.
     """
     if not contact.contact.driven:
         return 0.0
@@ -218,14 +230,14 @@ def _off(contact: Any, state: State, images: int) -> float:
         return share
     along = contact.contact.way / np.hypot(*contact.contact.way)
     e = _LIMITS.small
-    by = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-e, 0.0, e)]
-    less, force, more = (resultants.force(contact, *at) @ along for at in by)
-    way = (contact.travelled(by[2][1]) - contact.travelled(by[0][1])) @ along
+    states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-e, 0.0, e)]
+    less, force, more = (resultants.force(contact, *at) @ along for at in states)
+    way = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ along
     return min(2 * energy * abs((more - less) / way) / force**2, _LIMITS.stiffest * share) if force and way else share
 
 
-def _harder(contact: Any, off: float) -> str:
-    return f"give Contact a penalty of {contact.contact.penalty * off / _LIMITS.warns * 10:.1g}"
+def _harder(contact: Any, error: float) -> str:
+    return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warns * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:

@@ -112,9 +112,9 @@ class Ledger:
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return whole
-        halves = [(entry, other, self._between(entry, other)) for entry, other in ((a, middle), (middle, b))]
+        halves = [(start, end, self._between(start, end)) for start, end in ((a, middle), (middle, b))]
         if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(whole))) > small:
-            halves = [(entry, other, self._halved(entry, other, row, small, times - 1)) for entry, other, row in halves]
+            halves = [(start, end, self._halved(start, end, row, small, times - 1)) for start, end, row in halves]
         (*_, found), (*_, rest) = halves
         return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
 
@@ -168,7 +168,7 @@ class Ledger:
             return found
         straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
         h = self._curve.distance(a, b)
-        # a body in the reference configuration on a tool
+        # no tangent where a tool touches the body from the start, as its force has a kink there
         start = None if straight or a.kind == "start" and self._kinked(a) else h
         end = None if straight else h
         x = _through(a.x, b.x, start and h * a.direction, end and h * b.direction)
@@ -332,9 +332,9 @@ def _called(scene: Any, item: Any) -> str:
 def work(path: Any) -> dict[str, np.ndarray]:
     """See `Path.work`."""
     found = balance(path)
-    off = [finding for finding in findings(found) if finding not in path.record.findings]
-    tell(off, path.problem.comm.rank)
-    path.record.findings += off
+    new = [finding for finding in findings(found) if finding not in path.record.findings]
+    tell(new, path.problem.comm.rank)
+    path.record.findings += new
     return found
 
 

@@ -1,9 +1,9 @@
 """Checkpoints: a folder that holds every accepted state of a run, from which the run goes on, on any number of ranks.
 
-    run/scene.json        what the scene is, and versions
+    run/scene.json        description of the scene, and versions
     run/0000/state.json   the state's numbers, and checksums
-    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, what its histories remember
-    run/end.json          how the run ended, and what it said then; not there while it goes on, or if it was killed
+    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, history variables
+    run/end.json          how the run ended, and its findings; not there while it runs, or if it was killed
 
 A state is written beside its place and then renamed: a state with its final name is complete, even if the run is
 killed. Fields are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks;
@@ -57,7 +57,7 @@ class Checkpoint:
     """The folder of one run, for writing.
 
     Args:
-        folder: made, or looked at, at once.
+        folder: made if it does not exist, else its content is checked.
         path: the `Path` of the run; the states in the folder must be its beginning.
 
     Raises (collective):
@@ -193,7 +193,7 @@ _mesh_loaders: list[Callable[[Problem, State, dict[str, Any]], Problem]] = []
 
 
 def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Problem]) -> None:
-    """Provide the function that makes the problem on a mesh of a remeshed run again: (problem, last state, data)."""
+    """Provide the loader of remeshed runs: (problem, last state, data of the mesh) -> problem on the new mesh."""
     _mesh_loaders[:] = [loader]
 
 
@@ -248,8 +248,7 @@ def ended(folder: Any) -> dict[str, Any] | None:
     found = _read_json(file)
     rows = found.get("findings")
     if not (isinstance(found.get("failure"), str) and isinstance(rows, list) and all(
-            isinstance(entry,
-                       list) and list(map(type, entry)) == [str] * 4 and entry[0] in SEVERITIES for entry in rows)):
+            isinstance(row, list) and list(map(type, row)) == [str] * 4 and row[0] in SEVERITIES for row in rows)):
         raise InputError(f"checkpoint: {str(file)!r} is damaged: it does not say how the run ended")
     return {"failure": found["failure"], "findings": [Finding(*entry) for entry in rows]}
 
@@ -382,15 +381,15 @@ def _states(folder: FilePath) -> list[FilePath]:
 
 def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state's state.json; raise an InputError unless they are complete and unchanged."""
-    entry = folder / _name(number)
-    data = _read_json(entry / "state.json")
+    state_folder = folder / _name(number)
+    data = _read_json(state_folder / "state.json")
     content: dict[str, bytes] = {}
     try:
         if "x" in data:
-            content[_ARRAYS] = (entry / _ARRAYS).read_bytes()
+            content[_ARRAYS] = (state_folder / _ARRAYS).read_bytes()
         elif checksums:
             content = {f"{name}.bp/{file.name}": file.read_bytes() for name in _FIELDS
-                       for file in sorted((entry / f"{name}.bp").glob("*"))}
+                       for file in sorted((state_folder / f"{name}.bp").glob("*"))}
         missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
         whole = not missing and data.get("number") == number and (
             not checksums or _checksums(data, content) == data.get("checksums"))
@@ -398,7 +397,7 @@ def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     except (OSError, ValueError, TypeError):
         whole, found = False, data
     if not whole:
-        raise InputError(f"checkpoint {str(entry)!r} is damaged: its files are not those that were written"
+        raise InputError(f"checkpoint {str(state_folder)!r} is damaged: its files are not those that were written"
                          f" (load's state= picks an earlier one)")
     return found
 

@@ -91,7 +91,7 @@ class Fields:
         except InputError:
             profile = None                                  # not a sheet
         if profile is not None:
-            if self._between is None:  # a point stays on the line across that it is on in the reference configuration
+            if self._between is None:  # a point stays on its line across the sheet
                 points = self.points.reshape(-1, self.points.shape[-1])
                 self._between = _across(points, profile.rest_bottom, profile.rest_top)
             k, part = self._between

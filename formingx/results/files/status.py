@@ -12,10 +12,10 @@ from ...findings import Finding, alarming
 from . import checkpoint
 
 _RECENT = 20
-"""Of this number of steps the pace is taken."""
+"""Number of the last steps from which the pace is taken."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
 _STILL = 1e-3
-"""Relative change of these over the recent steps below which the body stands still."""
+"""Relative change of all of `_MOVES` over the last steps below which the body stands still."""
 _MET = 1e-9
 """Distance from a target, over it, at which it is met."""
 
@@ -25,7 +25,7 @@ class Status:
     """The last complete step of a run.
 
     Attributes:
-        states: in the checkpoint. stage: its name, or "". admissibility check: `State.verdict`.
+        states: in the checkpoint. stage: its name, or "". `verdict`: see `State`.
         target: (measure, the value that ends the stage, its value now), or None.
         spent, left: seconds that the run has worked, and about how many it takes to the end of the stage at the pace of
             its last steps; None: it came no nearer in them.
@@ -65,8 +65,8 @@ class Status:
         spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
         left = self._without_pace() if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
-        limits = ", ".join(f"{why} ({n} times)" for why,
-                           n in sorted(self.limits.items(), key=lambda entry: -entry[1])[:3])
+        most = sorted(self.limits.items(), key=lambda limit: -limit[1])[:3]
+        limits = ", ".join(f"{why} ({n} times)" for why, n in most)
         if self.ended is None:
             left += f"; the last state is {_words(self.age)} old"
         elif self.left != 0:

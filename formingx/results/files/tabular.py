@@ -16,7 +16,7 @@ from ...units import NONE, Units
 
 
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
-    """One row per state: stage (of a process), kind, iterations, then every measure of the path.
+    """Write one row per state: stage (of a process), kind, iterations, then every column of the path.
 
     units: of the header; in plane strain per unit depth.
     """
@@ -29,7 +29,7 @@ def write_path(path: Any, file: Any, units: Units = NONE) -> None:
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
-    """One row per node of the bottom face: where it was, arc length, both deformed faces, thickness, its ratio."""
+    """Write one row per node of the bottom face: reference position, arc length, deformed faces, thickness, ratio."""
     columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
                "thickness", "thickness_ratio"]
     table = np.column_stack([profile.reference_radius, profile.reference_length, profile.arc_length, profile.bottom,

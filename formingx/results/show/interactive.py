@@ -39,7 +39,7 @@ def packed(text: str) -> str:
 
 
 def data(records: list[Record], names: list[str], units: Units, more: dict[str, Any] | None = None) -> str:
-    """Everything that `report.js` draws, as JSON; more: of each run, as the "mesh" of a sheet in three dimensions."""
+    """Everything that `report.js` draws, as JSON; more: added to each run, such as the "mesh" of a sheet."""
     runs = [_run(record, name, units) | (more or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]
@@ -217,7 +217,7 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
 
 
 def rounded(values: Any, each: bool = False) -> list:
-    """Numbers with `DIGITS` digits, `each` or those of the largest of them, as lists."""
+    """Return numbers as lists; each: with `DIGITS` digits each, else with the digits of the largest."""
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)
     unit = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - DIGITS)

@@ -49,8 +49,8 @@ class Record:
         heat: {tool: (conductance, its temperature as text)} where tools take heat; unit: of temperatures, or "".
         layers: of the last state, as in `Wall`; script: the file that ran; or "".
         findings: `Path.findings`; of a checkpoint those with which the run ended, as is failure: what ended it, or "".
-        admissibility checks: of the n states, `State.verdict`.
-        planes: of symmetry, that cut the body; drawn: about this number of states are.
+        `verdicts`: `State.verdict` of the n states.
+        planes: symmetry planes that cut the body; drawn: approximate number of drawn states.
     """
 
     summary: dict[str, str]
@@ -167,8 +167,8 @@ class Record:
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
-        listener = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
-        return listener or volume.findings(errors[k], where)
+        clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
+        return clamped or volume.findings(errors[k], where)
 
     def _of_verdict(self) -> list[Finding]:
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
@@ -177,7 +177,7 @@ class Record:
                     f" used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
-        """Return the warnings on the numbers of the run, without their severity."""
+        """Return the texts of all findings on the run, also of notes, worst first."""
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:

@@ -154,13 +154,14 @@ def _behind(record: Record, units: Units) -> list[str]:
 
 def _warnings(record: Record, lead: str = "") -> str:
     """Return the warnings: two lines of each, the whole text when it is opened."""
+    findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
-        return lead + "".join(map(_noted, record.all_findings()))
-    if not record.all_findings():
+        return lead + "".join(map(_noted, findings))
+    if not findings:
         return (f"<p class=good>{html.escape(lead)}No warnings: the target was met; mass, volume of the elements and"
                 f" penetration are within bounds, and no face crosses another or the axis.</p>")
-    return "".join(_noted(found._replace(text=lead + found.text)) for found in record.all_findings())
+    return "".join(_noted(found._replace(text=lead + found.text)) for found in findings)
 
 
 def _noted(found: Finding) -> str:
@@ -181,7 +182,7 @@ def _made(records: list[Record]) -> list[list[str]]:
 
 
 def _cards(record: Record, found: Part | None, units: Units) -> str:
-    """Return the few numbers that are asked for first."""
+    """Return the main numbers of the part and of the run."""
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
@@ -240,7 +241,7 @@ def _key_numbers(record: Record, units: Units) -> str:
     return page.table(head, rows)
 
 
-def _course_columns(record: Record) -> list[list[str]]:
+def _control_columns(record: Record) -> list[list[str]]:
     """Columns of the controlled quantity, and of forces, of one kind each."""
     kinds = [[c for c in record.measures if c.endswith(end)] for end in ("pressure", "travel", "displacement", "force")]
     return [columns for columns in kinds if columns]
@@ -248,7 +249,7 @@ def _course_columns(record: Record) -> list[list[str]]:
 
 def _stages(record: Record, units: Units) -> str:
     """Every stage: its states and iterations, where it ended, the largest forces on tools in it, the remaining gap."""
-    columns = [c for kind in _course_columns(record) for c in kind if not c.endswith("force")]
+    columns = [c for kind in _control_columns(record) for c in kind if not c.endswith("force")]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
     for stage in dict.fromkeys(record.stages):

@@ -95,7 +95,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """Return a plotter to add meshes to, 1000 by `height`; when the block ends, its picture is written as PNG."""
+    """Yield a plotter to add meshes to, 1000 by `height`; when the block ends, its picture is written as PNG."""
     import pyvista
     picture = io.BytesIO()
     with screen():
@@ -137,7 +137,7 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """Return a display to draw on: the one that is there, or an Xvfb of our own that ends with the block.
+    """Provide a display in the block: the present one, or an Xvfb that ends with the block.
 
     Debian's VTK aborts without one.
     """
