@@ -1,8 +1,8 @@
 """Public calls with arguments of another kind, or number, than they take: an InputError that says what they take.
 
-A call that fails is explained: its arguments are held against its signature, and against its annotations. What an
-argument's value may be, each function checks itself (`errors.py`). Calls that a user makes are explained, those inside
-a run are not: methods by which the solver asks its objects stay plain functions.
+A call that fails is explained: its arguments are compared with its signature and its annotations. Each function
+checks the values itself (`errors.py`). Calls by a user are explained. Methods that the solver calls during a run stay
+plain functions.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from numpy.typing import ArrayLike
 from .errors import ConvergenceError, InputError
 from .tools.tool import PlaneTool, RigidTool
 
-_SAID = (InputError, ConvergenceError, OSError)              # as text already
+_SAID = (InputError, ConvergenceError, OSError)              # their messages tell the fault already
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
 _PACKAGE = __name__.partition(".")[0]
 _SOLVER = {"physics", "contact", "forms", "problem", "measures", "solve"}
-"""Rooms of objects whose methods the solver calls: of what a user makes of them the making alone is explained."""
+"""Subpackages of objects whose methods the solver calls: only calls of their constructors are explained."""
 _ASKED = {name for protocol in (RigidTool, PlaneTool) for name in vars(protocol) if not name.startswith("_")}
 """Methods of tools that the solver calls in every iteration."""
 _seen: set[type] = set()     # classes whose methods are explained

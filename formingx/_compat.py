@@ -23,7 +23,7 @@ if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
 JIT_OPTIONS = {"timeout": 120}
 
 _compiled: dict[str, Any] = {}
-"""What the compiler gave for forms and expressions of this process, by their signatures."""
+"""Compiled forms and expressions of this process, by their signatures."""
 
 
 def compile_form(form: Any) -> Any:

@@ -174,10 +174,13 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 
 
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a user's function of arrays of one shape, by name, as floats of that shape; an InputError unless all
-    are finite.
+    """Return the values of a user's function of arrays of one shape, as floats of that shape.
 
-    (One that `function` raises goes through.)
+    Args:
+        at: {name: array}, the arguments of the function in order.
+
+    Raises:
+        InputError: the function fails, or a value is not finite. An InputError of the function itself passes through.
     """
     arguments = ", ".join(at) if len(at) == 1 else f"({', '.join(at)})"
     try:
@@ -209,7 +212,7 @@ def known(kind: str, name: Any, names: Any) -> None:
 
 
 def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
-    """Call them; an InputError of one of them, on any rank, is raised on all, with one message; collective."""
+    """Call all of `calls`; an InputError on any rank is raised on all ranks, with one message; collective."""
     refused = None
     for call in calls:
         try:

@@ -46,7 +46,7 @@ class MeshAdaptation(Protocol):
         """Raise an InputError if the mesh cannot be adapted."""
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
-        """Return the adapted mesh; raise an InputError for an unknown option."""
+        """Return the adapted mesh; options: arguments of `formingx.mesh.adapted`, whose names are checked before."""
 
 
 dry_runs: dict[str, Callable[..., None]] = {}

@@ -62,9 +62,9 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         at_limit_point: action at a limit point of the control. "continue": continue along the path, on which the
             control turns back; in contact, or with history variables, the body snaps through where the path has no
             further state. "snap_through": the control continues, and the body snaps to its next equilibrium, see
-            `Path.jumps`. "stop": end there. None: "snap_through" where the control goes one way only, that is for time
-            and with history variables (friction); a pressure is continued while the enclosed volume grows, as by an air
-            supply.
+            `Path.jumps`. "stop": end there. None: "continue", but "snap_through"
+            for time and, with history variables (friction), for all controls but a growing pressure. In contact or with
+            history variables a growing pressure is continued while the enclosed volume grows, as by an air supply.
         resume: continue from the states of the checkpoint, which must be of this scene; without states, begin.
         allow_inadmissible: continue, with a warning, at states that a body cannot have: folded, inside a tool, with
             inverted elements. `State.verdict` tells why; by default the run ends there.
@@ -144,7 +144,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     -formingx_0_snes_monitor (0: the first such run of a script) reach the SNES.
 
     Args:
-        to: pressure (stress) or travel (length) of the controlled quantity.
+        to: value of the controlled quantity: pressure (stress) or travel (length).
         increments: number of equal increments; one that fails is halved, and new contact shortens them.
         tolerances: when a state counts as converged; default `Tolerances()`.
         max_steps: accepted states before the run gives up.
@@ -319,12 +319,10 @@ def _after_pilot(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: 
     """Return the path of a run on the mesh that a first run asks for."""
     if start is not None or resume:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
-                         f" start or resume"
-                         f" a run goes on with the mesh that it has: give only one of them")
+                         f" start or resume a run goes on with the mesh that it has: give only one of them")
     if adapt_mesh is not True and not isinstance(adapt_mesh, Mapping):
         raise InputError(f"{caller}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
-                         f" such as"
-                         f" {{'error': 0.02}}")
+                         f" such as {{'error': 0.02}}")
     options = {} if adapt_mesh is True else dict(adapt_mesh)
     meshes = adaptation(caller)
     for name in options:
@@ -362,7 +360,7 @@ def _path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measur
           found: list[Finding], timed: bool = False) -> Path:
     """Return a path to be solved for by `curve`, that begins with the states of another, or with a state.
 
-    found: by the checks before the run, told now.
+    found: findings of the checks before the run, which are logged here.
     """
     record = Record(curve.problem, curve)
     record.findings = found
@@ -394,7 +392,7 @@ def _from_checkpoint(caller: str, resume: bool, checkpoint: Any, scene: Scene, s
 
 @contextlib.contextmanager
 def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
-    """Errors carry the path that is handed in, as far as it has come; so does the word where a run was interrupted."""
+    """Attach the path so far to the errors of a run; yield the function that names the path; raise `Interrupted`."""
     paths: list[Path] = []
 
     def carried(path: Path) -> Path:
@@ -411,7 +409,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
             _end(path, str(error), path.findings() if path.record.on_end else [])
         if getattr(error, "diagnosis", None) is not None:
-            raise copy.copy(error) from None                # it tells the cause: no lines of the solver before it
+            raise copy.copy(error) from None                # its diagnosis tells the cause: no traceback of the solver
         raise
     except KeyboardInterrupt:
         path = so_far()
@@ -428,6 +426,6 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 
 def _end(path: Path, failure: str, found: list[Finding]) -> None:
-    """Tell those who keep the run how it ended, and its findings."""
+    """Call the listeners at the end of a run with the failure, or "", and the findings."""
     for listener in path.record.on_end:
         listener(failure, found)

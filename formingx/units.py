@@ -90,7 +90,7 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """Return the unit of what a whole body has."""
+        """Return the unit of a quantity of the whole body; in plane strain `_UnitsPerDepth` divides it by a length."""
         return unit
 
     @property

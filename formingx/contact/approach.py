@@ -18,21 +18,21 @@ class StepLimits:
 
     Attributes:
         as_good: part of a step within which a point is as good as in touch.
-        beyond: how far a step goes that is to end at an arrival, over the length to there.
+        beyond: length of a step that ends at a gap closure, over the length up to the closure.
         near: distances, over thickness, at which a point is as good as in touch.
-        at_end: part of a step from which on points that touch, and will stick, have no friction until the next.
-        slides: how far a point may slide so, over the length of face that is its own.
-        nearer: part of its distance from the tool that a point may move in a step of lagged contact, beside its length
-            of face.
-        cut_off: how deep the way of a point in a step may lead through a tool, over the length of face that is its own.
-        places: at most, at which that way is looked at.
+        at_end: part of a step after which sticking points that touch have no friction until the next step.
+        slides: largest slip of such a point, over its tributary length.
+        nearer: largest motion of a point in a step of lagged contact, less its tributary length, over its distance from
+            the tool.
+        cut_off: largest depth of the straight path of a point through a tool, over its tributary length.
+        places: largest number of positions at which this path is checked.
         lag: change of the pressure in a step of lagged friction, over the pressure.
         behind: allowed difference between the pressure at the end of the step and the pressure that limits friction,
             over the pressure.
         corrections: largest number of solutions of a step that reduce this difference.
         inaccurate: change of the pressure, over `lag`, at which a step is taken again.
         settling: iterations in which such friction settles, however short the step.
-        weak: smallest force of which these are parts, over shear modulus, thickness and length of a sheet.
+        weak: smallest normal force to which these changes relate, over shear modulus times thickness times length.
         shortest: lengths of steps (dimensionless) that are never too long for points that come into contact.
         mixed: the same for steps in which sticking points lift off while the gaps of others close.
     """
@@ -59,16 +59,16 @@ LIMITS = StepLimits()
 
 
 class Approach:
-    """The step ahead of one contact. For each step: `reach`, `prepare`; of the state that it reached the others.
+    """The step ahead of one contact: `reach` and `prepare` before each step, the other methods at its end.
 
     Args:
         face: the contact.
-        conducts: heat flows through points in contact, from the end of the step on.
+        conducts: True if heat flows through points in contact, from the end of the step on.
 
     Attributes:
-        points: of the face, all ranks.
-        at_once: this number of points a step may bring into contact along the tangent. (Where it does not matter
-            when they come, the convergence of contact limits steps.)
+        points: number of points of the face, all ranks.
+        at_once: number of points that may come into contact in one step along the tangent. (If the order of the gap
+            closures does not matter, it is larger: the convergence of contact limits steps.)
     """
 
     def __init__(self, face: FaceContact, conducts: bool):
@@ -76,7 +76,7 @@ class Approach:
         self.points = face.comm.allreduce(len(face.rule.points))
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
-        self._foreseen = 0                                  # points that the step is going to bring, all ranks
+        self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """Return True if a point touches the tool."""
@@ -130,7 +130,7 @@ class Approach:
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
-        if not face.contact.lagged:                         # that asks for no place of arrival, but for its pressure
+        if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
             face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
         elif ends and self.lags:
@@ -161,7 +161,7 @@ class Approach:
         return self._part_of_pressure(self.face.tractions(new, control).normal) if self.lags else 0.0
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Limit lagged friction by the pressure at the end of the step; False if it is, as well as wanted."""
+        """Limit lagged friction by the pressure at the end of the step; return False if it is close (`behind`)."""
         if not self.lags:
             return False
         face, law = self.face, self.face.law
@@ -172,7 +172,7 @@ class Approach:
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return a length, or as much of it as changes the pressure of lagged friction by the tolerance."""
+        """Return a length, reduced so that the pressure of lagged friction changes by `StepLimits.lag` at most."""
         if not self.lags:
             return length
         law, touch = self.face.law, self.face.touch
@@ -181,10 +181,9 @@ class Approach:
         return length * min(LIMITS.lag / change, 1.0) if change else length
 
     def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
-        """Return the relative difference of another pressure, by default that at the last state, from `normal`
-        (stress).
+        """Return the relative difference between `normal` and another pressure, by default the last state's (stress).
 
-        Of points that were pressed at the last state.
+        Only points under pressure at the last state count.
         """
         face, before = self.face, self.face.law.pressure(self.face.touch)
         off = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
@@ -215,9 +214,9 @@ class Approach:
         return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
 
     def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """Return True if a straight way from positions a to b leads deeper than both ends by `StepLimits.cut_off`.
+        """Return True if a straight path from positions a to b is deeper than both ends by `StepLimits.cut_off`.
 
-        So much a point may cut off an edge that it slides over.
+        A point that slides over an edge may cut it off by this depth.
         """
         law, lengths = self.face.law, self.face.rule.lengths
         way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
@@ -257,7 +256,7 @@ class Approach:
 
 
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Arc length at which free points (a mask) that go straight meet the ramp, `length` if not before, shape (n,)."""
+    """Return the arc lengths at which free points (a mask) on straight paths meet the ramp, else `length`, (n,)."""
     at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
     ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
     near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))

@@ -1,4 +1,4 @@
-"""Contact of one face as forces at points of it, and their history variables (a `History`). No form is compiled per
+"""Contact of one face: forces at its points, and their history variables (a `History`). No form is compiled per
 tool."""
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ _SAME_STIFFNESS = 1e-3
 class Memory(NamedTuple):
     """History variables of the points of a face at the last accepted state.
 
-    touch: of the law of friction; arrived: which points came into contact in the step that ended there, shape (n,).
-    penalty: over that in the reference configuration, which the state was found with, shape (n,)
-        (`Contact.present_area`).
+    Attributes:
+        touch: history variables of the law of friction.
+        arrived: mask of the points that came into contact in the step to this state, shape (n,).
+        penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
+            (`Contact.present_area`).
     """
 
     touch: Touch
@@ -37,13 +39,17 @@ class FaceContact:
     """Residual, tangent and history of one contact, at the n points of its face that are this rank's.
 
     Args:
-        solid: the scene's `Solid`; contact: the `Contact`; assemble: makes the owned part of a linear form.
+        solid: the scene's formulation, such as `Solid`.
+        contact: the `Contact`.
+        assemble: function that returns the locally owned entries of a linear form.
 
     Attributes:
-        rule: where the points are (`Rule`); points: their reference positions, shape (n, components), length.
-        law: at the points; thickness: of the body behind the face, length.
-        increment: the `Increment` that goes on.
-        present: it takes part in the stage.
+        rule: quadrature points (`Rule`).
+        points: their reference positions, shape (n, components), length.
+        law: contact law at the points.
+        thickness: thickness of the body behind the face, length.
+        increment: the present `Increment`.
+        present: True if the contact is active in the stage.
         shift: reduction of the distances, shape (n,), length, or None.
         unbalanced: contact forces less the reaction of the body at its nodes, shape (components,), stress length^2:
             round-off of positions, given by the perturbed runs of a design sensitivity.
@@ -74,7 +80,7 @@ class FaceContact:
         self._base, self._rate, self.present = base, rate, present
 
     def shift_distances(self, by: np.ndarray) -> None:
-        """Distances count less from now on, shape (n,), length: of a mesh that is made on the way."""
+        """Reduce the distances from now on, by `by`, shape (n,), length: after remeshing in a run."""
         self.shift = by
         self.law = self._law(self._penalty)
 
@@ -158,11 +164,11 @@ class FaceContact:
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Make the tangent at a state the one that an iteration wants, and the residual (`values`) fit to it."""
+        """Linearise the law for an iteration at a state; add the change of the forces to the residual (`values`)."""
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
     def tangent(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """`stiffness` for the tangent of the problem; `ahead`: as in it."""
+        """Return and store `stiffness` for the tangent of the problem; `ahead`: see `Residual.tangent`."""
         self._in_tangent = self._stiffness(fields, control, ahead)
         return self._of_unknowns(self._in_tangent)
 
@@ -219,7 +225,7 @@ class FaceContact:
         return law
 
     def _harden(self, penalty: np.ndarray) -> None:
-        """Return the present over the reference penalty, shape (n,)."""
+        """Set the ratio of the present to the reference penalty, shape (n,), and update the law."""
         if not np.array_equal(penalty, self._penalty):
             self._penalty, self.law = penalty, self._law(penalty)
 
@@ -249,7 +255,7 @@ class FaceContact:
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
         """Store the positions at which points touch in the step ahead (`Touch.arrival`).
 
-        guessed: which are going to be guessed where their forces want them, shape (n,).
+        guessed: mask of the points whose first guess is predicted from their forces, shape (n,); None: no points.
         """
         self._guessed = guessed
         if self._memory is not None:
@@ -344,7 +350,7 @@ class FaceContact:
 
     def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
-        """See `History`: where its nearest point touched a point touches, and slipped as that did."""
+        """See `History`: a point touches if the nearest point of the source touched, and has the slip fitted there."""
         if memory is None:
             return None
         carrier, touch, theta = Carrier(self.comm, there(source.points), self.points), memory.touch, self.law.theta

@@ -12,7 +12,7 @@ from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
 class Increment:
     """Tractions at n points from their history variables of the last accepted state, until the next one is accepted.
 
-    It is begun for each run of Newton's method ahead of a state, or to look at one. In each iteration
+    Each run of Newton's method begins one, and so does the evaluation of a state. In each iteration
 
         tractions(x)     gives the residual, at the positions x of the points seen from the tool, shape (n, c);
         linearise(x)     is called at the same positions: `tractions(x)` then contains the tangent of the iteration;
@@ -110,7 +110,7 @@ class Increment:
         return found
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function for the motion of points along the tool, to first order."""
+        """Return a function that maps a displacement of points to their `Motion` at the tool, to first order."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
         return lambda by: before.to(x + by)

@@ -19,7 +19,8 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
     """Return the reference length of the face that is in touch; in three dimensions its area.
 
-    The node on the axis bears hardly anything, and stands a little off where its neighbours stick: it counts with them.
+    The node on the axis carries hardly any force and may have a small gap where its neighbours stick. It is in touch if
+    the point next to it is.
     """
     rule = face.rule
     rows = gathered(face.comm, np.column_stack([rule.points, rule.lumped, rule.extent, face.touching(fields, control)]))

@@ -16,14 +16,15 @@ from ..ranks import gathered
 
 
 class Rule:
-    """The n points of a face that are this rank's.
+    """The n locally owned points of a face.
 
     Attributes:
         dofs: local numbers of the unknowns that move each point, component by component of each of its nodes, (n, m).
-        points: reference positions, shape (n, components), length; nodes: of the nodes of each, shape (n, components),
-            where a point is a node, or (n, nodes, components).
-        lengths, lumped: reference length and area that belong to each point, shape (n,) (lumped: 0 on the axis).
-        area: that forces act on: `lumped`, but see `Lobatto`, shape (n,).
+        points: reference positions, shape (n, components), length.
+        nodes: reference positions of the nodes of each point, shape (n, components) if a point is a node, else
+            (n, nodes, components).
+        lengths, lumped: tributary reference length and area of each point, shape (n,) (lumped: 0 on the axis).
+        area: area on which the forces act, shape (n,): `lumped`, but see `Lobatto`.
     """
 
     dofs: np.ndarray
@@ -54,7 +55,7 @@ class Rule:
         raise NotImplementedError
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Values at the points, shape (n,), of those at `nodes`."""
+        """Return values at the points, shape (n,), from values at `nodes`."""
         raise NotImplementedError
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
@@ -93,8 +94,10 @@ class Lobatto(Rule):
         return values
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the mean of the values of the edges on both sides of a node; on the axis the stretch is the same both
-        ways."""
+        """Return the mean area ratio of the edges on both sides of a node, shape (n,).
+
+        On the axis the circumferential stretch equals the stretch along the edge.
+        """
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
         ratio = np.linalg.norm(_along(now[edges]), axis=-1) / np.linalg.norm(_along(rest[edges]), axis=-1)
@@ -111,7 +114,7 @@ class Lobatto(Rule):
 
     @cached_property
     def _first_lengths(self) -> np.ndarray:
-        """Return the mean of the values of the edges on both sides of a node."""
+        """`lengths` times the mean length ratio, first over present mesh, of the edges at each node, shape (n,)."""
         if self._brought is None:
             return self.lengths
         first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
@@ -133,7 +136,7 @@ class Lobatto(Rule):
         return np.asarray(found).reshape(-1, 3)
 
     def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
-        """Give the node on the axis some area of its facet's, so that something holds it.
+        """Give the node on the axis a part of the area of its facet, so that contact forces act on it.
 
         (1/24, -2/24, 1/24) of L times the weight at L: integrals of linear functions along the facet stay exact.
         """
@@ -148,8 +151,10 @@ class Lobatto(Rule):
 
 
 class Vertices(Lobatto):
-    """The nodes of a sheet in three dimensions, each with its third of the triangles around it; `lengths`: the root
-    of that."""
+    """The nodes of a sheet in three dimensions, each with a third of the area of the triangles around it.
+
+    `lengths` is the square root of this area.
+    """
 
     def __init__(self, surface: Any, assemble: Any):
         vectors, numbers = _displacements(surface)
@@ -216,7 +221,7 @@ class Gauss(Rule):
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Return a face that is as hot all over stays so to the last bit."""
+        """Return values at the points; a uniform field stays uniform to the last bit."""
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:

@@ -21,10 +21,7 @@ class EventPrediction(Protocol):
         """Return the length of a step, at most `length`; None: the events are unknown, from now on."""
 
     def closures(self, length: float) -> list[tuple] | None:
-        """Return for each contact the times, positions and exact points of its gap closures; None: unknown.
-
-        They are the first three arguments of `Approach.prepare`.
-        """
+        """Return for each contact the first three arguments of `Approach.prepare`; None: the events are unknown."""
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
         """Return the change of (x, control) at a length along the tangent by the events, locally owned entries;
@@ -58,10 +55,9 @@ class EventPredictor(Protocol):
 
 
 class Way(NamedTuple):
-    """A straight piece of a path: from (x, control) along (direction, slope), so long. Arrays: locally owned
-    entries, shape (n,).
+    """A straight piece of a path: from (x, control) along (direction, slope), with an arc length.
 
-    events: predicted ahead of it, or None.
+    Arrays are locally owned entries, shape (n,). events: predicted contact events ahead of (x, control), or None.
     """
 
     x: np.ndarray
@@ -94,7 +90,8 @@ class StepLimit:
         self._predictor = make(self) if make else None
 
     make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
-    """Makes the predictor of a limit. An extension sets it; without one, steps end where points touch that stick."""
+    """Function that makes the predictor of a limit, set by an extension. Without it, steps end where sticking points
+    touch."""
 
     @property
     def present(self) -> list[Approach]:
@@ -141,9 +138,9 @@ class StepLimit:
         """
         n, found = self._n, way.events.closures(way.length) if way.events else None
         for k, approach in enumerate(self.present):
-            times, places, exact = found[k] if found else (*approach.along(
+            times, places, guessed = found[k] if found else (*approach.along(
                 way.x[:n], way.control, way.direction[:n], way.slope, way.length), None)
-            approach.prepare(times, places, exact, way.length, ends)
+            approach.prepare(times, places, guessed, way.length, ends)
         return way.events.bend(way.length) if way.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:

@@ -16,8 +16,10 @@ from ..tools.shapes import Arc, Line, Tool
 class Tooling(NamedTuple):
     """All contacts of a scene.
 
-    contacts: in the order of the scene; before: how many of its items come before them (`Scene.things`); length: length
-    scale of a problem's forms, which makes amplitudes of travels.
+    Attributes:
+        contacts: in the order of the scene.
+        before: number of items of the scene before the contacts (`Scene.items`).
+        length: length scale of the forms of a problem: travel over amplitude, length.
     """
 
     contacts: list[Contact]
@@ -51,7 +53,7 @@ class Tooling(NamedTuple):
         return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
-        """Return the travel of each tool (length) in a state of this setting and control; None: it takes no part."""
+        """Return the travel of each tool (length) for these step data and control; None: the tool is inactive."""
         if not setting:
             return [0.0] * len(self.contacts)
         there = Setting(**setting)
@@ -96,5 +98,5 @@ def _contact(data: dict[str, Any]) -> Contact:
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
     found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], direction=direction,
                     **more)
-    found.friction = data["friction"]                       # a function of the temperature can only be told
+    found.friction = data["friction"]                       # a function of the temperature is stored as text
     return found

@@ -79,8 +79,9 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
 def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return a sheet laid on a tool at t = 0: temperatures of the sheet and of the tool, (len(times), len(x or
-    depths)).
+    """Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
+
+    Their shapes are (len(times), len(x)) and (len(times), len(depths)).
 
     x counts from the touching face, where the sheet loses `conductance` (T - tool), to the other, which loses
     h (T - air); depths count into the tool, whose back is held at `tool_start`.

@@ -12,7 +12,7 @@ T1 = 2 c10 h0 (l1/l2 - (l1 l2)^-3), T2 likewise, arc length s, slope phi and the
 dT1/ds = (T2 - T1) cos(phi)/r + mu N,   N = T1 kappa + T2 sin(phi)/r   (equilibrium: Song 1993, 2.2; friction: 5.9),
 kappa = 0 on the side; where the membrane is free N = 0 gives kappa. On the edge the sheet's thickness h = h0/(l1 l2)
 counts: its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/2 below it, which turns mu N into
-mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is that of the plug's face.
+mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is measured at the plug's face.
 """
 
 import functools
@@ -111,7 +111,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 
 def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
             radius: float) -> Any:
-    """Return the boundary value problem at a depth, from a guess at a smaller one, step by step."""
+    """Return the solution of the boundary value problem at depth `goal`, in steps from a guess at a smaller depth."""
     from scipy.integrate import solve_bvp
     while True:
         found = solve_bvp(slopes, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)

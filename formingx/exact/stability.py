@@ -99,7 +99,7 @@ def clamped_plate(n: int) -> float:
 
 
 def _last_root(f: Callable[[float], float], low: float) -> float:
-    """Return the root nearest to 1, from there down."""
+    """Return the root below 1 that is nearest to 1, or nan."""
     grid = 1 - np.geomspace(1e-5, 1 - low, 80)
     before = f(grid[0])
     for a, b in zip(grid, grid[1:]):
@@ -120,7 +120,7 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    """Return the determinant of the tractions on the outer face for three motions that leave the inner face free."""
+    """Return the determinant of the outer face's conditions for three motions that meet the inner face's conditions."""
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
     delta = _pressure(ratio, inner, 1.0)                             # outside less inside

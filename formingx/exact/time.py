@@ -11,7 +11,7 @@ points, c(s) T::
         p = integral of (n - 1) T R^(n-1)/r^n dR, by Gauss's rule
     thin balloon, R0 and H0 in the reference configuration:  p R0/H0 = 2 T/l^3,  s = ln l, 3 = through the wall
 
-Where s is driven the branches are integrated; where the load is held, its rate, zero, gives ds/dt.
+If s is prescribed, the branches are integrated. If the load is constant, its zero rate gives ds/dt.
 """
 
 import math
@@ -30,7 +30,7 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 @dataclass
 class Body:
-    """A body of one degree of freedom s, and its state. All in the reference configuration at s = 0.
+    """A body of one degree of freedom s, and its state; free of stress at s = 0 at first.
 
     Attributes:
         c10, branches: of the material, stress and (stress, time).
@@ -103,7 +103,7 @@ class Body:
         return found[:, 0]
 
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
-        """Return (times at which s grows to the targets under the load of now, time at which no state follows).
+        """Return (times at which s grows to the targets under the present load, time at which no state follows).
 
         A target that is passed already has the present time, one that is not met nan; the second is None if s reaches
         `end`. There must be no s up to `end` at which the body stays.
@@ -149,7 +149,7 @@ class Body:
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 
     def _time_per_s(self, s: float, w: np.ndarray) -> float:
-        """dt/ds under a load that is held."""
+        """Return dt/ds under a constant load."""
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])

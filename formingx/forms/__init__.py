@@ -1,1 +1,1 @@
-"""The discrete equations of a scene: the interface of `solve`."""
+"""Forms of a scene, with its fields, materials, histories and constraints."""

@@ -16,8 +16,8 @@ from .. import _compat
 from ..mesh.nodes import of_cells, own_cells
 
 _MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
-"""Of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the determinant
-there has no limit.)"""
+"""Midpoints of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the
+determinant there has no limit.)"""
 
 
 class Least(NamedTuple):
@@ -72,7 +72,7 @@ class Admissible:
     def least(self) -> Least:
         """Return the smallest hoop stretch or in-plane determinant at the state last set; collective.
 
-        Of values that are not finite, the first.
+        If values are not finite, the first of them.
         """
         found = [Least("in-plane determinant", np.inf, (0.0, 0.0))]
         for quantity, values in self.quantities().items():
@@ -115,10 +115,11 @@ class Admissible:
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
-        """Return True if no point lies beyond the axis, and in-plane determinants are positive where the energy looks.
+        """Return True if no point is beyond the axis and in-plane determinants are positive at quadrature points.
 
-        (Between its quadrature points an element that a sharp edge bends strongly may be inside out without harm to
-        the solution: a coarse mesh under a plug. `least` tells.) All ranks, at the state last set; collective.
+        The quadrature points belong to the energy. Between them an element that a sharp edge bends strongly may be
+        inside out without harm to the solution, as in a coarse mesh under a plug: `least` finds it. All ranks, at the
+        state last set; collective.
         """
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
@@ -126,9 +127,9 @@ class Admissible:
         return all(self._forms.comm.allgather(mine))
 
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
-        """(elements with a point where J <= 0, all elements, the worst point (R, Z)) at the state last set; collective.
+        """Return (number of elements with a point where J <= 0, of all elements, the worst point (R, Z)) of a solid.
 
-        Of a solid.
+        At the state last set; collective.
         """
         J = np.prod(list(self.quantities().values()), axis=0)
         mine = (np.inf, (0.0, 0.0))

@@ -15,13 +15,16 @@ from ..physics.supports import Held
 
 
 class Entry(NamedTuple):
-    """Unknowns that one item of the scene can hold.
+    """Unknowns that one item of the scene can constrain.
 
-    item: its number in `Scene.things`, -1 for unknowns that no equation holds; bc: the DirichletBC; dofs: local
-    numbers, ghosts too, shape (n,); driven: they follow the control.
+    Attributes:
+        item: number of the item in `Scene.items`, -1 for unknowns that appear in no equation.
+        bc: the DirichletBC.
+        dofs: local numbers of the unknowns, ghosts too, shape (n,).
+        driven: True if they follow the control.
     """
 
-    thing: int
+    item: int
     bc: Any
     dofs: np.ndarray
     driven: bool
@@ -30,9 +33,13 @@ class Entry(NamedTuple):
 class Active(NamedTuple):
     """Constraints that are active while some items take no part.
 
-    bcs: DirichletBCs; dofs: local numbers of the held unknowns, ghosts too, ascending, shape (n,); owned: which of them
-    this rank owns, shape (n,); driver: number of the item that moves each, or -1, shape (n,); rows: of the means that
-    could be held, each the owned part, 0 where it does not hold; present: which of the means hold.
+    Attributes:
+        bcs: DirichletBCs.
+        dofs: local numbers of the constrained unknowns, ghosts too, ascending, shape (n,).
+        owned: mask of the locally owned ones, shape (n,).
+        driver: number of the item that moves each unknown, or -1, shape (n,).
+        rows: row of each constrained mean of the scene, locally owned entries; 0 if the mean is not active.
+        present: for each of these means True if it is active.
     """
 
     bcs: list[Any]
@@ -44,13 +51,15 @@ class Active(NamedTuple):
 
 
 class Constraints:
-    """Everything in a scene that can be held.
+    """All constraints that a scene can have.
 
     Args:
-        forms: the `Formulation`. assemble: gives the owned part of a compiled linear form.
+        forms: the `Formulation`.
+        assemble: function that returns the locally owned entries of a compiled linear form.
 
     Attributes:
-        entries: list of `Entry`; means: [(number of the item, row: owned part, shape (n,))].
+        entries: constrained unknowns, a list of `Entry`.
+        means: constrained means, [(number of the item, row: locally owned entries, shape (n,))].
     """
 
     def __init__(self, forms: Any, assemble: Callable[[Any], np.ndarray]):
@@ -71,25 +80,25 @@ class Constraints:
 
     @property
     def can_move(self) -> bool:
-        """True if some held unknowns follow the control."""
+        """True if some constrained unknowns can follow the control."""
         return any(entry.driven for entry in self.entries)
 
-    def driven_by(self, thing: int) -> np.ndarray:
-        """Local numbers of the owned unknowns that an item of the scene moves."""
-        dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.thing == thing and e.driven]))
+    def driven_by(self, item: int) -> np.ndarray:
+        """Return the local numbers of the owned unknowns that an item of the scene (its number) moves."""
+        dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.item == item and e.driven]))
         return dofs[dofs < self._n]
 
     def without(self, off: set[int]) -> Active:
-        """Return the constraints that are active without these items."""
-        entries = [entry for entry in self.entries if entry.thing not in off]
+        """Return the constraints that are active without the items of these numbers."""
+        entries = [entry for entry in self.entries if entry.item not in off]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
         drivers = np.concatenate([np.zeros(0, dtype=int),
-                                  *(np.full(len(e.dofs), e.thing if e.driven else -1) for e in entries)])
+                                  *(np.full(len(e.dofs), e.item if e.driven else -1) for e in entries)])
         order = np.argsort(drivers < 0, kind="stable")          # where two supports meet, the driven one counts
         dofs, first = np.unique(numbers[order], return_index=True)
         owned = dofs < self._n
-        present = [thing not in off for thing, _ in self.means]
-        rows = [there * row for (_, row), there in zip(self.means, present, strict=True)]
+        present = [item not in off for item, _ in self.means]
+        rows = [active * row for (_, row), active in zip(self.means, present, strict=True)]
         for row in rows:
             row[dofs[owned]] = 0
         return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)

@@ -1,4 +1,4 @@
-"""The elements of a body in a state: determinants and shapes."""
+"""Elements of a body in a state: their deformation and their shape quality."""
 
 from __future__ import annotations
 
@@ -19,10 +19,14 @@ _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge,
 class Body(NamedTuple):
     """A solid in one state, all ranks: m elements with k quadrature points each.
 
-    points, moved: reference and deformed, shape (m, k, 2), length; J, I1: det F and tr F^T F there, shape (m, k);
-    section: F within the section, shape (m, k, 2, 2); layers: tag of each element, shape (m,);
-    outline: deformed nodes around each, shape (m, 6, 2), length; quality,
-    at_rest: shape of its corner triangle deformed and in the reference configuration (`shape_quality`), shape (m,).
+    Attributes:
+        points, moved: reference and deformed quadrature points, shape (m, k, 2), length.
+        J, I1: det F and tr F^T F at these points, shape (m, k).
+        section: F within the section, shape (m, k, 2, 2).
+        layers: tag of each element, shape (m,).
+        outline: deformed nodes around each element, shape (m, 6, 2), length.
+        quality, at_rest: `shape_quality` of the corner triangle of each element, deformed and in the reference
+            configuration, shape (m,).
     """
 
     points: np.ndarray

@@ -18,7 +18,8 @@ class Followed:
 
     Args:
         forms: the `Formulation`; values: a `Function` of a quadrature element, which holds f(T).
-        parts: [(cells, by local numbers; f)]; temperatures: there, as `take` wants them.
+        parts: [(local numbers of cells, f)].
+        temperatures: temperatures in the cells of each part, see `take`.
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],
@@ -30,19 +31,19 @@ class Followed:
         self.take(temperatures)
 
     def at(self, time: Any) -> Any:
-        """f at a time (UFL scalar) of the step."""
+        """Return f at a time (UFL scalar) of the step."""
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
     def take(self, temperatures: Iterable[np.ndarray]) -> None:
-        """Update to a changed temperature: in the cells of each part it is as `Temperature.now_and_before` gives it.
+        """Update f to changed temperatures: the result of `Temperature.now_and_before` for the cells of each part.
 
         Raises:
             InputError: f has no value at a temperature.
         """
         temperature = self._temperature
-        for (cells, function), there in zip(self._parts, temperatures, strict=True):
+        for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]
-            now, *before = function(there)
+            now, *before = function(T)
             self._values.x.array[rows] = now
             if self._rate is not None and before:
                 with np.errstate(all="ignore"):

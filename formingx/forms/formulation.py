@@ -2,7 +2,7 @@
 
 Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
 largest shear modulus). The energy is divided by stress times reference volume. So a run does not depend on the
-user's units, and the interface of `solve` are numbers of order one.
+user's units, and `solve` works with numbers of order one.
 """
 
 from __future__ import annotations
@@ -47,16 +47,18 @@ class Formulation(ABC):
         control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
         scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every item of the scene;
             last, 1 for the time. control_scale: scale of the only controlled item, or L.
-        terms: of each material of the scene its `MaterialTerms`.
+        terms: the `MaterialTerms` of each material of the scene.
         histories: arguments of the forms besides fields, control and time (`History`).
-        potential: of a step, over stress times volume (UFL, rank 0); energy: the energy stored, likewise: the same
-            without histories. dissipation: power, over stress times volume (UFL, rank 0), damage_energy: energy,
-            likewise. Each but the first may be None.
+        potential: potential of a step over stress times volume (UFL, rank 0).
+        energy: stored energy over stress times volume (UFL, rank 0), without histories the potential; or None.
+        dissipation: dissipated power over stress times volume (UFL, rank 0), or None.
+        damage_energy: energy that damage has cost over stress times volume (UFL, rank 0), or None.
         load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
-        residual: dpotential/dw - external virtual work (UFL, rank 1); control_derivative, time_derivative: its
-            derivative by the control, in the loads and by way of the time in materials, or None.
-        elastic_supports: [(support with an energy, 1 where it is there, else 0 (`Constant`))].
-        load_works: of each load of the scene its virtual work at the value that it has (UFL, rank 1, user's units).
+        residual: dpotential/dw - external virtual work (UFL, rank 1).
+        control_derivative, time_derivative: derivatives of `residual` by the control, through the loads and through
+            the time in materials; or None.
+        elastic_supports: [(support with an energy, 1 while the support is active, else 0 (`Constant`))].
+        load_works: virtual work of each load of the scene at its present value (UFL, rank 1, user's units).
         temperature: the `Temperature` of the body, or None.
         faces: the faces in contact of the problem (`FaceContact`), which makes them after the forms.
         slack_at_rest: True if the body in the reference configuration has no stiffness in some direction.
@@ -110,7 +112,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of `mesh` that stand for points of the body, shape (n, 2)."""
+        """Return the points of `mesh` that represent points of the body, shape (n, 2)."""
 
     @abstractmethod
     def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
@@ -118,7 +120,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Z, shape (n,), of the points of a layer that those of `mesh` at (R, Z), shape (n,), stand for."""
+        """Return Z of the points of a layer that the points (R, Z) of `mesh` represent, shape (n,) each."""
 
     @abstractmethod
     def _make_mesh(self) -> Any:
@@ -145,7 +147,7 @@ class Formulation(ABC):
         """`potential` or `energy`: of(terms, F) is the energy density (stress) of a `MaterialTerms`."""
 
     def _take_materials(self) -> None:
-        """Coefficients, histories and energies."""
+        """Set the coefficients, histories and energies of the materials."""
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.terms = list(dict.fromkeys(self._terms.values()))
@@ -168,9 +170,9 @@ class Formulation(ABC):
         for support in self.scene.supports:
             energy = body.stored(support)
             if energy is not None:
-                there = self.constant(1.0)
-                self.elastic_supports.append((support, there))
-                self.potential, self.energy = (None if e is None else e + self._scale * there * energy
+                active = self.constant(1.0)
+                self.elastic_supports.append((support, active))
+                self.potential, self.energy = (None if e is None else e + self._scale * active * energy
                                                for e in (self.potential, self.energy))
 
     def refresh(self) -> None:
@@ -209,19 +211,19 @@ class Formulation(ABC):
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:
-        """Return the displacement at reference points (R, Z), shape (n, 2)."""
+        """Return the `Probe` of the displacement at reference points (R, Z), shape (n, 2)."""
         return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
 
     def mean_row(self, held: Any) -> Any:
-        """Linear form: mean of a displacement component (dimensionless) over a boundary, as a `MeanHeld` asks."""
+        """Return the linear form of a `MeanHeld`: mean of a displacement component (dimensionless) over a boundary."""
         raise NotImplementedError
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
-        """[(sub space, local dofs)] of unknowns that no equation holds: they stay 0."""
+        """Return [(sub space, local dofs)] of unknowns that appear in no equation: they stay 0."""
         return []
 
     def set_stiff(self) -> None:
-        """Put `w` to a state near rest whose tangent is regular: its tangent gives a path its first direction."""
+        """Set `w` near the reference configuration with a regular tangent, for the first direction of a path."""
         self.w.x.array[:] = 0
 
     def constant(self, value: float) -> fem.Constant:
@@ -269,7 +271,7 @@ class Formulation(ABC):
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: of the setting, or as a run with its own times has set it."""
+        """Process time at control 0: from the setting, or set by a run that chooses its time steps."""
         return float(self._time[0].value)
 
     @clock.setter
@@ -277,13 +279,13 @@ class Formulation(ABC):
         self._time[0].value = time
 
     def time_at(self, control: float) -> float:
-        """Process time at a control, under the setting that holds now."""
+        """Return the process time at a control in the present setting."""
         base, rate = self._time
         return float(base.value + rate.value * control)
 
     @property
     def time_now(self) -> float:
-        """Process time at the control that the forms hold now."""
+        """Process time at the present control of the forms."""
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
@@ -291,9 +293,9 @@ class Formulation(ABC):
         for support, present in self.elastic_supports:
             present.value = float(not any(self.scene.items[i] is support for i in setting.off))
         for i, (load, base, rate) in enumerate(self._loads):
-            there = i not in setting.off
-            base.value = there * (setting.base[i] if load.driven else load.value)
-            rate.value = there * setting.rate[i]
+            active = i not in setting.off
+            base.value = active * (setting.base[i] if load.driven else load.value)
+            rate.value = active * setting.rate[i]
         for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
             constant.value = value
 

@@ -11,7 +11,7 @@ from .solid import Solid
 
 FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, DisplacementPenalty: Solid,
                                                       Membrane: MidSurface}
-"""The formulation of each kind of model; of a user's own, made from one of these, that of the one it is made from."""
+"""Formulation of each kind of model; a user's own subclass of a model has the formulation of its base class."""
 
 
 def formulate(scene: Any) -> Formulation:

@@ -19,7 +19,7 @@ class FreeStretch:
         forms: the `Formulation`; expansion: {layer: its `Expansion`}.
 
     Attributes:
-        stretch: UFL.
+        stretch: J_T^(1/3) at the present time (UFL scalar).
     """
 
     def __init__(self, forms: Any, expansion: dict[str, Any]):

@@ -23,11 +23,11 @@ class Histories:
 
     @property
     def control(self) -> float:
-        """The control that the forms see now."""
+        """The present control of the forms."""
         raise NotImplementedError
 
     def look_at(self, x: np.ndarray, control: float) -> None:
-        """Put the fields of x, locally owned entries, and the control where the forms see them."""
+        """Set the fields of the forms to x, locally owned entries, and their control."""
         raise NotImplementedError
 
     @property
@@ -53,12 +53,12 @@ class Histories:
 
     @property
     def time(self) -> float:
-        """Process time at the control that the forms see now."""
+        """Process time at the present control of the forms."""
         return self.forms.time_at(self.control)
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: of the setting, or as a run with its own times has set it."""
+        """Process time at control 0: from the setting, or set by a run that chooses its time steps."""
         return self.forms.clock
 
     @clock.setter
@@ -66,7 +66,7 @@ class Histories:
         self.forms.clock = time
 
     def time_at(self, control: float) -> float:
-        """Process time at a control, under the setting that holds now."""
+        """Return the process time at a control in the present setting."""
         return self.forms.time_at(control)
 
     @property
@@ -92,9 +92,10 @@ class Histories:
         self._foretold = None, []
 
     def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Return the history variables of the forms after the state; the caller restores them.
+        """Advance the histories of the forms to a state; return their history variables there, for `advance`.
 
-        start: the state that the step begins at.
+        The histories are left in the new state: the caller restores the old one. start: the state that the step begins
+        at; x: locally owned entries.
         """
         self.look_at(x, control)
         for history in self.forms.histories:

@@ -20,48 +20,50 @@ class History(Protocol):
 
     The order of calls, contacts first, then materials, the temperature last, which takes the heat that they dissipate:
 
-        start                   the body is in equilibrium;
+        start                   the body is in the reference configuration;
         get, advance, put       a step is tried: the new history variables; back to the old ones;
         advance                 a state is accepted;
         get, put                to another accepted state, and back;
         save, load              to a file and back, on any number of ranks;
         carry                   to a problem of the same body on another mesh.
 
-    A memory (`get`) is never changed, and fits only the ranks that it was made on; what `save` gives fits any.
+    A memory (`get`) is never changed, and fits only the ranks that it was made on. The result of `save` fits all.
     """
 
     def start(self) -> None:
-        """Nothing has happened yet."""
+        """Set the history variables of the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Accept the state of the forms; x: its owned unknowns. It becomes the beginning of a step.
+        """Update the history variables for the state of the forms, where a step then begins. x: its owned unknowns.
 
         start: the state at the beginning of the step that ends now, if there is one.
         """
 
     def get(self) -> Any:
-        """Return the memory now."""
+        """Return the present history variables (a memory)."""
 
     def put(self, memory: Any) -> None:
-        """Go back, or on, to a memory."""
+        """Set the history variables from a memory."""
 
     def save(self, memory: Any) -> dict[str, Any]:
-        """Return a memory as JSON can hold it but for arrays, independent of ranks and the same on all of them;
-        collective."""
+        """Return a memory as plain data and arrays, independent of ranks and the same on all of them; collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
-        """Return the memory, locally owned entries, of the result of `save`; an InputError if it does not fit this
-        scene."""
+        """Return the memory, locally owned entries, from the result of `save`.
+
+        Raises:
+            InputError: it does not fit this scene.
+        """
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
               there: Callable[[np.ndarray], np.ndarray]) -> Any:
-        """Return the history variables of the same part, from a problem of the same body on
-        another mesh; collective.
+        """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 
         Args:
-            source: its history there; memory: of that. The problem there stands at the state that it belongs to.
-            x, control: the state here that it belongs to (owned unknowns), at which the forms stand.
-            there: says where reference points of the other mesh are in this one's, shape (n, coordinates) both.
+            source: history of the same part in the other problem, which is set to the state of `memory`.
+            memory: history variables of `source` in that state.
+            x, control: the state of this problem (owned unknowns), which its forms are set to.
+            there: function that maps reference points of the other mesh, shape (n, coordinates), to this mesh.
         """
 
 
@@ -76,4 +78,4 @@ class ConstitutiveHistory(History, Protocol):
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Let the body reach equilibrium: its motion so far predicts nothing of the next step."""
+        """Reset the variables of motion (`Material.of_motion`): the last step predicts nothing of the next one."""

@@ -31,7 +31,7 @@ class LoadedBody:
     Attributes:
         u, du, X: displacement, virtual displacement and reference position (UFL, length, shape (2,): components r, z).
         F: deformation gradient (UFL, shape (3, 3)).
-        kinematics: of the scene.
+        kinematics: the `Kinematics` of the scene.
         stress, length, volume: largest shear modulus, largest extent and reference volume, in the user's units.
     """
 
@@ -63,7 +63,7 @@ class LoadedBody:
         return self._forms.thickness(boundary)
 
     def stored(self, support: Any) -> Any:
-        """Return the energy of a support or None, or an InputError unless it is a form without virtual displacement."""
+        """Return the energy of a support, or None; raise an InputError unless it is a form without `body.du`."""
         form = support.stored_energy(self)
         if form is not None and (not isinstance(form, ufl.Form) or form.arguments()):
             raise InputError(f"{support!r}: stored_energy must return a UFL form without body.du, such as"
@@ -71,7 +71,7 @@ class LoadedBody:
         return form
 
     def work(self, load: Any, value: Any) -> Any:
-        """Return the virtual work of a load, or an InputError unless it is a form that is linear in `du`."""
+        """Return the virtual work of a load; raise an InputError unless it is a form that is linear in `du`."""
         form = load.virtual_work(self, value)
         if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
             raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"

@@ -28,10 +28,11 @@ class MaterialTerms:
             UFL scalar.
         rest_stress: stress that the energy leaves at F = I (UFL scalar).
         internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
-        held: likewise, of an integral over past states (`PastStates`) at the fields as they are.
-        start: the process time there (`Constant`).
-        cells, own_cells: in which it is, ghosts included, and this rank's own.
-        places: of the quadrature points of the energy in the reference cell, shape (q, dimension).
+        held: {name: `Function` of a quadrature element} of an integral over past states at the present fields
+            (`IntegralLaw.coefficients`).
+        start: the process time at the beginning of the step (`Constant`).
+        cells, own_cells: local numbers of its cells, with ghosts, and the locally owned ones.
+        places: quadrature points of the energy in the reference cell, shape (q, dimension).
     """
 
     def __init__(self, forms: Any, material: Any, names: list[str]):
@@ -61,7 +62,7 @@ class MaterialTerms:
 
     @property
     def remembers(self) -> bool:
-        """True if its stress depends on more than the deformation."""
+        """True if the stress of the material depends on more than the deformation."""
         return bool(self.internal or self.held)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
@@ -94,9 +95,9 @@ class MaterialTerms:
         Raises:
             InputError: a constant has no finite value at a temperature.
         """
-        there = [self.forms.temperatures(self)] if self._followed else []
+        temperatures = [self.forms.temperatures(self)] if self._followed else []
         for followed in self._followed:
-            followed.take(there)
+            followed.take(temperatures)
 
     def of_mesh(self, expression: Any) -> Any:
         """Return a UFL scalar of the scene's mesh, where the fields live on it."""

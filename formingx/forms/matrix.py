@@ -17,7 +17,7 @@ from .. import _compat
 
 
 class ExtendedMatrix:
-    """Created once, refilled for every tangent.
+    """Sparse matrix of tangent and constraints, created once and refilled for every tangent.
 
     Args:
         form: compiled bilinear form of K; index_map: of its space (block size 1); bcs, rows: see `hold`; later
@@ -42,10 +42,12 @@ class ExtendedMatrix:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     def hold(self, bcs: list, rows: list[np.ndarray]) -> None:
-        """Constrain these unknowns from now on.
+        """Set the constraints of the tangents from now on.
 
-        bcs: held unknowns (their rows and columns become unit vectors); rows: of C, each the owned part,
-        shape (n,); one that is 0 on all ranks leaves its multiplier alone, as unknowns held are.
+        Args:
+            bcs: constrained unknowns; their rows and columns become unit vectors.
+            rows: rows of C, locally owned entries, shape (n,) each. If a row is 0 on all ranks, row and column of its
+                multiplier become unit vectors too.
         """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
         self._held = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
@@ -59,7 +61,7 @@ class ExtendedMatrix:
                                   np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
-        """Return the matrix at the state that the form's functions hold now.
+        """Return the matrix at the present values of the form's functions.
 
         blocks: (local dofs (n, m), ghosts too, values (n, m, m)) to be added to K; dofs of a block must share a cell.
         """
@@ -87,12 +89,12 @@ class ExtendedMatrix:
         plain.assemble()
         indptr, indices, _ = plain.getValuesCSR()
         plain.destroy()
-        there = [np.flatnonzero(row) for row in rows]        # the multipliers' columns come after all others
-        more = np.concatenate([np.full(len(i), self._first + k) for k, i in enumerate(there)]) if rows else []
-        at = np.concatenate(there) if rows else np.zeros(0, dtype=int)
-        order = np.lexsort((more, at)) if rows else at
-        columns = np.insert(indices, indptr[1:][at[order]], np.asarray(more, dtype=indices.dtype)[order])
-        lengths = np.diff(indptr) + np.bincount(at, minlength=len(indptr) - 1)
+        entries = [np.flatnonzero(row) for row in rows]      # the multipliers' columns come after all others
+        added = np.concatenate([np.full(len(i), self._first + k) for k, i in enumerate(entries)]) if rows else []
+        places = np.concatenate(entries) if rows else np.zeros(0, dtype=int)
+        order = np.lexsort((added, places)) if rows else places
+        columns = np.insert(indices, indptr[1:][places[order]], np.asarray(added, dtype=indices.dtype)[order])
+        lengths = np.diff(indptr) + np.bincount(places, minlength=len(indptr) - 1)
         if self._last_rank:
             tail = self._first + np.arange(m)
             parts = [np.concatenate([np.sort(everyone), tail]) for _, _, everyone, _ in self._entries]

@@ -3,8 +3,8 @@
 With the meridional stretch l1 = |dx/dS| and the hoop stretch l2 (r/R, or 1 in plane strain), the energy per reference
 area of the mid-surface is the sum over the layers of h W(l1, l2, 1/(l1 l2)): the volume is kept exactly, and no
 pressure is needed. The follower pressure acts on the mid-surface. A flat membrane without stretch has no stiffness
-normal to itself: its pressure grows with the cube of the pole height. So a path leaves rest along the deflection that
-the membrane has under a vanishing tension, at no pressure; every state on it is a solution of the unchanged equations.
+normal to itself: its pressure grows with the cube of the pole height. So a path leaves the reference configuration
+along the deflection of the membrane under a vanishing tension. Every state on the path solves the unchanged equations.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class MidSurface(Formulation):
                          f" only")
 
     def constraints(self, support: Any) -> list[Any]:
-        """Return a mean over an end is the value at its point; a membrane is held at its ends only."""
+        """Return the constraints of a support at an end; a mean over an end becomes the value at its point."""
         held = [Held(c.component, on=c.on) if not isinstance(c, Held) else c for c in support.constraints()]
         for item in held:
             if item.on is not None and item.on not in self.mesh.boundaries:
@@ -71,12 +71,12 @@ class MidSurface(Formulation):
         return held
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Points of the mid-surface at the same R, shape (n, 2)."""
+        """Return the points of the mid-surface at the same R, shape (n, 2)."""
         R = np.asarray(points, dtype=float)[:, 0]
         return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
 
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Halfway between the faces of the layer."""
+        """Return Z halfway between the faces of the layer, shape (n,); Z of the argument is not used."""
         low, high = self._ends[layer]
         return np.interp(R, self._R, (low + high) / 2)
 

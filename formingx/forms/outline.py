@@ -1,4 +1,4 @@
-"""The boundary of a solid body where it is now: curved edges, all ranks'."""
+"""Boundary of a deformed solid body: curved edges of all ranks."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Outline:
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def around(self, caller: str) -> list[int]:
-        """Numbers of the edges one after the other round the body; an InputError if it has holes, or several parts."""
+        """Return the edges in order round the body, by number; raise an InputError for a hole or several parts."""
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):
@@ -79,10 +79,9 @@ class Outline:
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
     def fold(self, edges: np.ndarray) -> np.ndarray | None:
-        """Return a place where the boundary goes through itself, of `edges()`, shape (2,), length; None if it does
-        nowhere.
+        """Return a point where the deformed edges (`edges`) cross, shape (2,), length; None if they cross nowhere.
 
-        Not in a crease: of edges that have a neighbour in common, where an element bends over a sharp edge.
+        Edges that have a neighbour in common do not count: an element that bends over a sharp edge makes a crease.
         """
         if crossing(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
@@ -93,7 +92,7 @@ class Outline:
         return None
 
     def _near(self, i: int, j: int) -> bool:
-        """Return True if two edges are the same, neighbours, or neighbours of one."""
+        """Return True if two edges are the same or neighbours, or have a neighbour in common."""
         around = np.isin(self.ends, self.ends[i]).any(1)
         return bool(np.isin(self.ends[around], self.ends[j]).any())
 

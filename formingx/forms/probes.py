@@ -52,7 +52,7 @@ class Probe:
         return self._read()
 
     def displacement_in(self, state: Any) -> np.ndarray:
-        """`displacement` in a state: of its unknowns alone, so nothing else is set for it; collective."""
+        """Return `displacement` in a state; the fields of the forms are restored afterwards; collective."""
         w = self._problem.forms.w.x.array
         before = w.copy()
         try:
@@ -74,7 +74,7 @@ class Probe:
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """c with c . x = sum over points and components of factors (n, c) times u over length; owned unknowns."""
+        """Return the row with row . x = sum of factors, shape (n, components), times u over length; owned unknowns."""
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -101,7 +101,7 @@ class Probe:
 
 
 class MidSurfaceProbe(Probe):
-    """The same on a membrane: points off the mid-surface move with it, their distance changes as the thickness."""
+    """A `Probe` on a membrane: points off the mid-surface move with it, and their distance changes as the thickness."""
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
@@ -139,7 +139,7 @@ class MidSurfaceProbe(Probe):
         self._tangent = np.where(self._meet[:, None], both / self._shorter, self._tangent)
 
     def _at_ends(self, values: np.ndarray) -> np.ndarray:
-        """Means of values on both sides of points where elements meet, of all points, shape (n, 2), all ranks."""
+        """Return the means of values on both sides of the points where elements meet, shape (n, 2), all ranks."""
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
@@ -152,11 +152,12 @@ class MidSurfaceProbe(Probe):
     def row(self, factors: np.ndarray) -> np.ndarray:
         """See `Probe.row`; only points of the mid-surface."""
         middle = self._problem.forms.nearest(self.points)
-        off = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
-        if np.any(off):
-            r, z = self.points[np.argmax(off)]
+        outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
+        if np.any(outside):
+            r, z = self.points[np.argmax(outside)]
             raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no"
-                             f" other: there it is ({middle[np.argmax(off)][0]:.6g}, {middle[np.argmax(off)][1]:.6g})")
+                             f" other: there it is ({middle[np.argmax(outside)][0]:.6g},"
+                             f" {middle[np.argmax(outside)][1]:.6g})")
         return super().row(factors)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -192,5 +193,5 @@ def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
 
 
 def probe(problem: Any, points: Any) -> Probe:
-    """Displacement at fixed reference points (see `Probe`), for every model of the body."""
+    """Return the `Probe` of the displacement at fixed reference points, for every model of the body."""
     return problem.forms.probe(problem, points)

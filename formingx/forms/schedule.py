@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Setting:
-    """amplitude = base + rate * control of every item of a scene (`Scene.things`), dimensionless; last, process time.
+    """amplitude = base + rate * control of every item of a scene (`Scene.items`), dimensionless; last, process time.
 
     Attributes:
         base, rate: one number for each item (0 unless it can be controlled), then the process time.
@@ -17,7 +17,7 @@ class Setting:
         fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
         changed: numbers of the items that leave or come in while it fades.
-        mesh: how often the mesh was made again before (`formingx.extensions.remeshing.remeshing`).
+        mesh: number of remeshings before (`formingx.extensions.remeshing.remeshing`).
     """
 
     base: list[float]
@@ -31,7 +31,7 @@ class Setting:
 
     @classmethod
     def first(cls, scene: Any) -> Setting:
-        """Everything at 0 and there; the controlled quantity, if it is one item, is the control."""
+        """Return the setting of the unloaded scene with all its items; a single controlled item follows the control."""
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
@@ -52,14 +52,14 @@ class Setting:
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:
-        """Return the part of a load's amplitude that acts: none of one that takes no part, all once the change did."""
-        there = float(number not in self.off)
+        """Return the active part of a load's amplitude: 0 if the load is inactive; it fades in or out in a change."""
+        share = float(number not in self.off)
         if self.fading and number in self.changed:
-            there = control if there else 1 - control
-        return there * self.amplitude(number, control)
+            share = control if share else 1 - control
+        return share * self.amplitude(number, control)
 
     def standing(self, control: float) -> list[float]:
-        """Amplitudes at a control, of the items and the time."""
+        """Return the amplitudes of the items and the process time at a control."""
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:

@@ -16,7 +16,7 @@ from .formulation import Formulation
 from .material_terms import MaterialTerms
 
 _THIN = 5e-4  # volume over length^3 (a disc of r0/h0 = 6000) below which the bending stiffness is round-off
-_FIRST_STRETCH = 1e-4      # at which the first direction of a path is taken
+_FIRST_STRETCH = 1e-4      # u = _FIRST_STRETCH X, at which the first direction of a path is taken
 
 
 class Solid(Formulation):
@@ -79,7 +79,7 @@ class Solid(Formulation):
         return found
 
     def set_stiff(self) -> None:
-        """Rest; of a sheet so thin that its bending stiffness is lost to round-off, a small stretch in all directions.
+        """Set `w` to 0; of a sheet whose bending stiffness is lost to round-off, to a small stretch in all directions.
 
         u = s X: the stress stiffens it as a membrane. (Interpolated: unknowns of bubbles are no nodal values.)
         """

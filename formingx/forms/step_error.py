@@ -3,7 +3,7 @@
 The history variables of materials are advanced once more, in two halves, along the displacements that the states
 before and the new one make likely, at the temperatures that the step has led to. The resulting stress at the end is
 compared with the stress of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point,
-at a given deformation, so nothing is solved for. Nothing need be known of a material but its step.
+at a given deformation, so nothing is solved for. Of a material only its step is used.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mpi4py import MPI
 from .. import _compat
 
 _AT_REST = 1e-6
-"""Stress, over the largest modulus, that counts as none."""
+"""Stress over the largest modulus that counts as zero."""
 
 _SYSTEMATIC = 4.0
 """Weight of an error that has the same sign in every step, as that of a backward difference has: such errors add up
@@ -46,13 +46,14 @@ class StepError:
                          if entry.remembers and entry.equilibrium_energy(forms.elastic_F) is not None]
 
     def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        """(error of the stress at the end of a step, the rest of it after another step as long), relative.
+        """Return (error of the stress at the end of a step, its part that is left after another step of this length).
 
-        Root mean squares over the body. The rest adds up from step to step; relaxed parts do not.
+        Relative root mean squares over the body. The part that is left adds up from step to step.
 
         Args:
-            past: states before, the last of which the step begins at; its end is (x, control).
-            share: of each of them, and of the new one, in the displacements half-way in time.
+            past: k accepted states; the step begins at the last of them.
+            share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
+            x, control: the state at the end of the step, locally owned entries.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
@@ -94,7 +95,7 @@ class StepError:
         return [stress.values() for stress in self._stresses]
 
     def _held(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """`_at`, of a body that has reach equilibrium."""
+        """Return the stresses as `_at` does, of a body whose deformation was constant before."""
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)
@@ -125,7 +126,7 @@ class _Stress:
         self._expression = _compat.compile_expression(ufl.as_vector(entries), terms.places)
 
     def values(self) -> np.ndarray:
-        """Shape (points, 4), own cells."""
+        """Return the entries 11, 22, sqrt(2) 12, 33 in locally owned cells, shape (points, 4), stress."""
         if not len(self._cells):
             return np.zeros((0, 4))
         return self._expression.eval(self._forms.domain, self._cells).reshape(-1, 4)

@@ -12,10 +12,10 @@ from .matrix import ExtendedMatrix
 
 
 class Tangent:
-    """dF/dx and dF/dcontrol of forms and the constraints of supports; made when first asked for: a neighbour has none.
+    """dF/dx and dF/dcontrol of the forms and the constraints of supports.
 
     Args:
-        forms: the `Formulation`; symmetric: dF/dx is.
+        forms: the `Formulation`. constraints: of its scene. symmetric: True if dF/dx is symmetric.
 
     Attributes:
         matrix: an `ExtendedMatrix`.
@@ -35,7 +35,7 @@ class Tangent:
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], anew: bool) -> None:
-        """Take a stage: the `Active` that it holds, anew if that changes, and the rates of items by the control."""
+        """Set the active constraints of a stage (anew: they have changed) and the rates of items by the control."""
         if anew:
             self.matrix.hold(active.bcs, active.rows)
         if self._lift is not None:

@@ -15,8 +15,9 @@ class Temperature:
         given: temperature of the scene.
 
     Attributes:
-        T: the DOLFINx `Function` (P2) of its values. Who changes it calls `take_temperature` of the `Problem`.
-        before: values at an earlier time, ghosts included, or None; time, time_before: of the values and of those.
+        T: the DOLFINx `Function` (P2) of its values. After a change call `take_temperature` of the `Problem`.
+        before: values at an earlier time, ghosts included, or None.
+        time, time_before: process times of `T` and of `before`.
         limits: lowest and highest temperature that there can be. Next to a face that is chilled at once quadratic
             elements overshoot: the part beyond is cut off where temperatures are read.
     """
@@ -35,14 +36,14 @@ class Temperature:
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Temperatures at reference points, shape (n, 2), of this rank's own choice, shape (n,); collective."""
+        """Return the temperatures, shape (n,), at reference points that each rank chooses, shape (n, 2); collective."""
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
     def nodes(self, points: np.ndarray) -> np.ndarray:
-        """Local numbers of the nodes of T that lie at points of this rank's cells, shape (..., 2), shape (...)."""
+        """Return the local numbers, shape (...), of the nodes of T at points of this rank's cells, shape (..., 2)."""
         from scipy.spatial import cKDTree
         return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
-        """Temperatures at nodes of T, by their local numbers, of any shape; within `limits`, as the exact ones."""
+        """Return the temperatures at nodes of T, by their local numbers, of any shape; cut off at `limits`."""
         return np.clip(self.T.x.array[nodes], *self.limits)

@@ -1,4 +1,4 @@
-"""A viscous stress in a body that moves from one place to another: P = eta dF, for all of the body alike."""
+"""Viscous stress in a body that moves to another equilibrium: P = eta dF, with one eta for the whole body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .. import _compat
 
 
 class Viscosity:
-    """Nodal forces eta V dx by a change dx of the unknowns; none by unknowns that are held, nor on them.
+    """Nodal forces eta V dx by a change dx of the unknowns; constrained unknowns neither cause nor receive any.
 
     Args:
         form: compiled bilinear form of V; bcs: the constraints.

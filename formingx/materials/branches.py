@@ -14,23 +14,23 @@ from ..errors import ConvergenceError, InputError, known
 from .homogeneous import MODES
 
 BETWEEN = ("stretch", "strain")
-"""What grows at a constant rate between two times: the stretch, or the logarithmic strain (a constant Hencky rate)."""
+"""Quantity with a constant rate between two times: the stretch, or the logarithmic strain (a constant Hencky rate)."""
 
 
 def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stretches: np.ndarray,
                     between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
-    """w_i of every branch at every time, shape (n, branches, 3).
+    """Return w_i of every branch at every time, shape (n, branches, 3).
 
     Args:
         flow: f, called with w of shape (branches, 3).
         tau: relaxation times, shape (branches,).
         mode: a test of `homogeneous.MODES`.
-        times, stretches: shape (n,). At rest before; a change of the stretch without one of the time is a jump.
+        times, stretches: shape (n,). The first stretch is put on at once; a second stretch at the same time is a jump.
         between: one of `BETWEEN`.
         accuracy: of a step in time, relative; a test keeps about a hundredfold of it.
 
     Raises:
-        ConvergenceError: the integration reached an end before.
+        ConvergenceError: the integration stopped before the last time.
     """
     from scipy.integrate import solve_ivp
     known("elastic_strains: mode", mode, MODES)
@@ -59,7 +59,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return (times, stretches) of a test as arrays of shape (n,), or an InputError that begins with `name`."""
+    """Return (times, stretches) of a test as arrays of shape (n,); raise an InputError that begins with `name`."""
     known(f"{name}: mode", mode, MODES)
     known(f"{name}: between", between, BETWEEN)
     try:

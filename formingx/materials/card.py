@@ -15,9 +15,9 @@ from .constants import OfTemperature
 from .homogeneous import MODES
 
 _MOST = 6.0
-"""Stretch to which curves are drawn where there is no limit before."""
+"""Largest stretch of the curves, if the material has no smaller limit."""
 _PART = 0.97
-"""Of a limit of the stretch, to which curves are drawn."""
+"""Largest stretch of the curves over the limit of the stretch."""
 
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
@@ -42,13 +42,13 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
 
 
 def _shift(material: Any, temperature: float) -> float:
-    """aT there: a rate there is as this many times itself at the reference."""
+    """Return aT at a temperature: a rate acts there as aT times the rate at the reference temperature."""
     law = material.parameters.get("aT")
     return float(law(temperature)) if isinstance(law, OfTemperature) else 1.0
 
 
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
-    """Return (what, value) at one temperature."""
+    """Return the rows (quantity, value) of the card at one temperature."""
     def said(value: float, of: str = "") -> str:
         return f"{value:.4g} {of}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []

@@ -22,8 +22,12 @@ from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 class Sample(NamedTuple):
     """Sample of the body for the check of constants: points of the locally owned cells of a layer.
 
-    points: reference (R, Z), shape (m q, 2), length; cells: their numbers, shape (m,); places: of the q points in the
-    reference cell, shape (q, 2); domain: the `dolfinx.mesh.Mesh`; temperature: there, shape (m q,), None: not given.
+    Attributes:
+        points: reference positions (R, Z), shape (m q, 2), length.
+        cells: local numbers of the cells, shape (m,).
+        places: positions of the q points in the reference cell, shape (q, 2).
+        domain: the `dolfinx.mesh.Mesh`.
+        temperature: temperatures at the points, shape (m q,); None: not given.
     """
 
     points: np.ndarray
@@ -49,7 +53,7 @@ class Varying(ABC):
         """Return the constant in a form (UFL scalar).
 
         Args:
-            fields: its possible arguments: `fields.X`, the reference position (UFL, shape (2,)), and
+            fields: possible arguments of the constant: `fields.X`, the reference position (UFL, shape (2,)), and
                 `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients that hold f(R, Z) and f(T) at the
                 quadrature points of the energy; the latter follows the temperature when that changes.
         """
@@ -105,7 +109,7 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
     """Return a modulus in proportion to the absolute temperature, as of a network of flexible chains (Treloar 1975).
 
     Args:
-        value: at the temperature `reference`. unit: of temperatures, "C" or "K".
+        value: modulus at the temperature `reference`. unit: unit of temperatures, "C" or "K".
 
     >>> modulus = fx.entropic(1.0, 20.0, unit="C")
     >>> float(modulus(313.15).round(6))

@@ -179,7 +179,7 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """First, and first and second derivatives of an energy of `_STRETCHES` and n of `_CONSTANTS`; of one once."""
+    """Return programs of the first and of all derivatives of an energy by `_STRETCHES`, for n of `_CONSTANTS`."""
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))
     first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]

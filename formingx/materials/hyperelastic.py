@@ -177,8 +177,8 @@ class ArrudaBoyce(Material):
     less its value at s = 1/N.
 
     Args:
-        mu: n k T, stress, greater than 0. The shear modulus in the reference configuration is larger: mu (1 + 3/(5
-            N) + ...).
+        mu: n k T, stress, greater than 0. The shear modulus in the reference configuration is larger:
+            mu (1 + 3/(5 N) + ...).
         N: segments in a chain, greater than 1: I1 stays below 3 N. In uniaxial tension the largest stretch is about
             sqrt(3 N).
 
@@ -262,7 +262,7 @@ class Ogden(Material):
 
     @classmethod
     def guesses(cls, modulus, I1, terms):
-        """Every choice of this number of exponents out of six."""
+        """Return a material for every choice of `terms` exponents out of six."""
         exponents = (1.3, 2, 5, 10, -2, -5)
         n = count("fit: terms", 3 if terms is None else terms)
         if n > len(exponents):
@@ -282,9 +282,9 @@ class Hyperelastic(Material):
     """Any energy, written as a function of the invariants or of F.
 
     Args:
-        energy: called as `energy(I1, I2, **constants)` or `energy(F, **constants)`; returns a UFL scalar. Where it must
-            not be used it should be infinite or not a number, with its derivatives: a step that gets there is halved.
-        of: "invariants" or "F" (shape (3, 3)).
+        energy: called as `energy(I1, I2, **constants)` or `energy(F, **constants)`; returns a UFL scalar. Outside its
+            range it and its derivatives should be infinite or not a number: a step that leaves the range is halved.
+        of: argument of the energy, "invariants" or "F" (shape (3, 3)).
         constants: the energy's named constants. Exponents and the like may be among them.
 
     Example: ``Hyperelastic(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3)**2, c1=0.2, c2=0.01)``
@@ -322,7 +322,7 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """ln x, not a number where x < 0, and so are its derivatives (the derivatives of ln x itself are finite there)."""
+    """Return ln x, not a number for x < 0 with its derivatives. (The derivatives of ln x itself are finite there.)"""
     return 2 * ufl.ln(ufl.sqrt(x))
 
 

@@ -12,7 +12,7 @@ from .material import Material
 
 
 def checked_shift(name: str, shift: Any) -> Callable:
-    """Return a law by which relaxation times depend on the temperature, or an InputError."""
+    """Return a law of relaxation times over temperature; raise an InputError if it is no function."""
     if not callable(shift):
         raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
     return shift
@@ -31,12 +31,12 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
 
 
 class Relaxing(Material):
-    """A material that relaxes to an equilibrium; tests of it are by `stress(mode, stretches, times=, between=)`.
+    """A material that relaxes to an equilibrium; `stress(mode, stretches, times=, between=)` computes its tests.
 
     Args:
         equilibrium: the material, without a history, that is left when all has relaxed, or None.
 
-    Subclasses add their own constants to `parameters` and check, and give `_modulus`.
+    Subclasses add their own constants to `parameters`, call `check`, and define `_modulus`.
     """
 
     stress: Any
@@ -52,11 +52,11 @@ class Relaxing(Material):
         self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
 
     def _modulus(self, times: Any) -> np.ndarray:
-        """G(t) without the equilibrium's, stress."""
+        """Return G(t) without the modulus of the equilibrium, stress."""
         raise NotImplementedError
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
-        """G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
+        """Return G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
         rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
         return rest + self._modulus(finite_array("relaxation_modulus: times", times))
 
@@ -89,7 +89,7 @@ class Relaxing(Material):
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
-        """Nominal stress of the equilibrium."""
+        """Return the nominal stress of the equilibrium material, stress."""
         return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     @property
@@ -102,7 +102,7 @@ class Relaxing(Material):
         return rest
 
     def relaxation(self, mode: str, stretch: float, times: ArrayLike) -> np.ndarray:
-        """Nominal stress at times (any shape, at least 0) after a stretch was put on at once, and held; stress."""
+        """Return the nominal stress at times (any shape, at least 0) after a sudden stretch that stays constant."""
         t = np.asarray(times, float)
         if not np.all(t >= 0):
             raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
@@ -111,10 +111,10 @@ class Relaxing(Material):
         return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
 
     def constant_rate(self, mode: str, rate: float, stretches: ArrayLike) -> np.ndarray:
-        """Nominal stress at stretches, shape (n,), all above or all below 1, met at a constant Hencky rate; stress.
+        """Return the nominal stress at stretches, shape (n,), all above or all below 1, at a constant Hencky rate.
 
         Args:
-            rate: of the logarithmic strain in the direction pulled, 1/time, above 0 (pushed: of its size).
+            rate: absolute value of the rate of the logarithmic strain in the loaded direction, 1/time, above 0.
         """
         rate = positive(f"{self}: constant_rate: rate", rate)
         t = np.abs(np.log(np.asarray(stretches, float))) / rate

@@ -1,6 +1,7 @@
 """Thin bodies of one or more layers that are inflated freely: the pressure that they bear at a stretch.
 
-Membrane theory of shapes that keep their kind. The layers share the stretches, so their forces add up.
+Membrane theory: a tube stays a tube, a disc becomes a cap of a sphere. The layers have the same stretches, so their
+forces add up.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,11 +12,11 @@ import numpy as np
 from .homogeneous import along
 from .material import Material
 
-_HALVINGS = 60             # of a stretch: to round-off
+_HALVINGS = 60             # bisections of a stretch, down to round-off
 
 
 class Peak(NamedTuple):
-    """The first maximum of the pressure: where (a stretch), and the pressure."""
+    """The first maximum of the pressure: the stretch, and the pressure, stress."""
 
     stretch: float
     pressure: float
@@ -25,8 +26,8 @@ class Inflated:
     """A thin body, inflated freely.
 
     Args:
-        layers: (material, thickness in the reference configuration) of each; constants are numbers.
-        radius: in the reference configuration: of the tube's middle, or of the opening that a disc is held at.
+        layers: (material, thickness in the reference configuration, length) of each layer; all constants are numbers.
+        radius: mean radius of the tube, or radius of the opening that holds the disc, in the reference configuration.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):

@@ -1,10 +1,9 @@
 """Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
 
 A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
-which advance from one accepted state to the next. The isotropic stress of an energy of F
-in the reference configuration is removed where the energy is used: W(F) - rest_stress ln J. (On a thin sheet Newton's
-method takes half as many iterations with that form than with the isochoric part of F: see the notes on
-incompressibility.)
+which advance from one accepted state to the next. The isotropic stress of an energy of F in the reference
+configuration is removed where the energy is used: W(F) - rest_stress ln J. (On a thin sheet Newton's method takes half
+as many iterations with this form as with the isochoric part of F: see the notes on incompressibility.)
 """
 
 from __future__ import annotations
@@ -41,14 +40,14 @@ class Material:
         parameters: {name: constant}.
         internal: {name: value in the reference configuration}, a number or nested tuples, of the shape
             of the variable; of a quantity per quadrature point. Empty: no history.
-        of_motion: names of internal variables that tell how the body moved in the last step, for its rate in the next;
-            as in the reference configuration they tell nothing.
-        shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or as its inverse, of entries 11,
-            22, 12, 33: on another mesh the body as it is sees them as it did. (Others are carried as numbers.)
-        rate_dependent: False: its history follows the strain alone, as damage does, and time is nothing to it.
+        of_motion: names of internal variables that describe the motion in the last step, for the rate in the next; with
+            their values in the reference configuration they predict nothing.
+        shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or its inverse, with entries 11,
+            22, 12, 33: they are transferred to another mesh relative to the deformed body, all others as numbers.
+        rate_dependent: False if the history depends on the strain alone, as damage does, and not on the time.
         integral: the law of a stress that depends on all past states (`IntegralLaw`), or None.
-        stores_energy: True if `stored_energy` is one.
-        symmetric: True if its tangent is.
+        stores_energy: True if `stored_energy` is defined.
+        symmetric: True if the tangent is symmetric.
         tested: the tests that its constants come from (a `MeasuredRange`), or None: not known.
     """
 
@@ -76,7 +75,7 @@ class Material:
 
     @property
     def of_flow(self) -> tuple[str, ...]:
-        """Names of constants that say how fast something flows: of those a step takes the value in its middle."""
+        """Names of constants that set a rate of flow: a step uses their values at its middle."""
         return ()
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
@@ -100,12 +99,12 @@ class Material:
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
         """Return the largest principal elastic stretch of each relaxing branch, with the present internal variables.
 
-        UFL scalars; 1 when the branch has relaxed; the isochoric stretch of F before.
+        UFL scalars: 1 for a relaxed branch, the largest isochoric stretch of F before any relaxation.
         """
         return []
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the power per reference volume that is dissipated there, stress over time; 0 without a history."""
+        """Return the dissipated power per reference volume at F, stress over time; 0 without a history."""
         return ufl.as_ufl(0.0)
 
     def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
@@ -231,7 +230,7 @@ class Material:
         """Draw nominal stress against stretch of the three tests; returns the matplotlib axes.
 
         Args:
-            axes: where to draw; default a new figure.
+            axes: matplotlib axes; default a new figure.
             stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
             unit: the constants' unit of stress, for the label.
         """
@@ -248,9 +247,9 @@ class Material:
         """Write one HTML page on the response of the material and its limits; return its path.
 
         Args:
-            temperatures: needed where constants or times depend on it, in the unit that theirs are in.
+            temperatures: needed if constants or relaxation times depend on the temperature, in the unit of their laws.
             rates: Hencky rates of forming, 1/time, of a material that relaxes.
-            unit, unit_of_time: of the constants, for the labels.
+            unit, unit_of_time: units of stress and of time of the constants, for the labels.
 
         Raises:
             InputError: a constant depends on the position, or on a temperature that is not given.
@@ -264,7 +263,7 @@ class Material:
         reference configuration.
 
         Numbers of any type are kept as floats.
-        sample: where to look at constants that vary; None: only constants that do not vary are checked.
+        sample: points at which varying constants are checked; None: only constants that do not vary are checked.
         """
         self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
                            for name, value in self.parameters.items()}
@@ -346,5 +345,5 @@ class Material:
 
 
 def brief(value: Any) -> str:
-    """Return a constant for people: a number with six digits."""
+    """Return a constant as text: a number with six digits."""
     return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

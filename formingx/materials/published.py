@@ -14,7 +14,7 @@ class Published(NamedTuple):
     substance: the tested material.
     temperature: in degrees Celsius, or None: not stated by the source.
     rate: of the tests, as text. mode: the tests that the constants come from, as text.
-    source: who published the constants, and where they are quoted from if not from there.
+    source: who published the constants, and the work that quotes them if they are quoted.
     """
 
     material: Material
@@ -45,7 +45,7 @@ def register_published(constants: Callable[[], dict[str, Published]]) -> Callabl
 
 
 def published() -> dict[str, Published]:
-    """{name: constants that can be cited}, in MPa, of melts in Pa and s.
+    """Return {name: constants that can be cited}, in MPa; for melts in Pa and s.
 
     They hold for the stretches, temperatures and rates of their tests, which are given as far as the source states
     them. Quoted ones were not read in the original. Test data to fit to: `treloar1944`.
@@ -76,6 +76,6 @@ def published() -> dict[str, Published]:
             MooneyRivlin(c10=25.11 * _PSI, c01=0.581 * _PSI), "MPa", "sheet of natural rubber, room temperature", None,
             _NOT_STATED, _NOT_STATED, _THRONE),
     }
-    for more in _MORE:
-        found |= more()
+    for constants in _MORE:
+        found |= constants()
     return found

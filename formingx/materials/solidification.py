@@ -1,4 +1,4 @@
-"""A material that sets: as it cools a glassy network is born, free of stress in the shape that the body has then."""
+"""A material that solidifies: as it cools a glassy network forms, free of stress in the shape of the body then."""
 
 import copy
 from typing import Any
@@ -23,8 +23,8 @@ class Solidification(Material):
         W = W_base + (G/2) [tr(C A) - 3 phi],   dA = C^-1 dphi as phi grows,   A in proportion to phi as it falls,
 
     the single-integral network with birth by temperature (Green and Tobolsky, J. Chem. Phys. 14 (1946) 80, with no
-    relaxation time). A stiffness that merely rises with falling temperature pulls a formed part back to where it came
-    from; the solidified part here keeps its shape, but for the small strain at which it bears what the base pulls with.
+    relaxation time). A modulus that only rises as the temperature falls pulls a formed part back to its reference
+    configuration. Solidified material keeps its shape, but for the small strain at which it balances the base.
     The scene needs a temperature, and `heat=Cooling(...)` for it to change.
 
     Args:
@@ -74,11 +74,10 @@ class Solidification(Material):
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
-        """See `Material`: the terms of the base; C of the last two states, A, and phi of the former, which A stands
-        for.
+        """See `Material`: the variables of the base, C of the last two states, A, and the fraction phi that A includes.
 
-        The part that solidifies in a step is known when the temperature at its end is: then, at the beginning of the
-        next, A takes it.
+        A includes the part that solidifies in a step from the beginning of the next step on, when the temperature at
+        its end is known.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
@@ -109,8 +108,8 @@ class Solidification(Material):
             + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """See `Material`. The part that solidifies in the step is born half in the shape at its beginning, half in
-        that at its end."""
+        """See `Material`. Half of the part that solidifies in the step is free of stress in the shape at its beginning,
+        half in the shape at its end."""
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2
         M = plus(tuple(_left(begin, end) * a for a in A), cofactor(entries(internal[_LAST])), born)
@@ -161,7 +160,7 @@ class Solidification(Material):
 
 
 class _Fraction:
-    """phi(T): a table that stays as it is beyond its ends, or linear between two temperatures."""
+    """phi(T): a table, constant beyond its ends, or linear between two temperatures."""
 
     def __init__(self, low: float, high: float, table: Table | None = None):
         self._low, self._high, self._table = low, high, table
@@ -190,5 +189,5 @@ def _fraction(between: Any, table: Any) -> _Fraction:
 
 
 def _left(before: Any, after: Any) -> Any:
-    """Part of the glass that is left when the fraction that has set falls; 1 when it grows."""
+    """Return the part of the glass that is left when the solidified fraction falls; 1 when it grows."""
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

@@ -9,7 +9,7 @@ IDENTITY = (1.0, 1.0, 0.0, 1.0)
 
 
 def isochoric(F: Any) -> Entries:
-    """Entries of J^(-2/3) F^T F."""
+    """Return the entries of J^(-2/3) F^T F."""
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
 
@@ -20,12 +20,12 @@ def entries(vector: Any) -> Entries:
 
 
 def plus(A: Entries, B: Entries, factor: Any) -> Entries:
-    """Return a + factor B."""
+    """Return A + factor B."""
     return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
 
 
 def inner(A: Entries, B: Entries) -> Any:
-    """Return a : B."""
+    """Return A : B."""
     return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
 
 
@@ -35,7 +35,7 @@ def determinant(A: Entries) -> Any:
 
 
 def cofactor(A: Entries) -> Entries:
-    """Return the inverse, where the determinant is 1."""
+    """Return the cofactor of A: its inverse, if its determinant is 1."""
     return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
 
 

@@ -31,8 +31,8 @@ from .tensors import IDENTITY, Entries, cofactor, determinant, deviator_squared,
 class RelaxingMaterial(Relaxing):
     """An equilibrium energy and relaxing branches, for any law of the branches.
 
-    The constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2, ... As a material without time
-    (`strain_energy`, `shear_modulus`, `stress` without times) it is the instantaneous response: nothing has flowed.
+    It has the constants of the equilibrium energy, then mu_1, tau_1, mu_2, ... Without times, `strain_energy`,
+    `shear_modulus` and `stress` give the instantaneous response, before any relaxation.
 
     Args:
         equilibrium: the material that is left when all has relaxed, or None.
@@ -126,7 +126,7 @@ class RelaxingMaterial(Relaxing):
         Args:
             F: deformation gradient at the end, shape (3, 3).
             internal: {name: its entries, shape (4,)}, names as in `internal`.
-            time_step: of the user's unit of time, at least 0.
+            time_step: length of the step, time, at least 0.
         """
         C = isochoric(F)
         past = self._past(internal, time_step)
@@ -137,7 +137,7 @@ class RelaxingMaterial(Relaxing):
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
         """{name: its entries, shape (4,)} at the end of a step; arguments as of `step_energy`.
 
-        To be called after steps of length 0, too: the next step begins with the C that is remembered.
+        It must be called after steps of length 0 too: the next step begins with the stored C.
         """
         C = isochoric(F)
         past, after = self._past(internal, time_step), self._left(C, internal, time_step)
@@ -183,7 +183,7 @@ class RelaxingMaterial(Relaxing):
         """Draw nominal stress against stretch at constant Hencky rates, at once and relaxed; returns the axes.
 
         Args:
-            axes, stretches, unit: as of any material; the stretches all above 1.
+            axes, stretches, unit: as in `Material.plot`; all stretches above 1.
             mode: the test.
             rates: 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
         """
@@ -216,17 +216,17 @@ class RelaxingMaterial(Relaxing):
         return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
 
     def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
-        """Return (number, mu, tau) of every branch."""
+        """Yield (number, mu, tau) of every branch."""
         k = 0
         while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the data of the states before that the branches of a step need, for any tau."""
+        """Return the data of earlier states that a step of the branches needs, independent of tau."""
         return entries(internal["C"]) if self._remembers else None
 
     def _left(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
-        """Return the data of this step for the branches of the next one."""
+        """Return the history variables of this step that the next one needs besides the states of the branches."""
         return {"C": C} if self._remembers else {}
 
     # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
@@ -313,7 +313,7 @@ class Viscoelastic(RelaxingMaterial):
         return tuple(scale * g for g in grown)
 
     def _start(self, before, Cv, x):
-        """G and x'."""
+        """Return G and x'."""
         if before is None:
             return Cv, x
         return plus(Cv, before, x / 2), x / 2 * (1 + x / 3 * inner(before, cofactor(Cv)))
@@ -325,19 +325,19 @@ class Viscoelastic(RelaxingMaterial):
 
 
 class TransientNetwork(RelaxingMaterial):
-    """Networks whose chains break and form again in the reference configuration: Green and Tobolsky (1946), the
-    upper-convected Maxwell law.
+    """Networks whose chains break and form again free of stress: Green and Tobolsky (1946), the upper-convected
+    Maxwell law.
 
-    Kirchhoff stress of a branch mu F A F^T (and a pressure), dA/dt = (C^-1 - A)/tau, A = I in the reference
-    configuration. Linear in the
-    memory: in steady extension faster than 1/(2 tau) the stress grows without bound.
+    The Kirchhoff stress of a branch is mu F A F^T (and a pressure), with dA/dt = (C^-1 - A)/tau and A = I in the
+    reference configuration. The law is linear in C^-1: in steady extension faster than 1/(2 tau) the stress grows
+    without bound.
 
-    A step is exact where C^-1 goes along a parabola in time, through its value at the end of the step and the two
-    known before. So it is of third order, and of second however short tau is: for dt >> tau the stress follows the rate
+    A step is exact if C^-1 is a parabola in time, through its value at the end of the step and the two values known
+    before. So it is of third order, and of second however short tau is: for dt >> tau the stress follows the rate
     at the end of the step, by the backward difference of three points (BDF2 with variable steps). With x = dt/tau
     the step has the potential (mu/2) tr(C M), A = M + (1 - m - p) C^-1, m = (1 - e^-x)/x, M = e^-x A_n
-    + (m - e^-x + p) C_n^-1 + p s (C_n^-1 - C_n-1^-1), p = [x - 2 + (x + 2) e^-x]/x^2 s/(1 + s), s the length of the
-    step over that of the one before. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
+    + (m - e^-x + p) C_n^-1 + p s (C_n^-1 - C_n-1^-1), p = [x - 2 + (x + 2) e^-x]/x^2 s/(1 + s), where s is the length
+    of the step over the length of the step before. The stored energy is (mu/2) [tr(C A) - 3 - ln det A].
 
     >>> fx.TransientNetwork(None, branches=[(0.05, 1.0)]).shear_modulus
     0.05
@@ -351,7 +351,10 @@ class TransientNetwork(RelaxingMaterial):
         return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
 
     def _past(self, internal, time_step):
-        """(C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)), the latter two 0 where the step before says nothing."""
+        """Return (C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)), see the class.
+
+        The last two are 0 if the motion before is unknown; the last is reduced where BDF2 would be unstable.
+        """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow by more leave BDF2 unstable
         small = ufl.lt(-inner(entries(internal["C"]), change), 1)       # else M is not positive definite
@@ -379,7 +382,7 @@ class TransientNetwork(RelaxingMaterial):
         return plus(self._kept(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _bulge(x))
 
     def _kept(self, past, A, x):
-        """M."""
+        """Return M."""
         before, change, share = past
         decay, p = ufl.exp(-x), share * _bulge(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
@@ -390,7 +393,7 @@ class TransientNetwork(RelaxingMaterial):
 
 
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
-    """aT(T) tau."""
+    """Return the relaxation time aT(T) tau."""
     shift, tau = checked_shift(name, shift), positive(name, tau)
     return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))
 

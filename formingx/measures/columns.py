@@ -12,7 +12,7 @@ from .relaxed import PoleStressRatio
 from .targets import Amplitude, Bound, OfWholePart, Sag, Target, bind_pole_height, bind_pole_stretch, bind_volume
 
 Measure = Target | Callable[[Any], float]
-"""What a user's own column records, see `formingx.trace`."""
+"""Quantity of a user's own column, see `formingx.trace`."""
 
 
 class _Recorded(Bound):
@@ -23,7 +23,7 @@ class _Recorded(Bound):
 
 
 class _Scalar(_Recorded):
-    """of(value of a scalar form)."""
+    """of(v), where v is the value of a scalar form."""
 
     def __init__(self, problem, form, of):
         self._problem, self._form, self._of = problem, problem.forms.compile(form), of
@@ -34,15 +34,15 @@ class _Scalar(_Recorded):
 
 
 class _Nodal(_Recorded):
-    """A number of every contact, put together by `over`."""
+    """over([0, of(contact), ...]) of the active contacts."""
 
     def __init__(self, problem, of, over, contacts=None):
         self._problem, self._of, self._over = problem, of, over
         self._contacts = problem.contacts if contacts is None else contacts
 
     def value(self, x, control):
-        there = [c for c in self._contacts if c in self._problem.present]
-        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in there)]))
+        active = [c for c in self._contacts if c in self._problem.present]
+        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in active)]))
 
 
 class _Reaction(_Recorded):
@@ -85,7 +85,7 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
     """Return the user's columns.
 
     Raises:
-        InputError: a name that is taken or no word, or a measure that is neither a target nor a function.
+        InputError: a name that is taken or not a word, or a column that is neither a target nor a function.
     """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")

@@ -19,12 +19,12 @@ def resisting(contact: Any) -> np.ndarray:
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
-    """Return the factor by which the force on a contact's tool as modelled is that on the whole tool."""
+    """Return the ratio of the force on the whole tool of a contact to the force on the part that is modelled."""
     return int(scene.symmetry.factor_of(contact.tool.bounds, resisting(contact)))
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the factor by which the force on a driven support as modelled is that on the whole support."""
+    """Return the ratio of the force on a whole driven support to the force on the part that is modelled."""
     (held,) = scene.kinematics.in_axes(support, support.constraints())
     nodes = scene.first.mesh.nodes_of(held.on)
     return int(scene.symmetry.factor_of(np.stack([nodes.min(0), nodes.max(0)]),
@@ -102,8 +102,8 @@ class _ToolForce(Bound):
         self._scale = self.size = forms.stress * forms.volume / forms.length
 
     def value(self, x, control):
-        there = [c for c in self._contacts if c.present]
-        return float(sum(resultants.force(contact, x.array_r, control) @ self._way for contact in there))
+        active = [c for c in self._contacts if c.present]
+        return float(sum(resultants.force(contact, x.array_r, control) @ self._way for contact in active))
 
     def equation(self, target):
         problem = self._problem

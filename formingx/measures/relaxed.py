@@ -12,14 +12,14 @@ from .. import _compat
 from ..mesh.nodes import own_cells
 
 _NONE = 1e-10
-"""A stress, over the shear modulus, that is none."""
+"""Stress over the shear modulus that counts as zero."""
 
 _STRAIN = 1e-6
-"""Equibiaxial strain that is added there: rest has the ratio of moduli."""
+"""Equibiaxial strain that is added where the stresses are zero: their ratio is then the ratio of the moduli."""
 
 
 class PoleStressRatio:
-    """The Mises stress at the pole over the one that is left at the same F when all has relaxed.
+    """Mises stress at the pole over the Mises stress in equilibrium, after all relaxation at the same F.
 
     Both are means over the reference volume of the elements that touch the axis, at their quadrature points, of
     sqrt(3/2) |dev(P F^T)|, P = dW/dF of the stored energy and of `Material.equilibrium_energy`. In the equibiaxial
@@ -57,7 +57,7 @@ class PoleStressRatio:
         return float(now / left)
 
     def _integrals(self) -> np.ndarray:
-        """Over the elements at the pole, all ranks: of both stresses, and of the scale of stresses."""
+        """Return the integrals over the elements at the pole of both stresses and of the largest modulus, all ranks."""
         totals = np.zeros(3)
         for expression, cells in self._parts:
             if len(cells):
@@ -99,8 +99,8 @@ class ElasticStretches:
             weights: Any
             at, weights = basix.make_quadrature(forms.domain.basix_cell(), problem.scene.quadrature_degree)
             root = np.sqrt(np.abs(weights))[:, None]
-            basis, there = (np.column_stack([np.ones(len(x)), x]) for x in (at, places))
-            self._to_places = there @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
+            basis, at_places = (np.column_stack([np.ones(len(x)), x]) for x in (at, places))
+            self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def now(self, cells: int) -> np.ndarray:
         """Return the stretches at the state of the forms in locally owned cells, shape (cells, n, branches); nan: no

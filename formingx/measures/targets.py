@@ -14,10 +14,10 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 
 
 class Bound:
-    """A measure of one problem: its value, and the equation measure = target for a run that aims at it.
+    """Output quantity of one problem: its value, and the equation quantity = target for a run with this target.
 
     Attributes:
-        size: its unit, in the user's units: 1e-12 of that is nothing.
+        size: its scale, in the user's units: differences below 1e-12 of it are round-off.
         smooth: True if it is a smooth function of the displacements and the control alone.
     """
 
@@ -29,7 +29,7 @@ class Bound:
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
-        """c(x, control, gradient) -> (c, dc/dcontrol), zero where the measure has the target value."""
+        """Return c(x, control, gradient) -> (c, dc/dcontrol), which sets `gradient` to dc/dx; c is 0 at the target."""
         raise NotImplementedError
 
 
@@ -50,7 +50,7 @@ class OfWholePart(Bound):
 class Amplitude(Bound):
     """Amplitude of an item (by its number in the scene), of the process time (-1), or of the control (None).
 
-    Of a load it is the active load: nothing of one that a stage leaves out.
+    For a load it is the active part of the amplitude, 0 while a stage makes the load inactive.
     """
 
     def __init__(self, problem: Any, number: int | None):
@@ -134,7 +134,7 @@ class _Form(Bound):
 
 
 class Sag(Bound):
-    """See `sag`: the node that has sunk the most, the first of several."""
+    """See `sag`: displacement of the node that has sunk the most, of several the first."""
 
     smooth = False
 
@@ -152,7 +152,7 @@ class Sag(Bound):
             self._so_far = (nodes_at - brought.first_places(nodes_at))[:, -1] / forms.length
 
     def _deepest(self, x: Any) -> tuple[float, int]:
-        """(sag over the length, rank where that is)."""
+        """Return (sag over length, the rank that has the node)."""
         mine = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
         found = self._problem.comm.allgather(float(mine))
         return max(found), int(np.argmax(found))
@@ -172,7 +172,14 @@ class Sag(Bound):
 
 
 class Target(NamedTuple):
-    """Target of a run: an output quantity (by name), its value, and whether it changes sign with the control."""
+    """Target of a run.
+
+    Attributes:
+        name: name of the output quantity.
+        value: its target value, in the user's units.
+        bind: function that returns the `Bound` quantity of a problem.
+        signed: True if the quantity changes sign with the control.
+    """
 
     name: str
     value: float
@@ -210,7 +217,7 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """Complete the change of the scene between two stages (`Setting.fading`)."""
+    """Return the target: the change of the scene between two stages is complete (`Setting.fading`)."""
     return Target("change", 1.0, lambda problem: Amplitude(problem, None))
 
 
@@ -241,9 +248,10 @@ def pole_height(value: float) -> Target:
 
 
 def pole_stretch(value: float) -> Target:
-    """Return the target: the stretch at the pole reaches `value`: (thickness/original)^(-1/2), which is that along
-    the sheet in a solid of revolution; in plane strain, where the sheet is stretched one way only,
-    (thickness/original)^(-1).
+    """Return the target: the stretch at the pole reaches `value`.
+
+    In a solid of revolution it is (thickness/original)^(-1/2), the stretch along the sheet; in plane strain, where the
+    sheet is stretched one way only, (thickness/original)^(-1).
 
     A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
 
@@ -315,8 +323,7 @@ def bind_volume(problem: Any) -> Bound:
 
 
 def _volume(problem: Any) -> Bound:
-    """Return the volume of the body as modelled: minus the integral of u . n da over the face of the (first) driven
-    load.
+    """Return the volume swept by the body as modelled: minus the integral of u . n da over the driven face.
 
     The face goes from X to X + u. The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two
     points in t is exact.
@@ -338,13 +345,13 @@ def _volume(problem: Any) -> Bound:
 
 
 def _displacement(problem, points, factors):
-    there = probe(problem, points)
-    return _Linear(problem, there.row(np.asarray(factors)) * problem.forms.length,
-                   float(np.sum(factors * there.so_far)))
+    found = probe(problem, points)
+    return _Linear(problem, found.row(np.asarray(factors)) * problem.forms.length,
+                   float(np.sum(factors * found.so_far)))
 
 
 def _pole(problem):
-    """Z of the bottom and the top of the axis."""
+    """Return Z of the bottom and of the top of the axis on the first mesh, length."""
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"
@@ -354,5 +361,5 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    """Return True if a value of the target's measure is the target's, to round-off. size: see `Bound`."""
+    """Return True if a value of the quantity equals the target to round-off. size: see `Bound`."""
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

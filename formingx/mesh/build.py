@@ -166,8 +166,7 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
 
 def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
             elements: tuple = (60, 2), grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube from Z =
-    0 up.
+    """Return a closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube above.
 
     Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All nodes of the bottom, those on edges too, lie
     where polar coordinates put them: second-order geometry.
@@ -213,8 +212,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a body between two lines through points, each point opposite the same point of the
-    other line.
+    """Return a body between two lines through points, point k of the one opposite point k of the other.
 
     Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
 
@@ -223,8 +221,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
     Args:
         inner, outer: (R, Z) of their points, shape (n, 2), length; n is at least 2, and the same.
-        elements: (between each two points and the next, through each layer): counts, or rows of n - 1 counts and of
-            an argument of `disc` for its layers.
+        elements: (between each two points and the next, through each layer): counts, or a row of n - 1 counts, and
+            the second entry of `elements` in `disc`.
         layers: {layer name: its part of the way from `inner` to `outer`, in any unit}; default one, called `wall`.
 
     Raises:

@@ -49,13 +49,13 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
                          f" their nodes, and none may lie over another")
     piece = _pieces(triangles[:, :3])
     if piece.max() > 0:
-        entry, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
-        raise InputError(f"{what}: the body is in pieces: no elements lead from {entry} to {other}; bodies apart need a"
+        first, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
+        raise InputError(f"{what}: the body is in pieces: no elements lead from {first} to {other}; bodies apart need a"
                          f" scene each")
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return a number of the piece that each element is of, 0 for the piece of the first node, shape (m,)."""
+    """Return the number of the piece of each element, 0 for the piece of the first node, shape (m,)."""
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:

@@ -27,7 +27,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
 
     Args:
         mesh: the `dolfinx.mesh.Mesh`. size: its extent, length.
-        cells: look only in these (local numbers); default all. within: its name in the error.
+        cells: look only in these (local numbers); default all. within: name of the cells in the error.
 
     Raises:
         InputError: a point that lies in none of the cells.

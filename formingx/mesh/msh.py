@@ -187,8 +187,8 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
                          f" Mesh.MshFileVersion)")
     order = "<"
     if words[1] == "1":
-        entry = body.partition(b"\n")[2][:4]
-        order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(entry, "")
+        number_one = body.partition(b"\n")[2][:4]
+        order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(number_one, "")
         if not order:
             raise InputError(f"mesh file {file!r}: a binary mesh must hold the number one after its format")
     return words[0], words[1] == "1", order, int(words[2])

@@ -8,8 +8,7 @@ from mpi4py import MPI
 from .. import _compat
 
 COORDINATES = 2
-"""Of a point of the body in the reference configuration: (R, Z), of a sheet in three dimensions, which is flat then,
-(x, y)."""
+"""Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
 
 
 def axes(domain: Any) -> str:
@@ -51,7 +50,7 @@ def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the rows of `geometry.x` for that, shape (facets, 2 or 3)."""
+    """Return the rows of `geometry.x` of the nodes of facets, shape (facets, 2 or 3)."""
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

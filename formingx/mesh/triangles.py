@@ -28,8 +28,11 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Return a point, shape (2,), in three dimensions (x, y), the same on all ranks, with the nearest boundary;
-    collective."""
+    """Return the `Place` of a point, with its nearest boundary; collective.
+
+    Args:
+        point: reference coordinates, shape (2,), of a sheet in three dimensions (x, y); the same on all ranks.
+    """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)[:, :2]
@@ -77,5 +80,5 @@ class Triangles:
         self.thickness = float(self.area.sum()) / self.length
 
     def place(self, number: int) -> Place:
-        """Return the middle of a triangle."""
+        """Return the `Place` of the middle of a triangle."""
         return place(self._mesh, self.corners[number].mean(0), str(self.layer[number]))

@@ -47,7 +47,7 @@ _STICKS = 100.0
 """Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""
 
 _ROUGH = 1000.0
-"""T/N beyond which a sticking point slides that may lift off: none keeps its shear traction without pressure."""
+"""T/N beyond which a sticking point that may separate slides: without pressure no shear traction is left."""
 
 _ELASTIC_SLIP = 1e-3
 """g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
@@ -115,15 +115,15 @@ class Contact(Part):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = _coefficient(f"{name}: friction", friction)
-        held = tool.components == 3
-        usually = not held or not self.sticks
+        in_space = self.lagged
+        usually = not in_space or not self.sticks
         self.separates = instance(f"{name}: separates", usually if separates is None else separates, bool,
                                   "True or False")
-        usual = _HELD if held or not self.separates else _STICK if self.sticks else _SLIDES
+        usual = _HELD if in_space or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
-        if not self.separates and not held and (self.friction_by_temperature or 0 < self.mu < math.inf):
+        if not self.separates and not in_space and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
@@ -150,12 +150,12 @@ class Contact(Part):
 
     @property
     def sticks(self) -> bool:
-        """True if a point that touches stays where it touched: under "stick", and where mu is as good as that."""
+        """True if a point stays where it touched: under "stick", and for a mu of at least 100."""
         return not self.friction_by_temperature and self.mu >= _STICKS
 
     @property
     def way(self) -> np.ndarray:
-        """Motion of the tool per unit of its travel, shape (components,); 0 of one that stays."""
+        """Motion of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
         return np.array(self.direction or (0.0,) * self.tool.components)
 
     @property
@@ -165,22 +165,23 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True if points in contact are held from the next step on (`LaggedStick`): on tools in three dimensions."""
+        """True if points stick from the step after their touch (`LaggedStick`): on tools in three dimensions."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
         """Return the shear stress at which n points slide under a pressure, shape (n,), and its derivative:
         Coulomb's mu p.
 
-        A law of one's own gives another: 0 without pressure, and never less under more of it. Not asked for stick.
+        A subclass can return another law, which must be 0 without pressure and must not fall as the pressure grows.
+        It is not used for stick.
         """
         return mu * pressure, mu
 
     def friction_at(self, temperature: np.ndarray | None, clamped: bool = False) -> Any:
-        """mu: a number, or at the temperatures of n points, shape (n,).
+        """Return mu: a number, or the values at the temperatures of n points, shape (n,).
 
         Args:
-            clamped: beyond the ends of a table it is that at the end, as in a run.
+            clamped: True: beyond an end of a table mu has the value at that end, as in a run.
 
         Raises:
             InputError: it has no value there, or one below 0.
@@ -200,15 +201,15 @@ class Contact(Part):
 
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
-        """Tractions for a penalty k (stress/length, shape () or (n,)) on a sheet of this thickness, at points, (n, 2).
+        """Return the law for a penalty k (stress/length, shape () or (n,)), a sheet thickness and points, (n, 2).
 
         temperature: of the body there, shape (n,), if friction depends on it.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
             return self.tool.contact_law(self, k, thickness)
-        foot = (1 - _AT_FOOT * self.separates) * theta
-        shift = np.maximum(self.tool.signed_distance(points) + foot, 0.0)
+        edge = (1 - _AT_FOOT * self.separates) * theta
+        shift = np.maximum(self.tool.signed_distance(points) + edge, 0.0)
         mu = self.friction_at(temperature, clamped=True)
         shear_limit: Callable | None = self.shear_limit
         if self.separates and isinstance(mu, float) and mu == math.inf:
@@ -248,11 +249,13 @@ def _points(name: str, points: Any) -> str | int:
 class Law(NormalLaw):
     """The `ContactLaw` of this module: a penalty with a ramp, and friction.
 
-    mu, k: of friction, of the penalty, a number, or one for each point, shape (n,). elastic_slip: g_s, length, not used
-    by stick.
-    shear_limit: (pressure, shape (n,), mu): see `Contact.shear_limit`.
-
-    pulls: points in contact are held for ever.
+    Args:
+        tool, theta, shift: see `NormalLaw`.
+        mu: coefficient of friction, a number, or one for each point, shape (n,).
+        k: penalty, stress/length, likewise.
+        elastic_slip: g_s, length, not used by stick.
+        pulls: True if points in contact never separate.
+        shear_limit: see `Contact.shear_limit`; None: Coulomb's mu p.
     """
 
     def __init__(self, tool: PlaneTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
@@ -314,7 +317,7 @@ class Law(NormalLaw):
     def start(self, x: np.ndarray) -> Touch:
         """Return the initial history variables of points at x."""
         d = self.distance(x)
-        if self.pulls:                                      # at the outer edge of the ramp it is held, free of stress
+        if self.pulls:                                      # at the outer edge of the ramp it sticks, free of stress
             d = np.where(np.abs(d / self.theta + 1) < _AT_FOOT, -(1 - _AT_FOOT) * self.theta, d)
         return _touch(x.copy(), d, np.zeros(len(x)))
 
@@ -327,9 +330,8 @@ class Law(NormalLaw):
         iteration before predicted: tractions as unknowns of their own would be those. Taken from the points, the
         curvature of tool and motion, times a stiff penalty, would drown them.
 
-        `sense`: that of the iteration before. A point that would turn from sliding one way to sliding the other is
-        taken as stuck for this one iteration: Newton's method would send it to and fro across the narrow range of
-        stick.
+        `sense`: sense of sliding in the iteration before. A point whose sense would reverse sticks for this one
+        iteration: Newton's method would send it to and fro across the narrow range of stick.
         """
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
@@ -340,18 +342,18 @@ class Law(NormalLaw):
         N = pressed + k * slope * ahead
         force = N[:, None] * n
         zero: np.ndarray = np.zeros(len(x))
-        kept_at = np.where(held, np.maximum(d, 0.0), d) if self.remembers else d            # held for ever
+        kept_at = np.where(held, np.maximum(d, 0.0), d) if self.remembers else d            # it stays in contact
         if not self.has_friction:
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
                              + outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
         assert old is not None
         g, dg = self._slip(x, near, t, old)
-        foretold = g if expected is None else expected.slip
+        predicted = g if expected is None else expected.slip
         s, rising = self._resistance(at, pressed, slope)
-        T, sliding = s * g + rising * ahead * foretold, np.zeros(len(x), dtype=bool)
+        T, sliding = s * g + rising * ahead * predicted, np.zeros(len(x), dtype=bool)
         sense_now, bent, grows = zero, T, 0.0
         if self._slides:
-            trial = s * foretold
+            trial = s * predicted
             turned = False if sense is None else np.sign(trial) * sense < 0
             limit, grows = self.shear_limit(pressed, self.mu)
             sliding = (np.abs(trial) > limit) & ~np.asarray(turned)
@@ -360,7 +362,7 @@ class Law(NormalLaw):
         force = force + T[:, None] * t
 
         def stiffness() -> np.ndarray:
-            stuck = s[:, None] * dg + (rising * foretold)[:, None] * n
+            stuck = s[:, None] * dg + (rising * predicted)[:, None] * n
             dT = np.where(sliding[:, None], (sense_now * grows * k * slope)[:, None] * n, stuck)
             return (outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
                     + outer(t, (pressed * bend)[:, None] * t + dT))
@@ -384,8 +386,8 @@ class Law(NormalLaw):
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the traction round the axis by the motion there, shape (n,), stress/length.
 
-        For the normal traction it is N n_r/r (r: `radius`, infinite in plane strain), and the stiffness of a sticking
-        point; nothing holds one that slides.
+        It is N n_r/r of the normal traction (r: `radius`, infinite in plane strain); for a sticking point the stiffness
+        of the elastic slip is added.
         """
         turned, near, found = super().stiffness_round(x, old, radius), self.nearest(x), self.tractions(x, old)
         if not self.has_friction:
@@ -394,7 +396,7 @@ class Law(NormalLaw):
         return turned + np.where(found.sense == 0, self._resistance(near.distance, self.k * F, slope)[0], 0.0)
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """Distance and slip of points x, shape (n, 2), and their gradients."""
+        """Return the distance and the slip of points x, shape (n, 2), and their gradients."""
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, near.tangent, old)
         return Motion(x, near.distance, near.normal, g, dg)
@@ -418,7 +420,7 @@ class Law(NormalLaw):
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray, old: Touch) -> tuple[np.ndarray, np.ndarray]:
-        """Elastic slip g of points, shape (n,), if none slides, and its gradient, shape (n, 2); found once."""
+        """Return the elastic slip g of points that stick, shape (n,), and its gradient, shape (n, 2); computed once."""
         if self._slid is not None and self._slid[0] is near and self._slid[1] is old:
             return self._slid[2]
         touched = old.distance > -self.theta

@@ -17,7 +17,7 @@ from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
 
 _FAR = 1e30
-"""A length beyond all others, which may still be multiplied with 0."""
+"""A length larger than all others, but finite: its product with 0 is 0."""
 
 
 class ContactStatus(IntEnum):
@@ -32,9 +32,12 @@ class ContactStatus(IntEnum):
 class Touch(NamedTuple):
     """History variables of n points at the last accepted state, relative to the tool.
 
-    position: shape (n, c), length; distance: signed, shape (n,), length; slip: elastic slip g, shape (n,), length;
-    arrival: where the point will be when it touches, if it does in the step ahead, shape (n, c), length; NaN if it has
-    no friction before the end of that step.
+    Attributes:
+        position: shape (n, c), length.
+        distance: signed distance, shape (n,), length.
+        slip: elastic slip g, shape (n,), length.
+        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length; NaN if
+            the point has no friction before the end of that step.
     """
 
     position: np.ndarray
@@ -46,9 +49,11 @@ class Touch(NamedTuple):
 class Tractions:
     """Tractions at n points per unit reference area, with the sign of the residual (of the body on the tool).
 
-    force: shape (n, c), stress; normal, tangential: N and T, shape (n,), stress; sense: of sliding, 1 or -1 along the
-    tangent, 0 if stuck, shape (n,). stiffness, touch: functions for these properties, called when they
-    are first needed.
+    Args:
+        force: shape (n, c), stress.
+        normal, tangential: N and T, shape (n,), stress.
+        sense: sense of sliding, 1 or -1 along the tangent, 0 for a sticking point, shape (n,).
+        stiffness, touch: functions that compute these properties when they are first used.
     """
 
     def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
@@ -63,7 +68,7 @@ class Tractions:
 
     @cached_property
     def touch(self) -> Touch:
-        """Return the history variables."""
+        """History variables after the state."""
         return self._touch()
 
     @property
@@ -86,29 +91,31 @@ class Motion(NamedTuple):
 
     def to(self, x: np.ndarray) -> Motion:
         """Return the predicted values for the points moved to x, shape (n, c)."""
-        by = x - self.position
-        distance = self.distance + np.einsum("ni,ni->n", self.normal, by)
-        return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, by))
+        offset = x - self.position
+        distance = self.distance + np.einsum("ni,ni->n", self.normal, offset)
+        return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, offset))
 
 
 class ContactLaw(Protocol):
-    """Tractions at n points, a function of their positions x and of their history variables. (`None`: nothing.)
+    """Tractions at n points, a function of their positions x and of their history variables (`None`: there are none).
 
     For each increment, in this order:
 
-    * `motion`, `touching`, where it begins: each point's distance and slip to first order; which points touch;
-    * `tractions`, each iteration, linearised where the `Motion` of the iteration before predicts: forces, their
-      derivative (the tangent) and, of a state that is accepted, what to remember;
-    * `stiffness_ahead`, there: the tangent of the path, with the points that have just touched;
-    * `distance`, `nearest`, `ramp`, for limits of the next step: when points arrive, and whether that was predicted.
+    * `motion`, `touching`, at its beginning: distance and slip of each point to first order; the points that touch;
+    * `tractions`, in each iteration, linearised at the `Motion` that the iteration before predicts: forces, their
+      derivative (the tangent) and, for an accepted state, the new history variables;
+    * `stiffness_ahead`, at an accepted state: the tangent of the path, with the points that have just touched;
+    * `distance`, `nearest`, `ramp`, for limits of the next step: when gaps close, and whether that was predicted.
 
-    Where it has `friction` and `depth`, too, as `formingx.physics.contact.Law`, a step may bring several points.
+    If the law also has `friction` and `depth`, as `formingx.physics.contact.Law`, several gaps may close in one step.
 
     Attributes:
-        theta: half-width of the ramp: at -theta contact begins, length; elastic_slip: before a point slides, length.
+        theta: half-width of the ramp, length: contact begins at the distance -theta.
+        elastic_slip: slip of a point before it slides, length.
         shift: reduction of the distances, length, a number or one for each point, shape (n,).
-        has_friction: tractions depend on slip; remembers: on `Touch`; pulls: the body may pull at the tool, and what
-            `energy` says is held by the bond (`Path.work`).
+        has_friction: True if tractions depend on the slip.
+        remembers: True if tractions depend on the history variables (`Touch`).
+        pulls: True if the body may pull at the tool; `energy` is then the energy of the bond (`Path.work`).
     """
 
     theta: float
@@ -129,7 +136,7 @@ class ContactLaw(Protocol):
         """Return a mask of the points at x that touch or stick, shape (n,)."""
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """Distance and slip of points at x, and their gradients."""
+        """Return the distance and the slip of points at x, and their gradients."""
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
@@ -145,7 +152,7 @@ class ContactLaw(Protocol):
         stress/length."""
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Signed, of points x, shape (n, c), or several places of each, (m, n, c), length; contact begins at -theta."""
+        """Return the signed distance, length, of points x, shape (n, c), or of m positions of each point, (m, n, c)."""
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """`PlaneTool.nearest`, with these distances."""
@@ -170,7 +177,7 @@ class NormalLaw:
     """A `ContactLaw`, with its methods, without friction or memory: subclasses give `ramp` and `stored`.
 
     Args:
-        tool: with its signed distance.
+        tool: the tool, which gives the signed distance.
         k: the penalty, stress/length, a number or one for each point, shape (n,).
         theta, shift: see `ContactLaw`. With a shift a point that touches from the start begins at the outer edge of
             the ramp, free of stress.

@@ -25,13 +25,15 @@ class Kinematics:
     """Kinematics of a section of the body.
 
     Attributes:
-        axes: names of the coordinates; components: of a displacement and of a position now; coordinates: of a point
-            in the reference configuration, by which tables and functions look it up.
+        axes: names of the coordinates.
+        components: number of components of a displacement, and of a deformed position.
+        coordinates: number of coordinates of a reference point, which tables and functions take.
         axisymmetric: True if the section turns about R = 0.
-        dimension_of_volume: 3; of a volume per unit depth 2.
+        dimension_of_volume: power of the length in a volume: 3, or 2 per unit depth.
         formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
         reader: class of the `Reader` of a path; None: `SectionReader`. An extension sets it.
-        scene_checks: checks of a scene (`SceneChecks`); None: the checks of a section. An extension sets it.
+        scene_checks: the module `formingx.extensions.space.scene_checks`; None: the checks of a section. An extension
+            sets it.
     """
 
     axes: tuple[str, ...] = ("r", "z")
@@ -117,7 +119,7 @@ class Axisymmetric(Kinematics):
         return _rows(ufl.grad(mode), [-(number * U + V) / X[0], -number * W / X[0], (number * V + U) / X[0]])
 
     def rigid_modes(self, number):
-        """Along the axis and about it (n = 0); across it and tilting it (n = 1)."""
+        """Return the motions along the axis and about it (n = 0), or across it and tilting it (n = 1)."""
         def mode(*components):
             return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)
         zero, unit = (lambda r, z: 0 * r), (lambda r, z: 1 + 0 * r)
@@ -161,10 +163,10 @@ class PlaneStrain(Kinematics):
 class ThreeD(Kinematics):
     """A sheet in three dimensions, coordinates (x, y, z): a surface with a thickness.
 
-    The gradient of a displacement is that along the surface; the normal goes with it unstretched in I + grad u, whose
-    cofactor so gives the area vector, and `Surface` puts the thickness there.
+    The gradient of a displacement is the surface gradient. In I + grad u the normal is not stretched, so the cofactor
+    of I + grad u gives the area vector; `Surface` adds the stretch through the thickness.
 
-    >>> fx.ThreeD().axes, fx.ThreeD().coordinates                                       # a point at rest is (x, y)
+    >>> fx.ThreeD().axes, fx.ThreeD().coordinates                                       # a reference point is (x, y)
     (('x', 'y', 'z'), 2)
     """
 
@@ -172,7 +174,7 @@ class ThreeD(Kinematics):
     components = 3
 
     def in_axes(self, support, items):
-        """Constrain all nodes of the rim of a hinge, along y too."""
+        """See `Kinematics`; a hinge constrains all nodes of its rim, along y too."""
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
         return [Held(self.axes.index(NAMES[h.component].replace("r", "x")), on=h.on, driven=h.driven) for h in items]
@@ -205,8 +207,7 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """Return True if F has the block structure of this module; modes alone have none, and write their F entry by
-    entry."""
+    """Return True if F has the block structure of this module: all but the F of a mode, which is a list of entries."""
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 
@@ -251,8 +252,9 @@ def _in_plane_determinant(F):
 
 
 def _powers_across(F, b, a):
-    """Return the terms that entries b = (C13, C23) add to tr C^a, to second order: b . g(A) b with the in-plane part
-    A, C33 = c.
+    """Return the terms b . g(A) b that the entries b = (C13, C23) add to tr C^a, to second order.
+
+    A is the in-plane part of C, and c = C33.
 
     An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
     a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact

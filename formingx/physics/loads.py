@@ -38,7 +38,7 @@ class Load(Part):
         `body.du`.
 
         Args:
-            body: a `formingx.forms.formulation.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
+            body: a `formingx.forms.loaded_body.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
         """
         raise NotImplementedError
 
@@ -79,7 +79,7 @@ class Pressure(Load):
         value: a fixed pressure (stress); None: the pressure is the control of the run.
         name: its name in a process and in its columns.
 
-    >>> scene.driven                                                                  # what `trace` finds the value of
+    >>> scene.driven                                                                  # `trace` finds its value
     Pressure('bottom')
     """
 

@@ -24,8 +24,8 @@ from ..errors import InputError, finite, instance, known, non_negative, positive
 from ..mesh.triangles import Place, Triangles
 
 _SLIM = 3.0                                # slenderness of triangles that can do harm
-_TOO_STIFF = 0.003                         # expected error that is worth a word
-_WRONG = 0.05                              # and with which no run is worth it
+_TOO_STIFF = 0.003                         # expected error above which a check warns
+_WRONG = 0.05                              # expected error above which a scene is refused
 
 
 class Locking(NamedTuple):
@@ -36,9 +36,9 @@ class Locking(NamedTuple):
     at: Place
 
     def __str__(self) -> str:
-        by = "several" if self.error > _WRONG else "about one"
+        share = "several" if self.error > _WRONG else "about one"
         return (f"triangles are up to {self.slenderness:.3g} times taller than wide across the thickness (at"
-                f" {self.at}): the default element locks in them, and bending comes out too stiff, by {by} per cent:"
+                f" {self.at}): the default element locks in them, and bending comes out too stiff, by {share} per cent:"
                 f" use more elements through the thickness (at most 1.5 times taller than wide), fewer along the"
                 f" sheet, or MixedPressure(space='P1')")
 
@@ -59,7 +59,7 @@ class Model:
         """Raise an InputError if the scene has items that this model cannot have."""
 
     def locking(self, mesh: Any) -> Locking | None:
-        """Triangles of a mesh in which its elements lock so that a word is due, or None; collective."""
+        """Return the triangles of a mesh in which the elements lock enough for a warning, or None; collective."""
         return None
 
 
@@ -136,11 +136,11 @@ class MixedPressure(Model):
             bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
             not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
             (`locking`); a scene whose triangles would make it wrong by 5 % is refused.
-        volume_stiffness: by this number of shear moduli J is held at 1 at each point besides: an energy of k (J -
-            1)^2/2. Pressures keep the volume of an element, not of its parts; where they differ in it by more than
-            the shear modulus, as in a block that is pressed very flat, they crush one part and open another. 10 for
-            one; then thin sheets on coarse meshes are stiffer. (The grad-div stabilisation of mixed methods:
-            Olshanskii and Reusken, Mathematics of Computation 73, 2004.)
+        volume_stiffness: k over the shear modulus of an additional energy k (J - 1)^2/2 at each point, for example 10.
+            Pressures keep the volume of an element, not of its parts. If the pressure varies in an element by more
+            than the shear modulus, as in a block that is pressed very flat, one part collapses and another opens. The
+            additional energy prevents that; thin sheets on coarse meshes become stiffer. (The grad-div stabilisation of
+            mixed methods: Olshanskii and Reusken, Mathematics of Computation 73, 2004.)
 
     >>> scene.model
     MixedPressure()
@@ -162,7 +162,7 @@ class MixedPressure(Model):
             raise InputError(f"Scene: {found}")
 
     def locking(self, mesh):
-        """Triangles so slim across a thick sheet that its bending is too stiff by more than 0.3 %; collective.
+        """Return triangles so slim across a thick sheet that its bending is too stiff by more than 0.3 %; collective.
 
         Its inf-sup constant falls as 2 width/height. Hinged sheets 2 to 15 times wider than thick came out wrong by
         up to 0.3 (height/width) (height/length of the body)^2.5, at most (benchmarks/thickness.py), clamped ones, and

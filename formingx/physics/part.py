@@ -12,11 +12,11 @@ class Part:
         name: its name in a process and in its columns; None: it has no name.
         on: the boundary that it acts on; None: it acts on none.
         driven: True if the run controls it.
-        quantity: its controlled quantity, such as "pressure" or "travel"; None: nothing.
+        quantity: its controlled quantity, such as "pressure" or "travel"; None: it has none.
         symmetric: True if its part of the tangent is symmetric.
-        direction: (r, z) of its motion per unit of travel; None: it does not move as a whole.
+        direction: its motion per unit of travel, (r, z) or (x, y, z); None: it does not move as a whole.
         holds_rotation: True if it also constrains the rotation.
-        told: attributes of which its repr tells as text; a summary leaves their numbers out.
+        told: attributes that its repr shows as text: a summary leaves out their numbers.
     """
 
     name: str | None = None

@@ -1,4 +1,4 @@
-"""Supports: each says which displacement components are held, where, and how."""
+"""Supports: each gives the displacement components that it constrains, and where."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from .part import Part
 
 R, Z = 0, 1
 NAMES = ("r", "z", "y", "x")
-"""Of the components that supports hold, by their numbers; in three dimensions r, of what holds a rim whole, is x."""
+"""Names of the components that supports constrain, by number; in three dimensions r of a support of a rim is x."""
 
 
 class Held(NamedTuple):
-    """One displacement component held at 0 at every node of a boundary, or at the node at `point`.
+    """Constraint of one displacement component to 0 at every node of a boundary, or at the node at `point`.
 
-    `driven`: instead of 0 it follows the run's control.
+    driven: the component follows the control of the run instead.
     """
 
     component: int
@@ -25,9 +25,9 @@ class Held(NamedTuple):
 
 
 class MeanHeld(NamedTuple):
-    """The mean of one displacement component over a boundary held at 0 (a Lagrange multiplier carries the force).
+    """Constraint of the mean of one displacement component over a boundary to 0, by a Lagrange multiplier.
 
-    `by_stiffness`: layers count in proportion to their shear modulus, and carry the force so.
+    by_stiffness: layers count in proportion to their shear modulus, and carry the force in this proportion.
     """
 
     component: int
@@ -55,7 +55,7 @@ class Support(Part):
     def stored_energy(self, body: Any) -> Any:
         """Energy of an elastic support (stress length^3, per depth length^2): a UFL form of rank 0; None: it has none.
 
-        Its derivative by the displacement are the forces on the body. In a stage without the support it is not there.
+        Its derivative by the displacement enters the residual. In a stage without the support the energy is 0.
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
@@ -86,14 +86,14 @@ class _OneComponent(Support):
 class Symmetry(_OneComponent):
     """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
 
-    Where a flat end of the body lies in it the part goes on behind it as the image of the body, and results belong
-    to the whole part: see `Scene.symmetry_factor`.
+    If a flat end of the body lies in it, the part continues behind it as the mirror image of the body, and results
+    belong to the whole part: see `Scene.symmetry_factor`.
 
     Args:
         on: name of the boundary.
         normal: the component that is held: "r" or "z"; in three dimensions "x", "y" or "z".
-        mirror: modes that are no image of themselves count, too, see `Path.stability`.
-        guide: the part ends there and slides along a frictionless wall: results belong to the body alone.
+        mirror: True: modes that are not symmetric to it count too, see `Path.stability`.
+        guide: True: the part ends there and slides along a frictionless wall, so results belong to the body alone.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
     [Symmetry('axis', 'r'), Symmetry('middle', 'z')]
@@ -204,7 +204,7 @@ class PrescribedDisplacement(_OneComponent):
 
 
 def _component(name: str, value: str) -> int:
-    """Its number in `NAMES`: `Kinematics.in_axes` makes it that of the body's."""
+    """Return the number of a component in `NAMES`, which `Kinematics.in_axes` turns into the number of an axis."""
     if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
     return NAMES.index(value)

@@ -16,15 +16,17 @@ from ..mesh.nodes import of_space
 from ..mesh.triangles import Place, place
 
 _SHORTENED = 0.9       # stretch along the section below which a sheet is compressed
-_COLUMNS = 3           # of elements that make a piece of it
+_COLUMNS = 3           # smallest number of columns of elements of a compressed piece
 
 
 class Examination:
-    """The last good state and a failed attempt, looked at; collective.
+    """Examination of the last good state and of a failed attempt; collective.
 
     Args:
-        problem: the `Problem`. last: the state, None: there is none. attempt: where Newton's method ended, with x,
-            control and the last corrections dx and dcontrol; None: no iteration failed.
+        problem: the `Problem`.
+        last: the last good state; None: there is none.
+        attempt: the point where Newton's method ended, with x, control and the last corrections dx and dcontrol; None:
+            no iteration failed.
 
     Attributes:
         facts: {field of a `Diagnosis`: the result}.
@@ -53,7 +55,7 @@ class Examination:
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
     def _take_worst(self, shape: Body) -> None:
-        """Smallest J, worst shape and nearness to a material's limit in the last good state."""
+        """Find the smallest J, the worst shape and the place nearest to a material's limit in the last good state."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
         facts["shape"] = float((shape.quality / shape.at_rest).min())
@@ -67,7 +69,7 @@ class Examination:
             self._marks.append(("nearest to the material's limit", shape.moved[at]))
 
     def _take_shortened(self, shape: Body) -> None:
-        """Longest piece of a sheet that is compressed along its section in the last good state."""
+        """Find the longest piece of a sheet that is compressed along its section in the last good state."""
         columns = self._problem.scene.mesh.columns
         if columns is None:
             return
@@ -163,12 +165,12 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
 
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
-    """For every contact: True for each own node in touch, shape (n,)."""
+    """Return a mask of the locally owned points in contact, shape (n,), of every active contact."""
     return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.present]
 
 
 def _flips(problem: Any, attempt: Any) -> int | None:
-    """Nodes whose contact changed in the last iteration; None without contact."""
+    """Return the number of points whose contact status changed in the last iteration; None without contact."""
     if not problem.present:
         return None
     n, count = problem.forms.space.dofmap.index_map.size_local, 0

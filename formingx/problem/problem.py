@@ -39,10 +39,12 @@ from .units import Units
 class _Stage(NamedTuple):
     """Equations of a setting, from a state on.
 
-    setting: the `Setting`; active: the constraints; place, rate: of the held owned unknowns, place + rate * control,
-        shape
-    (n,); means: values that the means are held at; left: forces without balance that a fading setting takes away, over
-    1 - control, owned part of F, or None.
+    Attributes:
+        setting: the `Setting`.
+        active: the active constraints.
+        place, rate: the constrained owned unknowns are place + rate * control, shape (n,) each.
+        means: values of the constrained means.
+        left: unbalanced forces that a fading setting removes, over 1 - control, locally owned entries of F; or None.
     """
 
     setting: Setting
@@ -60,12 +62,12 @@ class Problem(Histories, Units):
         scene: the scene.
         forms: its fields, forms and scales (a `Formulation`).
         comm: communicator.
-        x: a vector of unknowns; inside `at` the unknowns of the state.
+        x: a vector of unknowns; inside `state_context` the unknowns of the state.
         matrix: the tangent, refilled by `tangent`.
         contacts: the scene's contacts (`FaceContact`); present: the active contacts.
         histories: arguments of F besides x and control (`History`); limit: limits of a step (`StepLimit`).
-        setting: the `Setting` that x and control are seen under; see `enter`.
-        admissible: whether the body has a shape, and keeps its volume (`Admissible`).
+        setting: the present `Setting`; see `enter`.
+        admissible: check of the admissibility of the body, and its volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -116,7 +118,7 @@ class Problem(Histories, Units):
 
     @property
     def symmetric(self) -> bool:
-        """True if the tangent is symmetric: no follower load in the scene."""
+        """True if the tangent is symmetric: so are the parts of all loads, contacts and materials."""
         return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
 
     @property
@@ -126,17 +128,17 @@ class Problem(Histories, Units):
 
     @property
     def control(self) -> float:
-        """The present control of the forms; inside `at` that of the state."""
+        """The present control of the forms; inside `state_context` the control of the state."""
         return float(self.forms.control.value)
 
     @property
     def held(self) -> np.ndarray:
-        """Local numbers of the owned unknowns that supports hold now."""
+        """Local numbers of the owned unknowns that are constrained in the present stage."""
         return self._stage.active.dofs[self._stage.active.owned]
 
     @property
     def held_rate(self) -> np.ndarray:
-        """Derivative of the held unknowns by the control, in the order of `held`."""
+        """Derivative of the constrained unknowns by the control, in the order of `held`."""
         return self._stage.rate
 
     @property
@@ -181,10 +183,13 @@ class Problem(Histories, Units):
 
     @contextlib.contextmanager
     def state_context(self, state: Any) -> Iterator[Problem]:
-        """Stand at a state: its setting, histories, unknowns (`x`, `forms.w`) and control; all restored on leaving.
+        """Set the problem to a state inside the context: setting, histories, unknowns (`x`, `forms.w`) and control.
 
-        state: anything with x (locally owned entries), control, setting (a `Setting` as plain data, or empty) and
-            memory.
+        On leaving, the values before are restored.
+
+        Args:
+            state: anything with x (locally owned entries), control, time, setting (a `Setting` as plain data, or empty)
+                and memory.
         """
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
         stage, memory, x, foretold = self._stage, self.memory, self.x.array_r.copy(), self._foretold
@@ -228,14 +233,14 @@ class Problem(Histories, Units):
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
         """Force of the body on a driven support (by its number in the scene), along its motion, all ranks.
 
-        Stress length^2 (per depth: length): of the forces that are left over at the unknowns that it holds.
+        Stress length^2 (per depth: stress length): minus the sum of the unbalanced forces at its unknowns.
         """
         left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
 
     def driven_unknowns(self, number: int) -> np.ndarray:
-        """Local numbers of the owned unknowns that a support (its number in the scene) drives."""
+        """Return the local numbers of the owned unknowns that a support (its number in the scene) drives."""
         return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
@@ -249,13 +254,13 @@ class Problem(Histories, Units):
         return self.assemble(self._residual)
 
     def look_at(self, x: np.ndarray, control: float) -> None:
-        """Put the fields of x, locally owned entries, and the control where the forms see them."""
+        """Set the fields of the forms to x, locally owned entries, and their control."""
         self.forms.control.value = control
         self.place(x)
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Forces on the body, owned part of the fields, that a setting takes away as the control goes to 1, or None."""
+        """Forces on the body, shape (n,), that a fading setting removes as the control goes to 1, or None; owned."""
         return None if self._stage.left is None else self._stage.left[: self._n]
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -286,7 +291,7 @@ class Problem(Histories, Units):
         return self.admissible.inside_out()
 
     def begin(self, old: Any = None) -> None:
-        """Newton's method begins at a guess ahead of a state (None: of none)."""
+        """Prepare the contacts for Newton's method, which begins at a guess ahead of a state (None: of no state)."""
         for contact in self.present:
             contact.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
 
@@ -300,9 +305,9 @@ class Problem(Histories, Units):
             F.array_w[: self._n] = values
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """dF/dx at (x, control): `matrix`, refilled.
+        """Return dF/dx at (x, control): `matrix`, refilled.
 
-        `ahead`: as it will be in the step ahead of an accepted state, where F has a kink there.
+        ahead: the derivative towards the next step, where F has a kink at an accepted state.
         """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
@@ -348,13 +353,13 @@ class Problem(Histories, Units):
         together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
 
     def motion(self, control: float) -> np.ndarray:
-        """Return the held unknowns at their values for a control, all else 0, shape (owned part of x,)."""
+        """Return the constrained unknowns at their values for a control, all others 0; locally owned entries of x."""
         values = np.zeros(self.x.getLocalSize())
         values[self.held] = self._stage.place + self._stage.rate * control
         return values
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Mean over the reference volume of the product of two displacement fields: no mesh, no unit in it."""
+        """Return the mean over the reference volume of the product of two displacement fields (dimensionless)."""
         return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
@@ -362,7 +367,7 @@ class Problem(Histories, Units):
         self.fill(out, self._metric * a.array_r[: self._n])
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
-        """Put the fields of x and the control where the forms see them; returns the multipliers, all ranks."""
+        """Set the fields of the forms to x, and their control; return the multipliers, all ranks."""
         self.forms.control.value = control
         self.place(x.array_r)
         multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
@@ -373,23 +378,23 @@ class Problem(Histories, Units):
         return multipliers
 
     def place(self, x: np.ndarray) -> None:
-        """Put the fields of x, locally owned entries, where the forms see them."""
+        """Set the fields of the forms to x, locally owned entries, and update the coefficients that depend on them."""
         w = self.forms.w.x
         w.array[: self._n] = x[: self._n]
         w.scatter_forward()
         self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
-        """out = a state near rest with a regular tangent, for the first direction of a path: for a solid, rest."""
+        """out = a state near the reference configuration with a regular tangent, for the first direction of a path."""
         self.forms.set_stiff()
         self.fill(out, self.forms.w.x.array[: self._n])
 
     def assemble(self, form: Any) -> np.ndarray:
-        """Return a compiled linear form at the state last set, owned part, shape (n,)."""
+        """Return the vector of a compiled linear form at the state last set, locally owned entries, shape (n,)."""
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def assemble_scalar(self, form: Any) -> float:
-        """Return a compiled scalar form at the state last set, all ranks."""
+        """Return the value of a compiled scalar form at the state last set, all ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
@@ -405,9 +410,9 @@ class Problem(Histories, Units):
         self.x.destroy()
 
     def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
-        """Take a setting: from here on F belongs to the setting, and (x, control) is a state on its path.
+        """Enter a setting: from here on F is the residual of the setting, and (x, control) is a state on its path.
 
-        Constrained unknowns are held where x has it, now or, if it is driven, at this control; a fading
+        Constrained unknowns stay at their values in x; driven ones have these values at this control. A fading
         setting removes the unbalanced forces at (x, control). x: locally owned entries.
         """
         before = self._stage

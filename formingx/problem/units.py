@@ -51,12 +51,12 @@ class Units:
 
     @property
     def fixed_loads(self) -> list[str]:
-        """The loads that act already where nothing is driven yet."""
+        """The loads with a fixed value, which act from the start, as text."""
         return [repr(load) for load in self.scene.loads if not load.driven]
 
     @property
     def main_columns(self) -> list[str]:
-        """The measures that tell one state from another in a line."""
+        """Columns that describe a state in one line."""
         return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
 
     @property
@@ -66,7 +66,7 @@ class Units:
 
     @property
     def units(self) -> tuple[float, float]:
-        """One of the dimensionless energy, of the whole part (stress length^3), and length in the user's units."""
+        """Units of the dimensionless energy, of the whole part (stress length^3), and of length, in user's units."""
         return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
 
     @property

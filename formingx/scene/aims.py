@@ -10,10 +10,10 @@ from ..mesh.triangles import Triangles
 from ..physics.supports import Held
 from .scene import Scene
 
-_NEAR = 1e-5           # of the body's length: a point is on a boundary
-_MOST = 1e9            # of the largest shear modulus, or of the body's length
-_SQUARES = 200         # along a mould's larger side
-_ROOMY = 1.05, 1.005   # the amount by which its volume by them may be wrong, over a flat body and around a tube
+_NEAR = 1e-5           # distance over the body's length up to which a point is on a boundary
+_MOST = 1e9            # largest plausible pressure over shear modulus, or travel over the body's length
+_SQUARES = 200         # number of squares along a mould's larger side
+_ROOMY = 1.05, 1.005   # largest ratio of a volume to the one counted in squares, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
@@ -31,8 +31,8 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
         that can be.
     """
     name, value, driven = target.name, target.value, scene.driven
-    there = [item for i, item in enumerate(scene.items) if i not in (off or ())]
-    moulds = [item for item in there if item in scene.contacts and not item.driven]
+    active = [item for i, item in enumerate(scene.items) if i not in (off or ())]
+    moulds = [item for item in active if item in scene.contacts and not item.driven]
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])
@@ -47,7 +47,7 @@ def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -
             and not driven.friction_by_temperature and driven.mu == 0:
         return f"{driven!r} can only push: the force must not be negative"
     if name.startswith("u_") and "_at_" in name and value != 0:
-        holds = _holder(scene, name, [t for t in there if t in scene.supports])
+        holds = _holder(scene, name, [t for t in active if t in scene.supports])
         if holds is not None:
             return f"{holds!r} holds that displacement"
     if name.endswith(("pressure", "travel")):
@@ -78,7 +78,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """Return the support that constrains the point that a `displacement` target (u_r_at_R_Z) wants to move, or None."""
+    """Return the support that constrains the displacement of a `displacement` target (u_r_at_R_Z), or None."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
@@ -102,12 +102,10 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
-    """(volume, how many times as much it may be): between the lower face of a flat body in the reference
-    configuration and the mould over it.
+    """Return the volume between the lower face of a flat body and the mould over it, and its largest error as a factor.
 
-    Infinite if the mould is not closed.
-
-    Counted in squares: the connected ones outside the tool, from where the body is. Of a closed tube: `_room_of_tube`.
+    The volume, infinite if the mould is not closed, is the sum over the squares outside the tool that are connected
+    with the body in the reference configuration. For a closed tube see `_room_of_tube`.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
@@ -134,7 +132,9 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
 
 
 def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
-    """Volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if that is not closed.
+    """Return the volume that a tube, closed below, can sweep in its mould, up to its upper end.
+
+    It is infinite if the mould is not closed.
 
     line: its outer face in the reference configuration, from one end to the other, shape (n, 2), length. The enclosed
         body keeps its volume.
@@ -154,7 +154,7 @@ def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     if part[-1].any() or part[:, 0].any():
         return np.inf
     weight = np.array([scene.kinematics.weight((r, 0.0)) for r in R])
-    disc = lambda r: r * scene.kinematics.weight((r / 2, 0.0))             # noqa: E731  between the axis and r, by height
+    disc = lambda r: r * scene.kinematics.weight((r / 2, 0.0))             # noqa: E731  from the axis to r, a height
     within = sum((b[1] - a[1]) / 6 * (disc(a[0]) + 4 * disc((a[0] + b[0]) / 2) + disc(b[0]))
                  for a, b in zip(line, line[1:]))
     return float(size**2 * (weight * part.sum(1)).sum() - within)

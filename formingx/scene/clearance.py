@@ -9,18 +9,22 @@ from ..errors import InputError
 from ..physics.contact import Contact
 from .scene import Scene
 
-_LOOKS = 50            # how often the tools are looked at on the way of a stage
-_MOST = 1000           # points of a tool in three dimensions that are looked at
+_LOOKS = 50            # number of positions of the tools that are checked in a stage
+_MOST = 1000           # largest number of points of a tool in three dimensions that are checked
 
 
 def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
-    """Raise an InputError if tools of a stage overlap, or one goes through a boundary that is held.
+    """Raise an InputError if tools of a stage overlap, or one goes through a constrained boundary.
 
-    Returns the plans to check once more when their turn comes: a travel at their beginning is not known yet.
+    If a travel is not known before the run (a stage that ends at a pole height), its tool is not checked from there on.
 
-    plans: of the stages, with `stage`, `numbers` of its controls, `tables` [(number, table)], numbers that are `off`.
-    stands: travels at the beginning {number: length}, default 0.
-    Where a travel cannot be known before the run (a stage that ends at a pole height) its tool is left out from there.
+    Args:
+        plans: plans of the stages, with `stage`, the `numbers` of its controls, `tables` [(number, table)], and the
+            numbers of inactive items, `off`.
+        stands: travels at the beginning, {number: length}; default 0.
+
+    Returns:
+        The plans with an unknown travel at their beginning, to be checked again when the run reaches them.
     """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
@@ -43,7 +47,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
 
 
 def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Return the positions of all tools at the ends of the straight pieces of a stage."""
+    """Yield the travels of all tools at the ends of the straight pieces of a stage, {number: length}."""
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
             yield stands | {i: float(np.interp(time, *table.T)) for i, table in plan.tables

@@ -39,7 +39,7 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """`values_at` points that are the same on all ranks."""
+    """Return `values_at` for points that are the same on all ranks."""
     if isinstance(field, type):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
     if isinstance(field, Table):
@@ -86,7 +86,7 @@ class PointReader:
 
 
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
-    """Linear between the points of a CSV file: over one of the axes, or over both, by its columns."""
+    """Return the linear interpolation of the points of a CSV file over one axis or both, by its columns, shape (n,)."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)

@@ -14,8 +14,7 @@ from .temperature import GivenTemperature
 
 
 def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
-    """Return the quadrature points of the energy, of a degree, in this rank's own cells of a layer, by their
-    numbers."""
+    """Return the quadrature points of this degree in the locally owned cells of a layer, in the order of the cells."""
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
     cells = np.sort(cells[cells < len(own_cells(domain))])

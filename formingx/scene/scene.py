@@ -29,7 +29,7 @@ from .symmetry import NO_PLANES, MirrorPlanes, mirror_planes
 from .temperature import Expansion, GivenTemperature
 
 _HIGHEST = 30
-"""Degree of a quadrature: more are asked for by mistake, and their points fill the memory."""
+"""Largest degree of a quadrature: a higher one is a mistake, and its points would fill the memory."""
 
 
 _LARGER = 4.0
@@ -124,7 +124,7 @@ class Scene:
         self.model.check(self)
         if self.model.solid:
             self._check_hinges()
-        for contact in self.contacts if preformed is None else ():      # else tools stand where they have gone
+        for contact in self.contacts if preformed is None else ():      # else tools have moved already
             self._check_contact(contact)
         if heat is not None:
             if not hasattr(heat, "check") or isinstance(heat, type):
@@ -133,7 +133,7 @@ class Scene:
             self.heat = heat
 
     one_by_one = False
-    """True: steps of a run take one node into contact, where a contact leaves `nodes_per_step` open."""
+    """True: one node comes into contact in a step, for contacts with nodes_per_step=None."""
 
     temperature: GivenTemperature | None = None
     heat: Any = None
@@ -154,7 +154,7 @@ class Scene:
     def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
         """Return the same scene on another mesh of the body, with the same names of layers and boundaries.
 
-        temperature: of the body there, where it is not the one that was given.
+        temperature: temperature on the new mesh; None: the temperature of this scene.
         """
         if temperature is None and self.temperature is not None:
             temperature = self.temperature.given
@@ -190,7 +190,7 @@ class Scene:
         return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, caller: str) -> Any:
-        """`driven`, or an InputError unless one item can be driven."""
+        """Return `driven`; raise an InputError unless exactly one item can be driven."""
         if not self.drivable:
             raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a PrescribedDisplacement support")
@@ -202,9 +202,9 @@ class Scene:
         return self.driven
 
     def number(self, caller: str, item: Any) -> int:
-        """Return the place in `things` of an item, given as itself or by its name; an InputError if it is not there."""
-        for i, known_thing in enumerate(self.items):
-            if item is known_thing or isinstance(item, str) and item == known_thing.name:
+        """Return the number in `items` of an item, given itself or by name; raise an InputError if it is not there."""
+        for i, own in enumerate(self.items):
+            if item is own or isinstance(item, str) and item == own.name:
                 return i
         names = [t.name for t in self.items if t.name]
         raise InputError(f"{caller}: {item!r} is not in the scene; it has {', '.join(map(repr, self.items))}"
@@ -216,7 +216,7 @@ class Scene:
         return item.quantity if alone else f"{item.name}_{item.quantity}"
 
     def check_held(self, supports: Sequence[Any], touched: bool = False) -> None:
-        """Raise an InputError unless these supports hold the axis and, if no tool touches, every rigid motion."""
+        """Raise an InputError unless these supports constrain the axis and, if no tool touches, every rigid motion."""
         self._check_axis(supports)
         if not touched:
             self._check_rigid_body(supports)
@@ -257,7 +257,7 @@ class Scene:
         self._moduli = {name: self._checked_modulus(name, self.materials[name]) for name in layers}
 
     def _checked_modulus(self, layer: str, material: Material) -> float:
-        """`shear_modulus` of a layer, whose material is checked at every quadrature point of the energy."""
+        """Return `shear_modulus` of a layer; check its material at every quadrature point of the energy."""
         if not material.varies:
             material.check()
             return material.shear_modulus
@@ -274,7 +274,7 @@ class Scene:
         return max(modulus for _, modulus in found)
 
     def _checked_expansion(self, given: Any) -> dict[str, Expansion]:
-        """{layer: its expansion}, which is known at the temperature of every point."""
+        """Return {layer: its law of expansion}, checked at the temperature of every point."""
         laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, Expansion) else given
         if not isinstance(laws, Mapping) or not all(isinstance(law, Expansion) for law in laws.values()):
             raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
@@ -307,9 +307,9 @@ class Scene:
                 raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def _check_contact(self, contact: Contact) -> None:
-        """Raise an InputError unless the body starts outside the tool and its face looks at the tool.
+        """Raise an InputError unless the body starts outside the tool and its face is the nearest one to the tool.
 
-        Friction has a value at the temperature of the face.
+        Its friction must have a value at the temperatures of the face, and no driven pressure may act on the face.
         """
         contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
         mesh, near = self.mesh, 1e-6 * max(self.extent)
@@ -397,10 +397,10 @@ class Scene:
                              f" for one")
 
     def _check_hinges(self) -> None:
-        """Raise an InputError if the soft one of two layers would carry a hinge more than a hundred times too strong.
+        """Raise an InputError if a hinge or a pressure would overload a layer much softer than another at the same rim.
 
-        A plain mean pulls all layers with one traction; and a hinged rim face is free, so a pressure on a soft layer
-        squeezes it out there.
+        With weight="area" a hinge pulls all layers with one traction: refused if they differ by more than 100 times in
+        stiffness. A hinged rim face is free, so a pressure on a layer 50 times softer would squeeze it out there.
         """
         moduli = {name: self.shear_modulus(name) for name in self.materials}
         for held in (held for support in self.supports for held in support.constraints()):
@@ -442,7 +442,7 @@ class Scene:
 
 
 def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
-    """Return a list of items of one kind, or an InputError."""
+    """Return a list of items of one kind; raise an InputError for others."""
     scene_items = several(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

@@ -10,7 +10,7 @@ from ..mesh.nodes import COORDINATES, span
 from ..physics.supports import Symmetry
 
 _NEAR = 1e-6
-"""A node lies in a plane, a tool reaches it, to this part of the body's largest extent."""
+"""Tolerance for nodes in a plane and tools that reach it, over the largest extent of the body."""
 
 _PARTS = {1: "half", 2: "quarter", 3: "eighth"}
 
@@ -72,10 +72,11 @@ class MirrorPlanes:
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
 
     def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:
-        """Return the factor by which a force on the body as modelled is that on a whole tool or support.
+        """Return the ratio of the force on a whole tool or support to the force on the part of it that is modelled.
 
-        A plane counts if the tool reaches it: then the other half of the tool is on the other side. It does not count
-        if the force has a component across it, as the images of that component cancel: the force is that on one side.
+        A plane counts if the tool reaches it: the other half of the tool is then on the other side. It does not count
+        if the force has a component across it, since the images of this component cancel: then the force on one side is
+        taken.
 
         Args:
             extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components).
@@ -92,8 +93,8 @@ class MirrorPlanes:
 
         Args:
             components: of x.
-            extent: lowest and highest coordinates of a tool, shape (2, components): planes are left out beyond which
-                it lies already.
+            extent: lowest and highest coordinates of a tool, shape (2, components): planes that the tool crosses are
+                left out.
         """
         found = [(np.ones(components), np.zeros(components))]
         for plane in self.planes:
@@ -107,7 +108,7 @@ class MirrorPlanes:
 
 
 NO_PLANES = MirrorPlanes()
-"""Those of a body that is modelled as a whole."""
+"""Mirror planes of a body that is modelled as a whole: there are none."""
 
 
 def mirror_planes(scene: Any) -> MirrorPlanes:

@@ -32,8 +32,8 @@ class GivenTemperature:
         mesh: of the scene.
 
     Attributes:
-        given: as it was given.
-        T: the DOLFINx `Function` (P2), never changed: what changes is `Temperature`.
+        given: the argument `given`.
+        T: the DOLFINx `Function` (P2). It never changes; `formingx.forms.temperature.Temperature` does.
 
     Raises:
         InputError: it is not given all over the body.
@@ -47,16 +47,18 @@ class GivenTemperature:
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Temperatures in some cells (local numbers) at places in the reference cell, shape (q, 2): (cells, q).
+        """Return the temperatures in some cells (local numbers) at points of the reference cell, shape (cells, q).
 
-        values: in place of those of T, ghosts included, shape (..., n): (..., cells, q).
+        Args:
+            places: the points, shape (q, 2).
+            values: coefficients in place of T.x.array, ghosts included, shape (..., n): the result is (..., cells, q).
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def on(self, boundary: str) -> np.ndarray:
-        """Temperatures at the nodes of T on a boundary, shape (n,), all ranks; collective."""
+        """Return the temperatures at the nodes of T on a boundary, shape (n,), all ranks; collective."""
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
         return gathered(self.mesh.comm, self.T.x.array[nodes])
 

@@ -1,4 +1,4 @@
-"""Tools that are too narrow for the contact points of a face, which fit between two points or are deep first."""
+"""Check for tools that pass between two contact points of a face, or penetrate it before they meet a point."""
 
 from typing import Any
 
@@ -13,13 +13,13 @@ from ..ranks import gathered
 _DIRECTIONS = 90           # in which a closed tool's width is measured
 
 CUT = 0.1
-"""Depth of a face in a tool between contact points, over the thickness, from which on it is cut."""
+"""Penetration between contact points over the thickness from which on a tool counts as cutting the face."""
 
 _PLACES = 33
-"""Places of an edge that are looked at."""
+"""Number of points of an edge that are checked."""
 
 _MOVES = 200
-"""Of a tool to a face, at most."""
+"""Largest number of moves of a tool towards a face."""
 
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
@@ -49,8 +49,8 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
     """Raise an InputError if a tool is deep in the undeformed face before it meets a contact point.
 
-    It moves by its distance to the nearest point, again and again (sphere tracing): so it passes none. One that stays
-    is thought to come straight to the middle of an edge.
+    The tool moves by its distance to the nearest point, repeatedly (sphere tracing), so it passes no point. A fixed
+    tool is assumed to approach the middle of an edge along the normal.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))

@@ -19,7 +19,7 @@ Predictor: TypeAlias = Callable[[float], Array | None]
 """x at a control, locally owned entries, or None where the tangent is the better guess."""
 
 Bend: TypeAlias = tuple[Array, float]
-"""What a guess is off the tangent: of x, locally owned entries, and of the control."""
+"""Deviation of a guess from the tangent: of x, locally owned entries, and of the control."""
 
 
 class Curve:
@@ -31,7 +31,7 @@ class Curve:
 
     Attributes:
         fixed_control: True if it cannot pass a limit point.
-        sweeps: solutions at a target, at most, until no point comes into a tool in three dimensions in the step to it.
+        sweeps: largest number of solutions of a step in three dimensions, until no more points penetrate a tool.
         control_weight: of the squared control against the mean squared displacement in arc length (dimensionless).
     """
 
@@ -43,8 +43,8 @@ class Curve:
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
-        self._found: State | None = None                    # whose factors are at hand
-        self._ahead_of: tuple[State | None, int] = None, 0  # whose tangent ahead is, by the count of the solver
+        self._found: State | None = None                    # the state of the present factors
+        self._ahead_of: tuple[State | None, int] = None, 0  # state of the tangent ahead; factorisations until then
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
@@ -78,7 +78,7 @@ class Curve:
         return self._state(0.0, history, "start", None)
 
     def spend(self, iterations: int) -> None:
-        """Count iterations that another has spent for it."""
+        """Count Newton iterations of another solver, such as a viscous one, in this step."""
         self._iterations += iterations
 
     @property
@@ -92,7 +92,7 @@ class Curve:
         return self.norm(self._x, 0.0)
 
     def spent(self) -> int:
-        """Newton iterations since this was last asked, whether they led to a state or not."""
+        """Return the number of Newton iterations since the last call, failed attempts included."""
         spent, self._iterations = self._iterations, 0
         return spent
 
@@ -110,7 +110,7 @@ class Curve:
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
-        """Return the solution of F = 0 and of the constraint, from a guess. chords: see `BorderedNewton`.
+        """Return the solution of F = 0 and of the constraint, from a guess. chords: see `BorderedNewton.correct`.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -162,9 +162,10 @@ class Curve:
         return self._b.array_r.copy()
 
     def guess_from_rest(self, rest: State, control: float) -> Array:
-        """Return a guess of the state at a control, to correct at that control: rest, with the constraints moved.
+        """Return a guess of the state at a control: the unloaded state `rest` with the constraints of the control.
 
-        Where rest has no stiffness (a flat membrane) it is the state in the first direction on which F does no work.
+        If the unloaded body has no stiffness (a flat membrane), the guess is the state along its first tangent at which
+        F does no work.
         """
         if not self.problem.slack_at_rest or control == 0:
             return self.problem.motion(control)
@@ -201,7 +202,7 @@ class Curve:
 
     def _ahead(self, old: State, length: float, behind: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
-        """(x, control) so far along the tangent, off it by a bend, or along the parabola that a state behind gives."""
+        """Return (x, control) at a length along the tangent, or along the parabola from a state behind, plus a bend."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if behind is not None:
             h = self.distance(behind, old)
@@ -215,7 +216,10 @@ class Curve:
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
                     predictor: Predictor | None) -> State:
-        """`solve`; in time with a predictor guess and kept tangents, but not near a fold, which tangents locate."""
+        """Solve from a guess; with a predictor, from its guess and with kept tangents, unless a limit point is near.
+
+        Limit points are located by tangents.
+        """
         if predictor is None or not self._runs_along_control(old.slope):
             return self.solve(x, control, constraint, kind, old)
         guess = predictor(control)
@@ -225,7 +229,7 @@ class Curve:
         return self.solve(new.x, new.control, constraint, kind, old)
 
     def _runs_along_control(self, slope: float) -> bool:
-        """Return True if the control makes the greater part of a path of this slope, whose fold is then not near."""
+        """Return True if the control contributes more than half of the squared arc length: no limit point is near."""
         return slope**2 * self.control_weight > 0.5
 
     def unit_slope(self, state: State) -> float:
@@ -237,7 +241,7 @@ class Curve:
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
     def turned_at(self, old: State, new: State) -> bool:
-        """Return True if a run went back from a state: the way to the next one leads against its tangent."""
+        """Return True if a run turned back at `old`: the chord to the next state points against its tangent."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control) < 0
 
     def work_ahead(self, state: State) -> float:
@@ -332,11 +336,11 @@ class Curve:
         return found
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """Return the states after `old`, the first of them solved for again with points that came into a tool in three
-        dimensions in the step.
+        """Solve again for the first of the states after `old`, with the points that penetrated a tool in contact.
 
-        These points stay in contact from the place where they met the tool. At a target, a pair (target, its measure),
-        these are the points of all tools. At other states, at the same control, only tools with friction count.
+        For tools in three dimensions. A point stays in contact from the place where it met the tool. If the state meets
+        one of `targets`, pairs (target, its measure), the points of all tools count, and the target is met again. Else
+        the control stays, and only points on tools with friction count.
 
         Raises:
             Failure: no such state was found.

@@ -25,13 +25,13 @@ class Limits:
     """Limits from which on a number of the last good state counts as a cause.
 
     Attributes:
-        before: states before it at which the condition number of the tangent is looked at, too.
-        singular: its growth from there that tells of a singular tangent.
-        round_off: a condition number that leaves next to nothing of 16 digits.
+        before: number of states back to the one with which the condition number of the tangent is compared.
+        singular: growth of the condition number since then that indicates a singular tangent.
+        round_off: condition number that leaves hardly any of 16 digits.
         slowing: slope of the control over its largest, below which the last slopes may tell of a limit point ahead.
         material: part of a material's limit of I1 - 3.
-        volume, shape: J, and a deformed element's shape over that in the reference configuration, of one about to
-            turn inside out.
+        volume: J below which an element is about to turn inside out.
+        shape: shape of a deformed element over its shape in the reference configuration, likewise.
     """
 
     before: int = 10
@@ -47,17 +47,19 @@ _LIMITS = Limits()
 
 ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not a limit point), and a real body may"
                 " follow it: path.stability([0]) finds where, and its mode")
-"""Of two neighbours, described."""
+"""Warning, with the descriptions of two neighbouring states."""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A run that could not go on, as its checks see it (`formingx.findings.register("failure")`).
+    """A failed run, the subject of the checks of `formingx.findings.register("failure")`.
 
     Attributes:
         facts: {field of a `Diagnosis`: its value}.
-        problem: the equations; last: the last good state, or None.
-        fixed_control: no limit point can be passed; target: the value of the control that was aimed at, or None.
+        problem: the equations.
+        last: the last good state, or None.
+        fixed_control: True if no limit point can be passed.
+        target: the target of the control, in the user's units, or None.
     """
 
     facts: dict[str, Any]
@@ -92,7 +94,9 @@ class Diagnosis:
         touching: nodes in contact in the last good state.
         condition, condition_before: 1-norm condition numbers (estimates) of the tangent of the last good state, and
             some states before it.
-        findings: causes that the numbers prove ("serious") or make likely ("warning"), with what to try.
+        findings: causes that the numbers prove ("serious") or make likely ("warning"), with advice.
+        what: name of the controlled quantity.
+        examined: examination of the body, which `picture` draws; None: there is no body.
     """
 
     reason: str
@@ -168,11 +172,15 @@ class Diagnosis:
 
 def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attempt | None = None, pace: str = "",
              target: float | None = None) -> Diagnosis:
-    """Everything that the last good state and the failed attempt tell; collective.
+    """Return the diagnosis of the last good state and the failed attempt; collective.
 
     Args:
-        states: the accepted ones, may be empty. attempt: None: no iteration failed. pace: further facts if
-            the run ended without a failure. target: of the control (the user's units), if the run has one.
+        curve: the solver.
+        states: the accepted states; may be empty.
+        reason: how the last attempt ended.
+        attempt: end of the failed iteration; None: no iteration failed.
+        pace: progress of a run that ended without a failure, as text, or "".
+        target: target of the control, in the user's units, or None.
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),
@@ -227,9 +235,10 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
 
 
 def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return neighbours whose orientations differ, limit points left out: there the sign is round-off.
+    """Return neighbours whose orientations differ.
 
-    Not across a jump or the start of a stage. Where a run went back from a state, its orientation turns with it.
+    Limit points are left out, since the sign there is round-off. So are pairs across a jump or the start of a stage.
+    Where a run turned back at a state, the orientation turns with it.
     """
     found = []
     last: State | None = None
@@ -258,7 +267,7 @@ def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
 
 
 def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
-    """Condition and signs of the determinant along the path, and the limit point that the last slopes point to.
+    """Return the condition number, the sign changes of the determinant, and the limit point that the slopes predict.
 
     A limit point is where the determinant of dF/dx changes its sign and the control is stationary; where it changes
     without that, another branch starts. The sign at two states says whether there was an odd number of changes
@@ -319,7 +328,7 @@ def _changes(states: Sequence[State], usable: Sequence[State],
 
 @register("failure")
 def _of_material(failure: Failure) -> Iterator[Finding]:
-    """Return a material near the end of its domain."""
+    """Yield a finding if a material is near the end of its domain."""
     facts = failure.facts
     if (facts.get("I1") or 0) > _LIMITS.material:
         yield Finding("serious", "material",
@@ -331,7 +340,7 @@ def _of_material(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_elements(failure: Failure) -> Iterator[Finding]:
-    """Return an element that turns inside out."""
+    """Yield a finding if an element is about to turn inside out."""
     facts = failure.facts
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
@@ -349,7 +358,7 @@ def _of_elements(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_compression(failure: Failure) -> Iterator[Finding]:
-    """Return a sheet in contact that is compressed along its section: it buckles."""
+    """Yield a finding if a sheet in contact is compressed along its section: it buckles."""
     if _buckles(failure.facts):
         stretch, first, last = failure.facts["shortened"]
         yield Finding("serious", "wall",
@@ -368,7 +377,7 @@ def _buckles(facts: dict[str, Any]) -> bool:
 
 @register("failure")
 def _of_limits(failure: Failure) -> Iterator[Finding]:
-    """Return a limit point before the target."""
+    """Yield findings on limit points before the target."""
     facts, target = failure.facts, failure.target
     if _buckles(facts):                                      # then the limit point is no more than its effect
         return
@@ -393,7 +402,7 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_branches(failure: Failure) -> Iterator[Finding]:
-    """Another branch, and contact that does not settle."""
+    """Yield findings on another branch, a singular tangent, and contact that does not settle."""
     facts = failure.facts
     what = facts["what"]
     for a, b in facts.get("turned", ()):
@@ -424,7 +433,7 @@ def _singular(facts: dict[str, Any]) -> bool:
 
 @register("failure")
 def _of_numbers(failure: Failure) -> Iterator[Finding]:
-    """Round-off."""
+    """Yield a finding if the condition number leaves only round-off."""
     facts = failure.facts
     if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
         yield Finding("warning", "round-off",

@@ -38,7 +38,7 @@ Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 
 
 class Measure(Protocol):
-    """A number of every state. size: its unit, in the user's units: 1e-12 of that is nothing."""
+    """A number of every state. size: its unit, in the user's units, of which 1e-12 is negligible."""
 
     size: float
 
@@ -50,7 +50,15 @@ class Measure(Protocol):
 
 
 class Standing(Protocol):
-    """A state to stand at. x: locally owned entries, shape (n,); setting: plain data of a `Setting`, or empty."""
+    """A state of a problem.
+
+    Attributes:
+        x: the unknowns, locally owned entries, shape (n,).
+        control: the control.
+        time: process time.
+        memory: the history variables from here on.
+        setting: plain data of a `Setting`, or empty.
+    """
 
     x: Array
     control: float
@@ -60,8 +68,14 @@ class Standing(Protocol):
 
 
 class Tractions(Protocol):
-    """Tractions of the law of contact at n points: force, shape (n, 2), stress; sense of sliding, shape (n,);
-    stiffness, dforce/dposition, shape (n, 2, 2), stress/length; status: `ContactStatus` of each, shape (n,)."""
+    """Tractions of the contact law at n points in c components.
+
+    Attributes:
+        force: shape (n, c), stress.
+        sense: sense of sliding, shape (n,).
+        stiffness: derivative of the force by the position, shape (n, c, c), stress/length.
+        status: `ContactStatus` of each point, shape (n,).
+    """
 
     force: Array
     sense: Array
@@ -90,10 +104,10 @@ class Increment(Protocol):
         """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:
-        """Return the forces and stiffnesses that `linearise` has taken, of some points, shapes (m, 2), (m, 2, 2)."""
+        """Return the forces and stiffnesses that `linearise` has taken, of some points, shapes (m, c), (m, c, c)."""
 
     def foretold(self, by: Array) -> Tractions:
-        """Return the law at the points after a motion, shape (n, 2), length."""
+        """Return the law at the points after a motion, shape (n, c), length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
         """Return a function that maps a motion of some of the points to their tractions."""
@@ -102,7 +116,7 @@ class Increment(Protocol):
         """Return a function that maps motions of m points to their depth and path in the ramp.
 
         The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
-        (m, 2), length; 0 where friction does not grow in the ramp.
+        (m, c), length; 0 where friction does not grow in the ramp.
         """
 
     def expect(self, points: Array, sense: Array) -> None:
@@ -123,14 +137,14 @@ class ContactFace(Protocol):
         """Factor of the tractions in the forces of F, shape (n,)."""
 
     def add(self, values: Array, forces: Array) -> None:
-        """Add forces at the points, shape (n, 2), to locally owned rows of F."""
+        """Add forces at the points, shape (n, c), to locally owned rows of F."""
 
     def leave_out(self, points: Array) -> None:
         """Keep some points (a mask, shape (n,)) open until another increment begins."""
 
     def moved(self, dx: Array, step: float) -> Array:
         """Return the motion of the points relative to the tool by a correction of x (locally owned) and the control;
-        (n, 2), length."""
+        (n, c), length."""
 
 
 class Viscosity(Protocol):
@@ -192,7 +206,7 @@ class Residual(Protocol):
         """out = F(x, control); sets `force_scale`."""
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """dF/dx in `matrix`; `ahead`: as it is beyond an accepted state, where F has a kink there."""
+        """Compute dF/dx in `matrix`; `ahead`: on the far side of an accepted state, if F has a kink there."""
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
         """out = dF/dcontrol."""
@@ -243,7 +257,7 @@ class ActiveSet(Protocol):
 
     @property
     def held(self) -> Array:
-        """Local numbers of the own unknowns that are held: no force moves them."""
+        """Local numbers of the locally owned unknowns that are constrained."""
         return np.zeros(0, dtype=np.int32)
 
     @property
@@ -258,7 +272,7 @@ class ActiveSet(Protocol):
         """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the stiffness `ahead` less that in the last tangent, shape (n, 2, 2), stress/length."""
+        """Return for each face the stiffness `ahead` less that in the last tangent, shape (n, c, c), stress/length."""
         return []
 
 
@@ -313,19 +327,19 @@ class Stages(Protocol):
         """Step data: amplitudes of the controls, and inactive items."""
 
     def enter(self, setting: Setting, x: Array, control: float) -> None:
-        """Take a setting, in which (x, control), locally owned entries, is a state."""
+        """Enter other step data at a state (x, control); x: locally owned entries."""
 
     def restore(self, state: Standing) -> None:
         """Restore the stage data and history variables of an accepted state, to start a step from it."""
 
     def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
-        """Stand at a state, its x and control too, and come back on leaving."""
+        """Return a context in which the problem, with its x and control, is at a state."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
         """Activate an item (its number in the setting), without history.
 
         Raises:
-            InputError: a tool comes in where the body is.
+            InputError: the tool overlaps the body.
         """
 
 
@@ -338,7 +352,7 @@ class Units(Protocol):
 
     @property
     def units(self) -> tuple[float, float]:
-        """One of the dimensionless energy and length in the user's units."""
+        """Unit of the dimensionless energy and unit of the dimensionless length, in the user's units."""
         return 1.0, 1.0
 
     @property

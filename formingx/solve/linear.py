@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from .equations import Array
 
-_SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: as it thinks best, as it was
+_SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: automatic choice; the scaling of the last factorisation
 
 
 def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
@@ -92,7 +92,7 @@ class DirectSolver:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
-        """Two matrices of n locally owned rows and m columns, the same as before if that had as many."""
+        """Return two matrices of n locally owned rows and m columns; those of the last call if they have m columns."""
         if not self._columns or self._columns[0].getSize()[1] != m:
             self._forget()
             for _ in range(2):

@@ -92,13 +92,13 @@ class FixedControlCurve(Curve):
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the same, to where an equation for the control holds."""
+        """Return the state at the control that the tangent predicts: there an equation for the control holds."""
         return self._correct(old, length, kind)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
         """Return the state at a fraction of the way between two, by the control; raises `Failure`."""
         control = a.control + fraction * (b.control - a.control)
-        if self._at_rest(a):                                 # a slack body has no cubic from there
+        if self._at_rest(a):                                 # a slack body has no tangent there
             return self._correct(a, (control - a.control) / a.slope, "step")
         return self.solve(self.interpolate(a, b, fraction)[0], control, _at(control), "step", a)
 

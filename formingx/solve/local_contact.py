@@ -58,10 +58,10 @@ _LOCAL = LocalContact()
 
 
 class LocalSolve:
-    """The points that arrived, or whose status changed, in one run of Newton's method.
+    """Local solve of the points whose gap closed, or whose status changed, in one run of Newton's method.
 
     Attributes:
-        failed: how often no consistent state of them was found.
+        failed: number of corrections without a consistent state of these points.
     """
 
     def __init__(self, problem: Equations):
@@ -71,7 +71,7 @@ class LocalSolve:
         self.failed = 0
 
     def look(self) -> None:
-        """Prepare an iteration, after the problem was linearised; called once each."""
+        """Mark the points of an iteration; call it once after each linearisation."""
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -128,7 +128,7 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
     Args:
         problem: the equations.
-        changes: for each contact, changes of the stiffness per area of its points, shape (n, 2, 2).
+        changes: for each contact, changes of the stiffness per area of its points, shape (n, c, c).
         solver: solver with the LU factors.
 
     Returns:
@@ -168,7 +168,7 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
 
 
 class _Points:
-    """A few points and the body as they see it. Arrays hold all ranks, except those said to be locally owned."""
+    """A few contact points with the compliance of the body. Arrays are of all ranks, but for locally owned ones."""
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):

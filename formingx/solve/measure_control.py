@@ -30,10 +30,10 @@ class FlowSteps:
     Attributes:
         stretched: a step is stretched to the next prescribed time within this number of step lengths. The last step
             is then never much shorter than the others.
-        cut: largest part that is left of a step that is too long: more would be the same step again.
-        still: relative change of the controlled quantity that is none, but for round-off.
-        located: error of the time of a limit point, over the step that it lies in.
-        met: deviation from a target, relative, of the state that is solved for where it was passed.
+        cut: largest part of a too long step with which it is repeated.
+        still: relative change of the controlled quantity that is round-off.
+        located: error of the time of a limit point, over the duration of the step.
+        met: relative deviation from a target of the state that is solved for where the target was passed.
         contact: smallest admissible ratio of the step length that new contact allows to the length of the step.
     """
 
@@ -52,10 +52,10 @@ class Flow(Run):
     """States in time along the course of a measure.
 
     Args:
-        record, accuracy: as of a `Run`.
-        measure: the `Bound` that follows the course.
-        course: its value, in the user's units, at a time.
-        times: that are hit, where the course begins, has its corners and ends.
+        record, accuracy, label: see `Run`.
+        measure: the prescribed measure (`Bound`).
+        course: function of time that gives its prescribed value, in the user's units.
+        times: times that are met exactly: the beginning, the corners and the end of the course.
         targets: (target, its measure) to meet on the way.
         step: step control whose lengths are parts of the duration.
     """
@@ -125,10 +125,9 @@ class Flow(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """Return the state between two in time at which the controlled quantity has a maximum or a minimum, if it
-        has; else the second.
+        """Return the state between two at which the controlled quantity has a maximum or a minimum, else the second.
 
-        Not where the course turns, or where the controlled quantity stands still but for round-off.
+        A corner of the course is no such state, nor is a constant controlled quantity with round-off.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
@@ -153,7 +152,7 @@ class Flow(Run):
         return new
 
     def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
-        """(x, control) at a time: on the polynomial through the last states, or along the tangent of the first."""
+        """Return (x, control) at a time: on the polynomial through the last states, or on the tangent of the first."""
         past = predictor.before(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
@@ -163,15 +162,15 @@ class Flow(Run):
     def _along(self, old: State, value: float) -> tuple[Array, float]:
         """Return the point on the tangent of a state with a value of the quantity; the state itself if there is none
         near."""
-        def off(s: float) -> float:
+        def deviation(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
-        now = off(0.0)
+        now = deviation(0.0)
         for sense in (1.0, -1.0):
             high = 1e-9 * sense
-            while now * off(high) > 0 and abs(high) < 1.0:
+            while now * deviation(high) > 0 and abs(high) < 1.0:
                 high *= 4
-            if now * off(high) <= 0:
-                s = _root(off, 0.0, high)
+            if now * deviation(high) <= 0:
+                s = _root(deviation, 0.0, high)
                 return old.x + s * old.direction, old.control + s * old.slope
         return old.x, old.control
 
@@ -197,13 +196,13 @@ class Flow(Run):
         """Return the state, one step from `old`, at the time between two when a measure has its target value."""
         found: dict[float, State] = {}
 
-        def off(time: float) -> float:
+        def deviation(time: float) -> float:
             found[time] = self._at(old, time) if time > low else old
             return self.curve.value(bound, found[time].x, found[time].control) - target.value
-        time = _root(off, low, high)
+        time = _root(deviation, low, high)
         state = found.get(time) or self._at(old, time)
-        left, most = abs(off(time)), _STEPS.met * max(abs(target.value), _STEPS.met)
-        if not is_met(target, bound.size, off(time) + target.value) and left > most:
+        left, most = abs(deviation(time)), _STEPS.met * max(abs(target.value), _STEPS.met)
+        if not is_met(target, bound.size, deviation(time) + target.value) and left > most:
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state

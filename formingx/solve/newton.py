@@ -93,9 +93,10 @@ class _ActiveSet:
     """The active set of contact, iteration by iteration.
 
     Attributes:
-        changed: the iteration at which it changed last; share: of a correction to take, halved when an active set comes
-            back: full corrections would cycle.
-        found: how often a small correction led to a new active set (`Newton.small`); returns: how often one came back.
+        changed: number of the iteration in which it changed last.
+        share: factor of a correction, halved when an earlier active set returns: full corrections would cycle.
+        found: number of small corrections that led to a new active set (`Newton.small`).
+        returns: number of returns to an earlier active set.
     """
 
     def __init__(self, problem: Equations, small: float):
@@ -105,7 +106,7 @@ class _ActiveSet:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def look(self, moved: float) -> None:
-        """Prepare an iteration, after the residual was computed; called once each; moved: by the correction before."""
+        """Note the active set of an iteration; call it once after each residual. moved: size of the last correction."""
         self._iteration += 1
         now = self._problem.active_set
         if now != self._last and self._last is not None:
@@ -194,16 +195,16 @@ class _ModifiedNewton:
         self._before, self._fall = 0.0, 1.0
 
     def made(self, setting: Setting | None) -> None:
-        """There is another tangent, of an equation with this setting; None: it could not be made."""
+        """Note that a new tangent was made with these step data; None: it is singular."""
         self._setting = setting
 
     def begin(self, setting: Setting | None, allowed: bool) -> None:
-        """Newton's method begins at a guess; `allowed`: tangents may be kept in this step."""
+        """Begin Newton's method at a guess; `allowed`: tangents may be kept in this step."""
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0
 
     def keeps(self, residual: float, requested: float) -> bool:
-        """Return True if the tangent is kept for the next iteration, from this residual to the one wanted."""
+        """Return True if the tangent is kept for the next iteration, from this residual to the requested one."""
         ahead = residual * self._fall**self._settings.chords
         return self._allowed and self._fall < self._settings.slow and ahead < requested
 
@@ -294,8 +295,8 @@ class BorderedNewton:
                 chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate x (in place) and control to convergence; returns the control and the history.
 
-        `old`: the state that they are a guess ahead of, if there is one. `chords`: tangents may be kept where
-        that costs less and no contact has kinks (modified Newton).
+        `old`: the accepted state before the guess, or None. `chords`: tangents may be kept where that costs less and F
+        has no kinks (modified Newton).
 
         Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
         that was kept).
@@ -377,7 +378,10 @@ class BorderedNewton:
             raise Failure(f"{where}no convergence in {len(history)} Newton iterations", history)
 
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
-        """`self.a` = -K^-1 F; but in a chord iteration with a new K and, without drag, `self.b`; False if singular."""
+        """Compute `self.a` = -K^-1 F; return False if K is singular.
+
+        But in a chord iteration, K is factorised before, and without drag `self.b` is computed, too.
+        """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False
         if chord or self._drag:

@@ -1,4 +1,4 @@
-"""Follows the path of a scene through limit points to a target (Riks 1979; Song 1993, eqs. 4.8 to 4.31).
+"""Path following of a scene through limit points to a target (Riks 1979; Song 1993, eqs. 4.8 to 4.31).
 
 A step predicts along the tangent and corrects in the plane normal to it (Keller), in a norm that knows neither the
 mesh nor the units. Targets are hit exactly: within reach, the equation "measure = target" takes the plane's place.
@@ -59,7 +59,7 @@ class Run:
             "snap_through" to the next state, or "stop"; None: as `at_limit_points` says.
         accuracy: the error in time that is allowed, relative.
         label: text before the target beside a progress bar.
-        wanted: one of the targets that ends the run as the last does, or None.
+        requested: another target that ends the run, as the last does, or None.
     """
 
     settings = PathFollowing()
@@ -74,16 +74,17 @@ class Run:
         self._step, self._began = step, time.perf_counter()
         self._ahead = self.settings.snap_through.ahead      # the amount by which the control goes on in a jump
         self._no_rest_at = np.nan                           # control from which a body that jumped reached rest nowhere
-        self._turned: list[State] = []                      # its first state, if it goes back from there
+        self._turned: list[State] = []                      # the first state of a run that turned back there
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or on from the last one, until the last target is met.
 
-        max_steps: states before the run gives up; None: it does when many states have come no nearer.
-        may_turn: one that goes on, to another target than the states were on their way to, may go back to it.
+        max_steps: number of states after which the run gives up; None: it gives up when many states came no nearer to
+            the target.
+        may_turn: a continued run with another target than before may go back along the path to it.
 
         Raises:
-            ConvergenceError: it cannot be reached; without the path, which the record holds.
+            ConvergenceError: the target cannot be reached. The error has no `path` yet; the record holds the states.
         """
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
@@ -167,9 +168,13 @@ class Run:
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _go_on(self, may_turn: bool) -> dict[str, Any]:
-        """Take up the states with the last one's setting as those of this run; and their data for the continuation.
+        """Make the recorded states with the step data of the last one the states of this run.
 
-        If it turns, its first state is the last one. (It does not turn to a pressure, which may come again ahead.)
+        If the run turns, its first state is the last one. (It does not turn back to a pressure, which may be reached
+        ahead, too.)
+
+        Returns:
+            The data (`State.stepping`) with which the run continues; empty if no state has any.
         """
         record, last = self.record, self.record.last
         there = record.restore()
@@ -199,7 +204,7 @@ class Run:
         self.record.counts.seconds += self._elapsed()
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
         self.record.complete_step(self.step, self.aim.until, given=self._step and asdict(self._step),
-                           accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
+                                  accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
         """Return the next states: one at a target within reach, or one step ahead, and those between.
@@ -317,7 +322,10 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """Return the state that the body jumps to from a fold; none if there is none: a body left alone has snapped."""
+        """Return the state after a snap-through from a limit point, as a list.
+
+        The list is empty, and the run ends, if a body with constant loads reaches no equilibrium.
+        """
         onward = self._sense * (self._limit_rule == "continue_volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
@@ -336,8 +344,8 @@ class Run:
 
         step: the length of the last step that went well; onward: see `snap_through`.
 
-        From where the body is, contact that remembers may settle at one control and not at another next to it: others
-        are tried, too. A fading force is removed at once: on the way it is a load of its own, which no process has.
+        With length 0, contact with a history may settle at one control and not at another next to it: others are tried,
+        too. A fading force is removed at once, since no process has it as a load of its own.
         """
         fading, settings = self.problem.setting.fading, self.settings.snap_through
         others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
@@ -366,7 +374,7 @@ class Run:
         return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
-        """Viscous ones that a jump from a state may take."""
+        """Return the largest number of viscous solutions of a jump from a state."""
         most = self.settings.snap_through.solutions
         return most // 5 if self._found_no_rest_near(old) else most
 
@@ -412,7 +420,7 @@ class Run:
         return self.curve.hold_late(old, [*found, new], self.aim.open)
 
     def _accept(self, state: State) -> None:
-        """Take up a state and close the targets that it meets."""
+        """Accept a state and close the targets that it meets."""
         record = self.record
         try:
             record.accept(state)

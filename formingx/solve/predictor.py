@@ -13,11 +13,9 @@ CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a
 
 
 def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """Return the last states, at most this number of, on whose polynomial a time lies ahead: in order, from the last
-    jump on.
+    """Return the last states, at most `most`, to extrapolate to a time: in order, from the last jump on.
 
-    Those closer than the part `close` of the step ahead are merged: their errors would be
-    magnified.
+    States closer in time than the part `close` of the step ahead are left out, since their errors would be magnified.
     """
     found: list[State] = []
     for state in reversed(states):

@@ -29,7 +29,7 @@ from .state import State
 from .stepping import SAME_TIME, StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
-"""Step control of a material that relaxes: the error in time soon transfers."""
+"""Step control of a material that relaxes: after the first steps the error in time sets their length."""
 
 _HELD = replace(_IN_TIME, target=8)
 """In contact while nothing is driven: points in contact hardly move; the error in time says how long steps may be."""
@@ -38,15 +38,18 @@ _Targets: TypeAlias = list[tuple[Target, Measure]]
 
 
 class Execution:
-    """One run of a process: from where it stands, stage by stage.
+    """One run of a process, stage by stage, from its last state on.
 
-    Piece 0 of a stage changes the active items, pieces from 1 on drive; each has one `Setting`.
+    Piece 0 of a stage changes the active items. In each later piece a control varies. Each piece has one `Setting`.
 
     Args:
-        record: where the states go. plans: of the stages. unsure: those whose tools are to be looked at again when
-            their turn comes; look: looks at one, given a function for the value of an item (its number),
-            the user's units. step: step control of stages that have none of their own.
-        balanced: forces left over, relative to the support forces, that count as none.
+        record: record of the states.
+        plans: plans of the stages.
+        unsure: plans whose tools must be checked again at the start of their stage.
+        look: function that checks such a plan, given a function from the number of an item to its value in the user's
+            units.
+        step: step control of stages that have none of their own.
+        balanced: out-of-balance forces, relative to the support forces, that are negligible.
         accuracy: the error in time that is allowed, relative.
     """
 
@@ -63,7 +66,7 @@ class Execution:
         problem.enter(self._still, self._rest, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
-        """All stages that are left."""
+        """Run the remaining stages."""
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
         if self.record.states:
@@ -136,14 +139,14 @@ class Execution:
             raise ConvergenceError(f"{self._stage.who} cannot begin: {failure.reason}") from None
 
     def _take_up(self, state: State) -> None:
-        """Take up a state that needs no solving."""
+        """Accept a state that needs no solving."""
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
-        """Follow the path from a control (None: on from the last state); returns the targets that are still open.
+        """Follow the path from a control (None: on from the last state); return the targets that are still open.
 
-        wanted: one that ends it as the last of them does.
+        requested: another target that ends the path, as the last one does.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -184,7 +187,7 @@ class Execution:
         self._trace(self._left_to_meet(), None if begun else control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
-        """Make the amplitude of one item the control; `clocked`: time goes by as it moves. The control now."""
+        """Make the amplitude of one item the control; return its present value. `clocked`: time passes as it moves."""
         base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control

@@ -22,8 +22,11 @@ class Aim:
     """The open targets of a run, and the values of the last one, which ends it, in its states.
 
     Attributes:
-        open: [(target, its measure)]; until, measure: those of the last; values: of that, in the user's units.
-        patience: states that gain less than a thousandth of the way to the target, after which a run gives up.
+        open: [(target, its measure)].
+        until, measure: the last target and its measure.
+        values: values of this measure in the states so far, in the user's units.
+        patience: number of states after which a run gives up, if they gained less than a thousandth of the way to the
+            target.
     """
 
     patience = 500
@@ -49,7 +52,7 @@ class Aim:
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def look(self, state: State) -> None:
-        """Take up the value of a state."""
+        """Add the value of a state, and update the progress."""
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self._best = max(self._best, self.gained())
 
@@ -103,9 +106,9 @@ class Aim:
     # why a run should give up, as text; "" if nothing speaks against going on
 
     def turned_back(self) -> str:
-        """Return True if the target is further away than half of the progress.
+        """Return a text if the run has lost more than half of its progress to the target, else "".
 
-        (A control may fall again after a limit point, but not below where it started.)
+        (A control may fall again after a limit point, but not below its first value.)
         """
         if not self.is_open():
             return ""
@@ -118,7 +121,7 @@ class Aim:
         return ""
 
     def jumped_past(self, state: State) -> str:
-        """Return the error of a body that has snapped to a state beyond the target."""
+        """Return a text if the body has snapped to a state beyond the target, else ""."""
         if state.kind == "jump" and self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
@@ -126,7 +129,7 @@ class Aim:
         return ""
 
     def stalled(self) -> str:
-        """Many states have come no nearer to the target."""
+        """Return a text if many states came no nearer to the target, else ""."""
         if len(self.values) > self.patience:
             now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
             if abs(now - then) < 1e-3:
@@ -147,7 +150,9 @@ class Progress:
     """Progress of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
 
     Args:
-        comm: of the run. words: its subject. shown: False: no bar, and lines are of the level INFO.
+        comm: communicator of the run.
+        words: text before the progress.
+        shown: False: no bar, and lines are of the level INFO.
 
     Attributes:
         silence: seconds of processor time after which a line says where a run stands.

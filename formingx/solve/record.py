@@ -22,8 +22,15 @@ log = logging.getLogger("formingx")
 
 @dataclass
 class Counts:
-    """Cost of a run: accepted states (without the start), failed attempts, all Newton iterations (with a tangent that
-    was kept, too), seconds; limits: {reason for a shorter or failed step: count}."""
+    """Cost of a run.
+
+    Attributes:
+        steps: accepted states without the start.
+        failures: failed attempts.
+        iterations: all Newton iterations, chord iterations included.
+        seconds: duration.
+        limits: {reason for a shorter or failed step: count}.
+    """
 
     steps: int = 0
     failures: int = 0
@@ -37,8 +44,9 @@ class Segment:
     """States of one problem, in order; a run that changes its problem goes on in another segment.
 
     Attributes:
-        problem: the `Equations`, as whoever made them knows them (`Problem`); curve: the `Curve` that solves for
-            their states; states: list of `State`.
+        problem: the `Equations`, with the full interface of its class (`Problem`).
+        curve: the `Curve` that solves for their states.
+        states: list of `State`.
     """
 
     problem: Any
@@ -51,7 +59,7 @@ class Unusable(ConvergenceError):
 
 
 class Record:
-    """The accepted states of a run, in order, and who is told of them.
+    """The accepted states of a run, in order, and the functions that are called with them.
 
     Attributes:
         segments: list of `Segment`, the last of which grows.
@@ -62,7 +70,7 @@ class Record:
         on_step: functions called whenever a step is complete.
         on_end: functions called when the run ends, with the text of the failure, or "", and the findings of the run.
         findings: of the checks before the run.
-        judge: says of a state whose measures are known why it is none that a body can have, "" if it is one.
+        judge: function that returns the reason for which no body can have a state with known measures, or "".
         allow_inadmissible: keep such states, too.
     """
 
@@ -78,12 +86,12 @@ class Record:
 
     @property
     def problem(self) -> Any:
-        """The problem that is being solved, as whoever made it knows it."""
+        """The present problem, with the full interface of its class."""
         return self.segments[-1].problem
 
     @property
     def equations(self) -> Equations:
-        """The same as the solver sees it."""
+        """The present problem through the interface of the solver."""
         return self.curve.problem
 
     @property
@@ -104,10 +112,10 @@ class Record:
         return self.segments[-1].states[-1]
 
     def restore(self) -> int:
-        """Let the problem stand at the last state, its setting taken where it began; the number of states with that.
+        """Restore the last state in the problem; return the number of last states with the same step data.
 
-        (Constrained unknowns, and fading forces, are reckoned from where a setting began: elsewhere it would differ
-        by round-off.)
+        (The first of these states is restored before: constrained unknowns and fading forces count from it, and would
+        else differ by round-off.)
         """
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
@@ -126,7 +134,7 @@ class Record:
         """Accept a state: the histories continue from it.
 
         Raises:
-            Unusable: it is none that a body can have; the record is as it was before.
+            Unusable: no body can have this state. The record is then unchanged.
         """
         problem, memory = self.equations, self.equations.memory
         problem.advance(state.x, state.control)

@@ -60,10 +60,10 @@ class SnapThrough:
             (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
         iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
             halves its length.
-        near_rest: viscous forces below which the state in the reference configuration is looked for.
+        near_rest: viscous forces below which equilibrium without them is tried.
         sweeps: solutions in which a body releases a tool in three dimensions.
-        at_rest: viscous forces below which the body rests, though where a point is at a kink of its law of friction the
-            iteration without them may go to and fro.
+        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without them fails. It may
+            oscillate where a point is at a kink of its law of friction.
     """
 
     lengths: tuple[float, ...] = (1e-2, 1e-3)
@@ -103,7 +103,7 @@ class NoEquilibrium(Failure):
 
 
 class ViscousDrag:
-    """eta V (x - origin), locally owned entries; nothing at unknowns that are held."""
+    """Forces eta V (x - origin), locally owned entries; 0 at constrained unknowns."""
 
     def __init__(self, viscosity: Viscosity):
         self._viscosity = viscosity
@@ -146,7 +146,7 @@ class _Motion:
         return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
 
     def move(self, origin: Array, eta: float) -> float:
-        """One viscous solution from `origin`; the factor by which eta may change then."""
+        """Solve once with viscosity from `origin`; return the factor by which eta may change then."""
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
         try:
@@ -178,13 +178,16 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """No solution, or one too far off: the factor by which eta grows; it does not fall right after the next one."""
+        """Return the factor by which eta grows after a rejected solution; eta does not fall after the next one."""
         self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:
-        """Return the state in the reference configuration, if there is one near; raises `Failure` if the body,
-        without a history, rests at none."""
+        """Return the state in equilibrium near the present position without viscous forces, or None.
+
+        Raises:
+            Failure: the viscous forces vanish, but a body without a history has no equilibrium here.
+        """
         try:
             with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
@@ -209,9 +212,10 @@ class _Motion:
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
-        """Work of the unbalanced forces from a to x (trapezoidal rule: half way there the chord cuts into tools).
+        """Add the work of the unbalanced forces from a to x to the dissipated energy, by the trapezoidal rule.
 
-        A force at a that has turned before x is none that the body moved by: viscous forces do no negative work.
+        (The forces half way are not used, since the chord cuts into tools.) Negative work of the force at a is left
+        out: viscous forces do no negative work.
         """
         by = x - a
         self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))
@@ -233,8 +237,10 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
 
     Args:
         by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start where the tangent leads to, not where the body is.
-        solutions: viscous ones, at most; `told` is called before each.
+        ahead: start at the end of the tangent, not at `old`.
+        settings: criteria and settings.
+        solutions: largest number of viscous solutions; default `settings.solutions`.
+        listener: function that is called before each of them.
         onward: 1 or -1, the sign of the work that the driven load does on the way, as where a volume has its maximum;
             0: either.
         passed: states before, to whose path the body does not go back.

@@ -89,7 +89,7 @@ class Stage:
 
     @property
     def waits(self) -> bool:
-        """True if it ends when `until` is met while time goes by and nothing is driven."""
+        """True if the stage ends when `until` is met while time passes and nothing is controlled."""
         return self.until is not None and self.control is None and not self.tables
 
     @property
@@ -171,8 +171,15 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """A stage with the items of the scene by their numbers: its controls, [(number, table)], its inactive items; and
-    all of them as text."""
+    """A stage with the items of the scene by their numbers.
+
+    Attributes:
+        stage: the stage.
+        numbers: the controlled item and the items that move with it; empty without `Stage.control`.
+        tables: [(number, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
+        off: the inactive items.
+        names: all items of the scene, as text.
+    """
 
     stage: Stage
     numbers: list[int]

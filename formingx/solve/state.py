@@ -14,7 +14,7 @@ class State:
     """One converged state. Two states are equal only if they are the same object.
 
     Attributes:
-        x: the unknowns, this rank's part (dimensionless).
+        x: the unknowns, locally owned entries (dimensionless).
         control: the dimensionless control.
         direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
         measures: {name: value} in the user's units.
@@ -30,8 +30,8 @@ class State:
         time: process time.
         orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
             points too, until another path branches off; 0 if it is not known.
-        admissibility check: why it is no state that a body can have, as text; "" but in a run that went on beyond
-        (`Record`).
+        verdict: reason for which no body can have this state, as text; "" for an admissible state. Only a run with
+            `allow_inadmissible=True` continues past such a state.
 
     >>> state = path.limit_points[0]
     >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)

@@ -17,7 +17,7 @@ ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
 """Error of stress and thickness that each promises."""
 
 SAME_TIME = 1e-12
-"""What times may differ by, relative, to count as the same."""
+"""Largest relative difference of times that count as equal."""
 
 
 @dataclass
@@ -89,12 +89,13 @@ def allowed(caller: str, accuracy: str | float) -> float:
 
 
 class TimeError:
-    """Measures steps in time.
+    """Time integration error of steps, over its tolerance.
 
     Args:
-        accuracy: the error promised. once: part of it that is allowed at the end of a step, if the next step forgets
-            it. adding_up: allowed over the promised one to the power 3/2 if it lasts: steps of the third root of it add
-            up to that.
+        problem: the equations.
+        accuracy: the promised error.
+        once: part of the promised error that is allowed at the end of a step, if later steps do not keep it.
+        adding_up: error that is allowed if later steps keep it, over the promised error to the power 3/2.
     """
 
     def __init__(self, problem: Equations, accuracy: float, once: float = 0.5, adding_up: float = 0.5):

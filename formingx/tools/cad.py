@@ -27,7 +27,7 @@ _BUSY = 20                      # times as long by the clock: the machine may be
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return {number: what makes its pieces, or raises the error of one that is no tool's}; `kind`: "step" or "brep".
+    """Return {number: function that returns the pieces of a curve, or raises its error}; `kind`: "step" or "brep".
 
     Raises:
         InputError: the file cannot be read.

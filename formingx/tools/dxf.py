@@ -16,7 +16,7 @@ from .profile import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return {number: what makes its pieces} of the curves of a drawing's model space, counted from 1 in its order.
+    """Return {number: function that returns the pieces} of the curves of a drawing's model space, numbered from 1.
 
     Texts, dimensions, hatches and points count as nothing, nor does what cannot be seen. Ellipses and splines become
     arcs within `tolerance` (length).

@@ -18,11 +18,11 @@ _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATT
               "DIMENSION", "DWFUNDERLAY", "GEOPOSITIONMARKER", "HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER",
               "LIGHT", "MPOLYGON", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SHAPE",
               "SOLID", "TEXT", "TOLERANCE", "TRACE", "VIEWPORT", "WIPEOUT")
-"""What a drawing has beside its curves."""
+"""Entities of a drawing other than curves."""
 
 
 def check(file: str, others: tuple[str, ...]) -> Counter:
-    """{kind: how many} of the curves in the drawing; `others`: kinds that are let through as they are.
+    """Return {kind: number of the curves of it} of a drawing; `others`: kinds that are not checked.
 
     Raises:
         ValueError: what is wrong, and in which line.

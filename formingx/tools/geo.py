@@ -66,7 +66,7 @@ class _Drawing:
         self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
-        """Take one statement in; a ValueError that names its fault."""
+        """Add one statement; raise a ValueError that names its fault."""
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
             if kind in ("Point", "Line", "Circle"):

@@ -54,7 +54,7 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
     Args:
         radius: of the flat top, length; height: from the base plate up to the top.
         base: Z of the base plate.
-        draft: angle between the wall and the Z axis, degrees; the outer edge of the ramp is wider than the top.
+        draft: angle between the wall and the Z axis, degrees; the base is wider than the top.
         fillet, foot: radii of the edge around the top and of the edge between wall and base plate, length.
 
     >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)

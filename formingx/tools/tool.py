@@ -8,8 +8,8 @@ from .profile import Nearest
 
 
 class RigidTool(Protocol):
-    """A rigid tool in the reference configuration, which moves as a whole: n points are seen from it. A `Tool` and a
-    `SolidTool` are.
+    """A rigid tool at a travel of 0, such as a `Tool` or a `SolidTool`. It moves as a whole, so that points are given
+    relative to it.
 
     Distances must be exact near the surface: a penalty 1e5 times as stiff as the body multiplies their errors.
     """

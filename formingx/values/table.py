@@ -43,7 +43,7 @@ class Table:
         return self._curve(np.clip(x, self.x[0], self.x[-1]))
 
     def check(self, x: Any, name: str = "x") -> None:
-        """Raise an InputError unless all numbers x lie in the table; `name`: its name in it."""
+        """Raise an InputError unless all numbers x lie in the table; `name`: name of x in the message."""
         x = np.asarray(x, dtype=float)
         near = 1e-9 * (self.x[-1] - self.x[0])
         outside = ~((x >= self.x[0] - near) & (x <= self.x[-1] + near))

@@ -25,7 +25,7 @@ class FunctionOfTemperature:
 
     Args:
         function: f. words: its name in messages.
-        limits: lowest and highest temperature at which it is known; None: those of f, if it has any.
+        limits: lowest and highest temperature at which it is known; None: the limits of f, if it has any.
 
     Attributes:
         limits: the same; infinite where there are none.
