@@ -67,7 +67,7 @@ def test_paragraphs_are_filled():
     assert all(len(line) <= make_validation.WIDTH for line in lines[10:]) and len(lines) == 14
 
 
-@pytest.mark.parametrize("elements", [(20, 1), (40, 2)])
+@pytest.mark.parametrize("elements", [(20, 1), pytest.param((40, 2), marks=pytest.mark.slow)])
 def test_treloar(elements):
     found = treloar_mesh.pressures(elements, fx.SimplySupported("rim"))
     name = f"treloar_mesh/simply supported {elements[0]}x{elements[1]}"

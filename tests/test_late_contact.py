@@ -17,6 +17,12 @@ def draw(size, friction="stick", **more):
                     supports=[fx.SimplySupported("rim")], model=fx.Membrane(wrinkles=0.01), **more)
 
 
+@pytest.fixture(scope="module")
+def drawn():
+    """A box drawn to 20, past a travel and a force."""
+    return fx.trace(draw(16.0), until=fx.travel(20.0), intermediate=[fx.travel(5.0), fx.force(2.0)], progress=False)
+
+
 def serious(path):
     """The texts of serious findings."""
     return [found.text for found in path.findings() if found.severity == "serious"]
@@ -24,10 +30,11 @@ def serious(path):
 
 @pytest.mark.parametrize("more", [{}, {"friction": "none"}, {"tool": fx.tools.revolved(fx.tools.sphere(
     radius=35.0, z=0.5))}])
-def test_nothing_is_in_a_tool_at_a_target(more):
+def test_nothing_is_in_a_tool_at_a_target(drawn, more):
     """Targets are met exactly, of a box one of the force, too; between them points do come late."""
     targets = [fx.travel(5.0), *([] if more else [fx.force(2.0)]), fx.travel(20.0)]
-    path = fx.trace(draw(16.0, **more), until=targets[-1], intermediate=targets[:-1], progress=False)
+    path = fx.trace(draw(16.0, **more), until=targets[-1], intermediate=targets[:-1],
+                    progress=False) if more else drawn
     for target in targets:
         met = path.met(target).measures
         assert abs(met["travel" if target.name == "travel" else "tool_force"]) == pytest.approx(target.value, rel=1e-8)
@@ -45,9 +52,9 @@ def test_a_stage_ends_without_late_contact():
         assert end.measures["penetration"] < 2e-3 * THICKNESS
 
 
-def test_a_point_deep_in_a_tool_is_told_in_words():
+def test_a_point_deep_in_a_tool_is_told_in_words(drawn):
     """A penetration of 0.2 at the last state is a serious finding; one of 5 makes the state inadmissible."""
-    path = fx.trace(draw(16.0), until=fx.travel(12.0), progress=False)
+    path = drawn
     state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)
     assert serious(path) == [] and path._view(path.segments[-1]).verdict.of(state) == ""
     state.x[up] = found[up] + 0.2 / path.problem.forms.length
@@ -55,3 +62,4 @@ def test_a_point_deep_in_a_tool_is_told_in_words():
     assert "point is 0.2 deep in the tool of 'plug' at (x, y, z) = (" in words
     state.x[up] = found[up] + 5.0 / path.problem.forms.length
     assert "deep in the tool of 'plug'" in path._view(path.segments[-1]).verdict.of(state)
+    state.x[up] = found[up]

@@ -35,14 +35,16 @@ def whole():
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize("name", MISSING)
-def test_the_core_without_an_extension(name, whole, tmp_path):
-    """Without its folder a relaxing warm sheet blown against a plate ends in the same state, to the last bit."""
-    absent = [f"assert not hasattr(fx, {thing!r})" for thing in MISSING[name]]
-    absent += [f"assert not hasattr(fx.Path, {method!r})" for method in METHODS.get(name, ())]
-    assert all(hasattr(fx, thing) for thing in MISSING[name])
-    assert all(hasattr(fx.Path, method) for method in METHODS.get(name, ()))
-    file, *found = run_without(tmp_path, [name], "-c", "\n".join([SCRIPT, *absent])).splitlines()
+@pytest.mark.parametrize("names", [tuple(MISSING), *(pytest.param((name,), marks=pytest.mark.slow)
+                                                     for name in MISSING)])
+def test_the_core_without_extensions(names, whole, tmp_path):
+    """Without their folders a relaxing warm sheet blown against a plate ends in the same state, to the last bit."""
+    things = [thing for name in names for thing in MISSING[name]]
+    methods = [method for name in names for method in METHODS.get(name, ())]
+    assert all(hasattr(fx, thing) for thing in things) and all(hasattr(fx.Path, method) for method in methods)
+    absent = [f"assert not hasattr(fx, {thing!r})" for thing in things]
+    absent += [f"assert not hasattr(fx.Path, {method!r})" for method in methods]
+    file, *found = run_without(tmp_path, names, "-c", "\n".join([SCRIPT, *absent])).splitlines()
     assert file.startswith(str(tmp_path)) and found == whole[1:]
     assert np.frombuffer(bytes.fromhex(found[-1].split()[1])).max() > 0.1
 
