@@ -410,8 +410,7 @@ def files() -> dict[str, str]:
         "path.to_csv": path.to_csv,
         "path.save": path.save, "path.report": path.report,
         "path.animate": lambda file: path.animate(file.with_suffix(".gif"), frames=3),
-        "path.to_vtx": lambda file: path.to_vtx(file.with_suffix(".bp"), "all"),
-        "path.to_xdmf": lambda file: path.to_xdmf(file.with_suffix(".xdmf"), "all"),
+        "path.to_vtk": lambda file: path.to_vtk(file.with_suffix(".pvd"), "all"),
         "write_summary": lambda file: fx.results.files.write_summary(file, {"a": "x" * 200_000}, path.problem.comm)}
     found = {}
     for name, write in writers.items():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import ufl
 from mpi4py import MPI
+from test_files import steps_of
 from test_restart import same
 
 import formingx as fx
@@ -228,10 +229,11 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     assert "remesh" in page
     path.animate(tmp_path / "film.gif", frames=4)
     path.to_stl(tmp_path / "part.stl")
-    path.to_xdmf(tmp_path / "last.xdmf")
-    path.to_xdmf(tmp_path / "first.xdmf", path.segments[0].states)
-    with pytest.raises(fx.InputError, match="a file holds one mesh"):
-        path.to_xdmf(tmp_path / "all.xdmf", "all")
+    ends = [segment.states[-1] for segment in path.segments]
+    path.to_vtk(tmp_path / "run.pvd", ends)
+    steps = steps_of(tmp_path / "run.pvd")
+    for (_, step), entry in zip(steps, path.segments, strict=True):
+        assert len(step["points"]) == 6 * entry.problem.forms.domain.topology.index_map(2).size_local
     with pytest.raises(fx.InputError, match="filling: is not available for a remeshed run"):
         path.filling()
     with pytest.raises(fx.InputError, match="trim: is not available for a remeshed run"):

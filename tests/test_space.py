@@ -475,7 +475,8 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
     np.testing.assert_allclose(np.sort(fields["thickness"][:, 0, 0]), np.sort(path.wall().wall), rtol=1e-12)
     np.testing.assert_allclose(fields["thickness_ratio"] * 0.02, fields["thickness"], rtol=1e-12)
     assert fields["displacement"].shape[-1] == 3 and fields["displacement"][..., 2].min() < -0.1
-    path.to_xdmf(tmp_path / "tray.xdmf")
+    path.to_vtk(tmp_path / "tray.pvd")
+    assert (tmp_path / f"tray-{len(path) - 1}.vtu").exists()
 
 
 @pytest.mark.parametrize("wrinkles", [None, 0.01])

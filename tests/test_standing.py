@@ -39,11 +39,11 @@ def test_a_found_state_is_that_of_a_run_that_steps_there(path, target, stage):
 
 
 def test_files_and_fields_of_a_found_state(path, tmp_path):
-    """VTX, profile and stress at recorded and found states; the run's last state stays what it was."""
+    """VTK files, profile and stress at recorded and found states; the run's last state stays what it was."""
     before = dict(path.last.measures)
     found = path.at(fx.travel(1.1, of="plug"))
     for k, state in enumerate((found, end(path, "down"))):
-        path.to_vtx(tmp_path / f"{k}.bp", state)
+        path.to_vtk(tmp_path / f"{k}.pvd", state)
         assert path.profile(state).thickness.min() > 0
         assert np.isfinite(path.stress(state).at_quadrature_points().cauchy).all()
     assert {c: path.value(c, path.last) for c in path.columns} == pytest.approx(before, rel=1e-12, abs=1e-14)

@@ -86,20 +86,22 @@ class Path(States):
         kept.write()
         kept.end("", self.findings())
 
-    def to_vtx(self, folder: Any, states: Any = None) -> None:
+    def to_vtk(self, file: Any, states: Any = None) -> None:
         """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.
 
+        A file run-3.vtu for state 3 stands beside run.pvd, which lists the time steps; the time is the number of the
+        state. The states of a remeshed run have their meshes.
+
         Args:
-            folder: its name ends in .bp.
+            file: its name ends in .pvd.
             states: a state, several in order, or "all".
+
+        Raises:
+            InputError: the name ends otherwise, or a state is not of the path.
+            OSError: a file cannot be written.
         """
         from .files import fields
-        fields.to_vtx(self, folder, states)
-
-    def to_xdmf(self, file: Any, states: Any = None) -> None:
-        """Write the same fields as `to_vtx`, for programs that do not read VTX; the name ends in .xdmf."""
-        from .files import fields
-        fields.to_xdmf(self, file, states)
+        fields.to_vtk(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
         """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).

@@ -1,4 +1,4 @@
 """Files that people and programs open."""
 
 from ...io.output import replace
-from .tabular import named, on_root, reserve, versions, write_path, write_profile, write_rows, write_summary
+from .tabular import named, on_root, versions, write_path, write_profile, write_rows, write_summary

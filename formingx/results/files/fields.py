@@ -1,4 +1,4 @@
-"""Fields of states on the whole body, for ParaView: VTX (through ADIOS2) or XDMF.
+"""Fields of states on the whole body, for ParaView and other programs that read VTK's XML files.
 
 Every triangle gets six nodes of its own, so that nothing is smeared over an interface. The fields:
 
@@ -17,19 +17,11 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
 A membrane has displacement and thickness only. Rank 0 writes.
 """
 
-import os
-import shutil
-from collections.abc import Callable
-from pathlib import Path as FilePath
 from typing import Any
-from xml.etree import ElementTree
+from xml.sax.saxutils import quoteattr
 
-import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem, has_adios2, io
-from dolfinx import mesh as dolfinx_mesh
-from mpi4py import MPI
 
 from ... import _compat
 from ...errors import InputError
@@ -38,8 +30,8 @@ from ...mesh.nodes import own_cells
 from .. import files
 from ..evaluate.contact_face import ContactFace
 
-_NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])}
-"""Places of the nodes in the reference cell, in DOLFINx order, by dimension."""
+_NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]])}
+"""Places of the nodes in the reference cell, in the order of VTK, by dimension."""
 
 
 class Fields:
@@ -119,51 +111,57 @@ class Fields:
         return pressure
 
 
-def to_vtx(path: Any, folder: Any, states: Any = None) -> None:
-    """Write a VTX folder (name ends in .bp): P2 fields on P2 triangles, time is the number of the state.
+def to_vtk(path: Any, file: Any, states: Any = None) -> None:
+    """Write a .pvd file and beside it a .vtu file for each state: elements with quadratic fields; rank 0 writes.
 
     Raises:
-        InputError: this DOLFINx has no ADIOS2, the name does not end in .bp, or a state is not of the path.
+        InputError: the name does not end in .pvd, or a state is not of the path.
+        OSError: a file cannot be written.
     """
-    if not has_adios2:
-        raise InputError("to_vtx: this DOLFINx was built without ADIOS2: use to_xdmf")
-    _write(path, folder, states, ".bp", _vtx)
+    file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
+    fields: dict[int, Fields] = {}                          # by mesh
+    pieces = []
+    for number, state in _chosen(path, states):
+        key = id(path.segment(state).problem)
+        if key not in fields:
+            fields[key] = Fields(path.alone(state))
+        points = _gather(fields[key].points, comm)
+        values = {name: _gather(v, comm) for name, v in fields[key].of(state).items()}
+        pieces.append((number, file.with_name(f"{file.stem}-{number}.vtu"),
+                       _as_vtu(points, values) if comm.rank == 0 else ""))
+
+    def put(target, text):
+        files.replace(target, lambda stream: stream.write(text))
+
+    def write():
+        for _, piece, text in pieces:
+            put(piece, text)
+        steps = [f'<DataSet timestep="{number}" file={quoteattr(piece.name)}/>' for number, piece, _ in pieces]
+        put(file, "\n".join(['<VTKFile type="Collection" version="0.1"><Collection>', *steps, "</Collection></VTKFile>\n"]))
+    files.on_root(comm, write)
 
 
-def to_xdmf(path: Any, file: Any, states: Any = None) -> None:
-    """Write an XDMF file (name ends in .xdmf) and its HDF5 file beside it; else as `to_vtx`."""
-    _write(path, file, states, ".xdmf", _xdmf)
+def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
+    """Return the content of a .vtu file with quadratic cells, from arrays of shape (cells, nodes, components)."""
+    import pyvista
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+    cells, nodes = points.shape[:2]
+    kind = {3: pyvista.CellType.QUADRATIC_EDGE, 6: pyvista.CellType.QUADRATIC_TRIANGLE}[nodes]
+    grid = pyvista.UnstructuredGrid({kind: np.arange(cells * nodes).reshape(cells, nodes)}, _three(points))
+    for name, array in values.items():
+        grid.point_data[name] = _three(array) if name == "displacement" else array.reshape(cells * nodes, -1)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    return writer.GetOutputString()
 
 
-def _write(path: Any, file: Any, states: Any, suffix: str, write: Callable) -> None:
-    file, comm = files.named("to_vtx" if suffix == ".bp" else "to_xdmf", file, suffix), path.problem.comm
-    chosen = _chosen(path, states)
-    if len({id(path.segment(state)) for _, state in chosen}) > 1:
-        raise InputError(f"{'to_vtx' if suffix == '.bp' else 'to_xdmf'}: states: the run was remeshed, and a file"
-                         f" holds one mesh: give states of one, such as path.segments[0].states")
-    fields = Fields(path.alone(chosen[0][1]))
-    points = _gather(fields.points, comm)
-    steps = []
-    for number, state in chosen:
-        values = fields.of(state)
-        steps.append((float(number), {name: _gather(v, comm) for name, v in values.items()}))
-
-    def write_all():
-        for target in (file, file.with_suffix(".h5")) if suffix == ".xdmf" else (file,):
-            _check_replaceable(target)
-        size = 2**17 + sum(8 * (array.size + points.size) for _, values in steps for array in values.values())
-        part = file.with_name(f"part-{file.name}")
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            files.reserve(part, size)
-            write(part, file, _Body(points, fields.dimension), steps)
-        except OSError as error:
-            _remove(part)
-            raise OSError(error.errno, f"{str(file)!r} could not be written: {error.strerror}") from None
-        except RuntimeError as error:                       # errors of the libraries, such as a full disk
-            _remove(part)
-            raise OSError(f"{str(file)!r} could not be written: {error}") from None
-    files.on_root(comm, write_all)
+def _three(array: np.ndarray) -> np.ndarray:
+    """Return vectors as rows of three components: a section lies in the plane z = 0 of ParaView."""
+    rows = array.reshape(-1, array.shape[-1])
+    return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1])))
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
@@ -180,87 +178,6 @@ def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
     if any(b <= a for a, b in zip(found, found[1:])):
         found = list(range(len(states)))
     return list(zip(found, states))
-
-
-class _Body:
-    """A mesh on this rank alone in which no two cells share a node, and functions on it."""
-
-    def __init__(self, points: np.ndarray, dimension: int):
-        cells, nodes = points.shape[:2]
-        shape = {1: "interval", 2: "triangle"}[dimension]
-        element = basix.ufl.element("Lagrange", shape, 2, shape=points.shape[2:])
-        self.mesh = dolfinx_mesh.create_mesh(
-            MPI.COMM_SELF, cells=np.arange(cells * nodes, dtype=np.int64).reshape(cells, nodes),
-            x=points.reshape(-1, points.shape[2]), e=element)
-        self._order = self.mesh.topology.original_cell_index
-        self._spaces: dict[int, fem.FunctionSpace] = {}
-        self._functions: dict[str, fem.Function] = {}
-
-    def functions(self, values: dict[str, np.ndarray]) -> list[fem.Function]:
-        """P2 functions with these values, shape (cells, nodes, components) each."""
-        for name, array in values.items():
-            n = array.shape[-1]
-            if n not in self._spaces:
-                shape: dict[str, Any] = {} if n == 1 else {"shape": (n,)}
-                element = basix.ufl.element("Lagrange", self.mesh.topology.cell_name(), 2, **shape)
-                self._spaces[n] = fem.functionspace(self.mesh, element)
-            if name not in self._functions:
-                self._functions[name] = fem.Function(self._spaces[n], name=name)
-            f = self._functions[name]
-            f.x.array.reshape(-1, n)[f.function_space.dofmap.list] = array[self._order]
-        return [self._functions[name] for name in values]
-
-
-def _vtx(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
-    _remove(part)
-    with io.VTXWriter(MPI.COMM_SELF, part, body.functions(steps[0][1]), engine="BP4") as writer:
-        for time, values in steps:
-            body.functions(values)
-            writer.write(time)
-    _remove(file)
-    os.rename(part, file)
-
-
-def _xdmf(part: FilePath, file: FilePath, body: _Body, steps: list) -> None:
-    data = part.with_suffix(".h5")
-    with io.XDMFFile(MPI.COMM_SELF, part, "w") as writer:
-        writer.write_mesh(body.mesh)
-        for time, values in steps:
-            for function in body.functions(values):
-                writer.write_function(function, time)
-    text = _together(part.read_text()).replace(data.name, file.with_suffix(".h5").name)
-    os.replace(data, file.with_suffix(".h5"))
-    part.unlink()
-    files.replace(file, lambda stream: stream.write(text))
-
-
-def _check_replaceable(file: FilePath) -> None:
-    """Raise an InputError unless there is nothing of this name, a regular file, or a folder that an earlier run
-    wrote."""
-    ours = file.suffix.lower() == ".bp" and file.is_dir() and (not any(file.iterdir()) or (file / "md.idx").exists())
-    if file.is_symlink() or file.exists() and not (file.is_file() or ours):
-        raise InputError(f"file {str(file)!r} is there already, a link, a device or a folder of something else: give"
-                         f" another name, or remove it")
-
-
-def _together(text: str) -> str:
-    """XDMF with one grid to a time step that holds all functions; DOLFINx gives each function its own."""
-    root = ElementTree.fromstring(text)
-    domain = root[0]
-    first, *others = [grid for grid in domain if grid.get("GridType") == "Collection"]
-    first.set("Name", "states")
-    for other in others:
-        for step, theirs in zip(first, other, strict=True):
-            step.extend(theirs.findall("Attribute"))
-        domain.remove(other)
-    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode")
-
-
-def _remove(file: FilePath) -> None:
-    if file.is_dir():
-        shutil.rmtree(file)
-    else:
-        file.unlink(missing_ok=True)
 
 
 def _gather(values: np.ndarray, comm: Any) -> Any:

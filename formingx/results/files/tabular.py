@@ -1,9 +1,7 @@
 """Files that people open: CSV of a path and of a profile, JSON summaries. Rank 0 writes, whole files or none."""
 
 import csv
-import errno
 import json
-import os
 import platform
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -89,15 +87,3 @@ def named(caller: str, file: Any, *endings: str) -> Any:
         raise InputError(f"{caller}: file {str(file)!r}: its name must end in {' or '.join(endings)}"
                          + (f"; {other} writes that" if other else ""))
     return file
-
-
-def reserve(file: Any, size: int) -> None:
-    """Raise an OSError unless there is room for this number of bytes beside this name: ADIOS2 aborts on a full disk."""
-    with open(file, "wb") as stream:
-        try:
-            os.posix_fallocate(stream.fileno(), 0, size)
-        except OSError as error:
-            if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
-                raise
-        finally:
-            os.unlink(file)
