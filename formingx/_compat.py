@@ -14,8 +14,6 @@ from ufl.classes import Label
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-from .errors import InputError
-
 if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
     raise ImportError(f"formingx needs DOLFINx >= 0.9, this is {dolfinx.__version__}; './fx CMD' provides one")
 
@@ -132,17 +130,3 @@ def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
     """Bounding boxes of cells (local numbers)."""
     from dolfinx import geometry
     return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)
-
-
-def adios4dolfinx() -> Any:
-    """Return the library that writes and reads checkpoints.
-
-    Raises:
-        InputError: it is not there, or cannot be used.
-    """
-    try:
-        import adios4dolfinx
-    except ImportError as error:
-        raise InputError(f"checkpoints need adios4dolfinx (Debian: python3-adios4dolfinx; to be imported before adios2,"
-                         f" or that is there without MPI): {error}") from None
-    return adios4dolfinx

@@ -8,8 +8,7 @@
 A state is written beside its place and then renamed: a state with its final name is complete, even if the run is
 killed. Fields are kept by the order of the cells in the script's mesh, which does not depend on the number of ranks;
 history variables, by node or by cell, likewise. The first state on a mesh that was made on the way holds that mesh,
-and the data transferred to it ("mesh"). Of format 4, which is read, too, fields are x.bp and direction.bp, written by
-adios4dolfinx, and all else is in state.json.
+and the data transferred to it ("mesh").
 """
 
 import errno
@@ -28,7 +27,6 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from ... import _compat
 from ...errors import InputError, instance, place
 from ...findings import SEVERITIES, Finding
 from ...forms.schedule import Setting
@@ -45,8 +43,7 @@ from .arrays import pack, unpack
 from .description import describe, differences
 from .progress import progress
 
-FORMAT = 5                 # of the files written
-_READ = (4, 5)
+FORMAT = 5                 # of the files
 _FIELDS = ("x", "direction")
 _ARRAYS = "arrays.bin"
 _END = "end.json"
@@ -114,8 +111,6 @@ class Checkpoint:
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
             for left in there[len(whole):]:
                 shutil.rmtree(left)
-            if kept["formingx"] != FORMAT:                  # from now on files have this format
-                files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
             return len(whole)
         return files.on_root(problem.comm, lambda: _plainly(begin, folder, "cannot be begun"))
 
@@ -143,7 +138,7 @@ class Checkpoint:
             shutil.rmtree(part, ignore_errors=True)
             part.mkdir()
             (part / _ARRAYS).write_bytes(content)
-            text = json.dumps(plain | {"checksums": _checksums(plain, {_ARRAYS: content})})
+            text = json.dumps(plain | {"checksums": _checksums(plain, content)})
             (part / "state.json").write_text(text, encoding="utf-8")
             try:
                 os.rename(part, final)
@@ -177,11 +172,11 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
         return found[:settled[-1] + 1] if state is None and settled else found
     found = files.on_root(problem.comm, look)
     record = Record(problem, Curve(problem, Tolerances()))
-    for k, data in enumerate(found):
+    for data in found:
         if "mesh" in data:
             problem = _on_next_mesh(problem, record.last, data["mesh"])
             record.segments.append(Segment(problem, Curve(problem, Tolerances())))
-        record.segments[-1].states.append(_read_state(folder / _name(k), data, problem))
+        record.segments[-1].states.append(_read_state(data, problem))
     kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)
     record.counts = Counts(**kept["counts"]) if kept else Counts()
     record.counts.steps = sum(s.kind != "start" for s in record.states)
@@ -279,9 +274,9 @@ def _read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
 
 
 def _check_format(folder: FilePath, about: dict) -> None:
-    if about.get("formingx") not in _READ:
+    if about.get("formingx") != FORMAT:
         raise InputError(f"checkpoint {str(folder)!r} has the format {about.get('formingx')!r}; this version of"
-                         f" formingx reads {' and '.join(map(str, _READ))}")
+                         f" formingx reads {FORMAT}")
 
 
 def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
@@ -295,13 +290,11 @@ def _check_scene(folder: FilePath, about: dict, scene: dict) -> None:
         raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{more}")
 
 
-def _read_state(folder: FilePath, data: dict, problem: Any) -> State:
+def _read_state(data: dict, problem: Any) -> State:
     data, space = dict(data), problem.forms.space
     last = problem.comm.rank == problem.comm.size - 1
-    arrays = {}
-    for name in _FIELDS:
-        own = _of_cells(space, data[name]) if name in data else _of_file(space, folder / f"{name}.bp", name)
-        arrays[name] = np.concatenate([own, data[f"{name}_tail"] if last else []])
+    arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
+              for name in _FIELDS}
     met, setting = data.pop("met"), data["setting"]
     data["setting"] = setting and asdict(Setting(**setting))             # older files do without some of it
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
@@ -327,13 +320,6 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]
     return found[:space.dofmap.index_map.size_local]
-
-
-def _of_file(space: Any, file: FilePath, name: str) -> np.ndarray:
-    """Own unknowns in a file of format 4."""
-    w = fem.Function(space)
-    _compat.adios4dolfinx().read_function(file, w, name=name)
-    return w.x.array[:space.dofmap.index_map.size_local].copy()
 
 
 def _tail(space: Any, own: np.ndarray) -> list[float]:
@@ -383,17 +369,12 @@ def _read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state's state.json; raise an InputError unless they are complete and unchanged."""
     state_folder = folder / _name(number)
     data = _read_json(state_folder / "state.json")
-    content: dict[str, bytes] = {}
     try:
-        if "x" in data:
-            content[_ARRAYS] = (state_folder / _ARRAYS).read_bytes()
-        elif checksums:
-            content = {f"{name}.bp/{file.name}": file.read_bytes() for name in _FIELDS
-                       for file in sorted((state_folder / f"{name}.bp").glob("*"))}
+        content = (state_folder / _ARRAYS).read_bytes()
         missing = [f.name for f in fields(State) if f.name not in (*_FIELDS, "memory") and f.name not in data]
         whole = not missing and data.get("number") == number and (
             not checksums or _checksums(data, content) == data.get("checksums"))
-        found = unpack(data, content[_ARRAYS]) if whole and "x" in data else data
+        found = unpack(data, content) if whole else data
     except (OSError, ValueError, TypeError):
         whole, found = False, data
     if not whole:
@@ -434,11 +415,10 @@ def _instead(file: FilePath) -> str:
                                               f"{', ...' * (len(inside) > 5)}" if inside else "")
 
 
-def _checksums(data: dict, content: dict[str, bytes]) -> dict[str, int]:
-    """{file: CRC-32} of the data of state.json and of the other files of a state."""
+def _checksums(data: dict, content: bytes) -> dict[str, int]:
+    """{file: CRC-32} of the data of state.json and of the arrays of a state."""
     rest = {key: value for key, value in data.items() if key != "checksums"}
-    found = {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode())}
-    return found | {name: zlib.crc32(bytes_) for name, bytes_ in content.items()}
+    return {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode()), _ARRAYS: zlib.crc32(content)}
 
 
 def _plainly(action: Callable[[], Any], folder: FilePath, what: str) -> Any:

@@ -137,7 +137,8 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
         for _, piece, text in pieces:
             put(piece, text)
         steps = [f'<DataSet timestep="{number}" file={quoteattr(piece.name)}/>' for number, piece, _ in pieces]
-        put(file, "\n".join(['<VTKFile type="Collection" version="0.1"><Collection>', *steps, "</Collection></VTKFile>\n"]))
+        put(file, "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *steps, "</Collection>",
+                             "</VTKFile>", ""]))
     files.on_root(comm, write)
 
 
