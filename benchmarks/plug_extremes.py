@@ -90,8 +90,8 @@ def mesh_for(plug):
                         concentrate=at)
 
 
-def run(plug, max_steps=None, through=(), **options):
-    """Return (path or None, "arrived" or why not, elements). through: travels on the way, over the plug's radius."""
+def run(plug, max_steps=None, intermediate=(), **options):
+    """Return (path or None, "arrived" or why not, elements). intermediate: travels on the way, over the radius."""
     radius = plug.lengths[0]
     friction, separates = plugs.LAWS.get(plug.law, (plug.law, True))
     mesh = mesh_for(plug)
@@ -103,7 +103,7 @@ def run(plug, max_steps=None, through=(), **options):
     travel = TRAVEL * radius
     # a plug goes one way
     stages = [fx.Stage("push", control="plug", until=fx.travel(travel), at_limit_point="snap_through",
-                       intermediate=[fx.travel(t * radius) for t in through])]
+                       intermediate=[fx.travel(t * radius) for t in intermediate])]
     if plug.back:
         stages += [fx.Stage("hold", amplitudes={"plug": [(0, travel), (1, travel)]}),
                    fx.Stage("withdraw", control="plug", until=fx.travel(0.0))]

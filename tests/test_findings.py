@@ -3,14 +3,13 @@
 import re
 import shutil
 
-import numpy as np
 import pytest
 from conftest import treloar
 
 import formingx as fx
 from formingx.checks.check import before_run
 from formingx.checks.towards import moulds
-from formingx.findings import SEVERITIES, Finding, found_at, register, worst_first
+from formingx.findings import SEVERITIES, Finding, register, worst_first
 from formingx.results.evaluate import volume
 from formingx.results.files import checkpoint, status
 
@@ -124,7 +123,7 @@ def test_status_of_a_body_that_goes_on_while_its_pressure_falls(tmp_path):
     states = checkpoint.contents(tmp_path / "run")[1]
     falling = states[-1]["measures"]["pressure"] < max(state["measures"]["pressure"] for state in states)
     assert falling and found.moved[0] in ("enclosed_volume", "pole_height", "strain_energy")
-    assert found.left is not None or "the body goes on" in str(found)
+    assert found.left is None and "the body goes on" in str(found)
 
 
 def test_volumes_that_a_clamped_corner_costs_are_no_warning(caplog):
@@ -165,5 +164,4 @@ def test_a_tool_that_meets_nothing():
 def test_findings_of_a_scene_belong_to_its_path():
     path = fx.trace(sheet(c10=4e5), until=fx.pole_height(0.1), progress=False)
     assert path.findings()[0].about == "materials['sheet']" and "mould" in [f.about for f in path.findings()]
-    assert found_at("end", path) == [f for f in path.findings() if f not in path.record.findings]
-    assert np.isfinite(path["pole_height"]).all()
+    assert [f.about for f in path.findings()] == ["materials['sheet']", "mould"]

@@ -7,7 +7,7 @@ from ..findings import Finding, alarming, found_at, worst_first
 from ..measures.targets import Target
 from ..results.path import Path
 from ..scene.scene import Scene
-from ..solve.diagnose import ANOTHER_PATH
+from ..solve.branches import ANOTHER_PATH
 from ..solve.stage import Stage
 from ..units import NONE, Units
 from . import ended, ranges, scenes, touched

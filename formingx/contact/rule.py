@@ -164,7 +164,10 @@ class Vertices(Lobatto):
         self.area = self.lumped = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
         self.lengths = np.sqrt(self.area)
         self._surface, self._assemble = surface, assemble
-        self._now = surface.compile(surface.area_row(deformed=True))
+
+    @cached_property
+    def _deformed_area(self) -> Any:
+        return self._surface.compile(self._surface.area_row(deformed=True))
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Return the present over the reference area of the triangles around each node."""
@@ -172,7 +175,7 @@ class Vertices(Lobatto):
         before = w.array.copy()
         w.array[: len(fields)] = fields
         w.scatter_forward()
-        area = self._assemble(self._now)[self.dofs[:, 0]]
+        area = self._assemble(self._deformed_area)[self.dofs[:, 0]]
         w.array[:] = before
         return area / self.area
 

@@ -138,6 +138,8 @@ class StepLimit:
         """
         n, found = self._n, way.events.closures(way.length) if way.events else None
         for k, approach in enumerate(self.present):
+            if approach.face.contact.lagged and not (ends and approach.lags):
+                continue                                    # such a contact uses no predicted gap closures
             times, places, guessed = found[k] if found else (*approach.along(
                 way.x[:n], way.control, way.direction[:n], way.slope, way.length), None)
             approach.prepare(times, places, guessed, way.length, ends)

@@ -83,8 +83,7 @@ class Problem(Histories, Units):
         forms.faces = self.contacts
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        remembering = (contact for contact in self.contacts if contact.remembers)
-        self.histories: list[History] = [*remembering, *forms.histories]
+        self.histories: list[History] = [*(c for c in self.contacts if c.remembers), *forms.histories]
         self.limit = StepLimit(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)

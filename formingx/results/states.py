@@ -14,7 +14,7 @@ from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
 from ..measures.targets import Bound, Target, is_met, process_time
 from ..solve import predictor
-from ..solve.diagnose import branch_points
+from ..solve.branches import branch_points
 from ..solve.newton import Failure
 from ..solve.path_following import Run
 from ..solve.record import Counts, Record, Segment

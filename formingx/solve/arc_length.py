@@ -240,10 +240,6 @@ class Curve:
         """Distance from old to new along the tangent of old."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
-    def turned_at(self, old: State, new: State) -> bool:
-        """Return True if a run turned back at `old`: the chord to the next state points against its tangent."""
-        return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control) < 0
-
     def work_ahead(self, state: State) -> float:
         """Work of the driven load along the tangent of a state, per unit of control and of arc length.
 
@@ -335,6 +331,15 @@ class Curve:
             a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
         return found
 
+    def solve_again(self, new: State, equation: Constraint, old: State) -> State:
+        """Return the solution of another equation from a state, with the sense, the target and the jump of the state.
+
+        Points may have gone back, not the control: the tangent keeps its sense. Raises `Failure`.
+        """
+        found = self.solve(new.x, new.control, equation, new.kind, old)
+        sense = float(np.sign(found.slope * new.slope)) or 1.0
+        return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
+
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
         """Solve again for the first of the states after `old`, with the points that penetrated a tool in contact.
 
@@ -353,10 +358,7 @@ class Curve:
         for sweep in range(self.sweeps):
             if not limit.hold_late(new, bound is not None, sweep):
                 return [new, *rest]
-            found = self.solve(new.x, new.control, equation, new.kind, old)
-            sense = float(np.sign(found.slope * new.slope)) or 1.0
-            new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met,
-                          jump=new.jump)
+            new = self.solve_again(new, equation, old)
         raise Failure("points that are held bring others into their tool again and again", [])
 
     def destroy(self) -> None:

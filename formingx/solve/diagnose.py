@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import ConvergenceError, InputError
 from ..findings import Finding, found_at, register
 from ..mesh.triangles import Place
 from .arc_length import Curve
+from .branches import branches, determinant_sign
 from .equations import Attempt, Equations, Examined
 from .linear import DirectSolver, condition
 from .state import State
-
-log = logging.getLogger("formingx")
 
 
 @dataclass(frozen=True)
@@ -44,10 +42,6 @@ class Limits:
 
 
 _LIMITS = Limits()
-
-ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not a limit point), and a real body may"
-                " follow it: path.stability([0]) finds where, and its mode")
-"""Warning, with the descriptions of two neighbouring states."""
 
 
 @dataclass(frozen=True)
@@ -209,61 +203,22 @@ def limits_passed(problem: Equations, states: Sequence[State]) -> str:
     return f" {many} passed, at {shown[0][0]} {', '.join(f'{value:.6g}' for _, value in shown)}."
 
 
-def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return the neighbours between which the determinant of the tangent changes its sign without a limit point.
+def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagnosis: Diagnosis,
+                hint: str) -> ConvergenceError:
+    """Return the error of a run that ends before its target, with the advice of the diagnosis, or a hint.
 
-    The signs are stored in the states (`State.orientation`). States at fixed control carry none: two
-    factorisations for each stretch between limit points, which miss an even number of changes. With a history no other
-    path begins: none. Collective.
+    Args:
+        record: the run's states (`Record`); `states` are the ones since its stage began.
+        aim: the open targets (`Aim`).
+        why: the failure, a sentence.
     """
-    problem = curve.problem
-    if any(state.orientation for state in states):
-        return _turns(curve, states)
-    usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
-    if len(usable) < 2 or problem.has_history:
-        return []
-    solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
-    found = _changes(states, usable, _signs(curve, solver))
-    solver.destroy()
-    return found
-
-
-def warn_of_branches(record: Any, step: Sequence[State]) -> None:
-    """Warn where another path branches off within a step: the state that it began with and those that it added."""
-    for before, behind in _turns(record.curve, step):
-        log.warning(ANOTHER_PATH, record.describe(before), record.describe(behind))
-
-
-def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return neighbours whose orientations differ.
-
-    Limit points are left out, since the sign there is round-off. So are pairs across a jump or the start of a stage.
-    Where a run turned back at a state, the orientation turns with it.
-    """
-    found = []
-    last: State | None = None
-    for state in states:
-        if state.kind == "limit point":
-            continue
-        first = state.kind in ("start", "jump") or last is not None and last.setting != state.setting
-        if last is not None and not first and last.orientation * state.orientation:
-            sense = -1 if curve.turned_at(last, state) else 1
-            if sense * last.orientation * state.orientation < 0:
-                found.append((last, state))
-        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.slack_at_rest
-        last = state if smooth else None
-    return found
-
-
-def _signs(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
-    """Return the sign of the determinant of the tangent at a state, 0 if it has no factors."""
-    problem = curve.problem
-
-    def sign(state: State) -> int:
-        with problem.state_context(state):
-            problem.tangent(problem.x, state.control)
-            return solver.sign() if solver.factorise() else 0
-    return sign
+    best = int(np.argmin([abs(value - aim.until.value) for value in aim.values]))
+    at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
+    return ConvergenceError(
+        f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{aim.until} was not reached: {why} The nearest"
+        f" value was {aim.values[best]:.6g}{at}.{limits_passed(record.equations, states)} The last good state is"
+        f" {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
+        diagnosis=diagnosis)
 
 
 def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
@@ -275,20 +230,15 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
-    sign = _signs(curve, solver)
+    sign = determinant_sign(curve, solver)
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
-    turned = []
     usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
     if len(usable) > _LIMITS.before and sign(usable[-1 - _LIMITS.before]):
         facts["condition_before"] = condition(problem.matrix, solver)
-    if any(state.orientation for state in states):
-        turned = _turns(curve, states)
-    elif len(usable) > 1 and not problem.has_history:
-        # one sign per stretch between limit points: there it cannot change unless another branch starts
-        turned = _changes(states, usable, sign)
+    turned = branches(curve, states, sign)
     facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)
     solver.destroy()
     if len(states) > 2:
@@ -299,31 +249,6 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
             ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
             facts["limit_ahead"] = problem.shown(ahead)[1]
     return facts
-
-
-def _changes(states: Sequence[State], usable: Sequence[State],
-             sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Neighbours between which the sign of the determinant changed though the control has no limit point there."""
-    pieces: list[list[State]] = [[]]
-    for state in states:
-        if state.kind == "limit point":
-            pieces.append([])
-        elif any(state is s for s in usable):
-            pieces[-1].append(state)
-    found = []
-    for piece in pieces:
-        low, high = 0, len(piece) - 1
-        if high < 1:
-            continue
-        first, last = sign(piece[low]), sign(piece[high])
-        if first * last >= 0:
-            continue
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if sign(piece[middle]) * first > 0 else (low, middle)
-        if piece[low].slope * piece[high].slope > 0:
-            found.append((piece[low], piece[high]))
-    return found
 
 
 @register("failure")

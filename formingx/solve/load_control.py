@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from .arc_length import Bend, Curve, Predictor
 from .equations import Array, Attempt, Constraint, Equations
 from .linear import configure
-from .newton import Failure, Iteration, Tolerances, relative
+from .newton import Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
 _prefixes = itertools.count()
@@ -100,7 +100,7 @@ class FixedControlCurve(Curve):
         control = a.control + fraction * (b.control - a.control)
         if self._at_rest(a):                                 # a slack body has no tangent there
             return self._correct(a, (control - a.control) / a.slope, "step")
-        return self.solve(self.interpolate(a, b, fraction)[0], control, _at(control), "step", a)
+        return self.solve(self.interpolate(a, b, fraction)[0], control, fixed(control), "step", a)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -138,11 +138,3 @@ class FixedControlCurve(Curve):
     @staticmethod
     def _at_rest(state: State) -> bool:
         return state.kind == "start" and not np.any(state.x)
-
-
-def _at(value: float) -> Constraint:
-    """Return the constraint that the control has a value."""
-    def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
-        gradient.set(0.0)
-        return control - value, 1.0
-    return c

@@ -200,9 +200,9 @@ class Flow(Run):
             found[time] = self._at(old, time) if time > low else old
             return self.curve.value(bound, found[time].x, found[time].control) - target.value
         time = _root(deviation, low, high)
-        state = found.get(time) or self._at(old, time)
-        left, most = abs(deviation(time)), _STEPS.met * max(abs(target.value), _STEPS.met)
-        if not is_met(target, bound.size, deviation(time) + target.value) and left > most:
+        miss, most = deviation(time), _STEPS.met * max(abs(target.value), _STEPS.met)
+        state = found[time]
+        if not is_met(target, bound.size, miss + target.value) and abs(miss) > most:
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state

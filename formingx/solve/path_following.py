@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..contact.step_limit import Way
-from ..errors import ConvergenceError
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .diagnose import Diagnosis, diagnose, limits_passed, warn_of_branches
+from .branches import warn_of_branches
+from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
@@ -65,7 +65,8 @@ class Run:
     settings = PathFollowing()
 
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
-                 at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "", requested: Any = None):
+                 at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "",
+                 requested: Target | None = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
         self._limit_rule = at_limit_point or ""
         self._accuracy = accuracy
@@ -334,8 +335,8 @@ class Run:
             return [self._jump(old, 0.0, onward=onward)]
         except Failure as failure:
             if not self.problem.setting.rests:              # the controlled quantity was to go on
-                what = "the enclosed volume" if onward else "what is driven"
-                self._give_up(f"{what} has a limit point here, and {failure.reason}", failure.attempt)
+                controlled = "enclosed volume" if onward else self._driven
+                self._give_up(f"the {controlled} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
@@ -440,18 +441,7 @@ class Run:
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
-        raise self._error(f"{why}.", found, hint)
-
-    def _error(self, why: str, diagnosis: Diagnosis, hint: str) -> ConvergenceError:
-        """Return the error with the failure, the reached value and the advice of the diagnosis, or a hint."""
-        record, states, values = self.record, self.states, self.aim.values
-        best = int(np.argmin([abs(v - self.aim.until.value) for v in values]))
-        at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
-        return ConvergenceError(
-            f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{self.aim.until} was not reached: {why} The nearest"
-            f" value was {values[best]:.6g}{at}.{limits_passed(self.problem, states)} The last good state is"
-            f" {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
-            diagnosis=diagnosis)
+        raise not_reached(self.record, self.states, self.aim, f"{why}.", found, hint)
 
 
 class _Astray(Failure):

@@ -365,10 +365,10 @@ def begin(curve: Curve) -> State:
         if not problem.fixed_loads:
             raise _no_start(curve, failure) from None
         record = Record(problem, curve)
-        target = Target("change", 1.0, None)
+        target = changed()
         try:
             problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
-            run = Run(record, [(target, Amplitude(problem, None))])
+            run = Run(record, [(target, target.bind(problem))])
             run.follow(1000, False, curve.resume(rest, 0.0))
         except (ConvergenceError, Failure):
             raise _no_start(curve, failure) from None

@@ -342,9 +342,7 @@ def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callabl
         if not limit.let_go(new):
             return new
         try:
-            found = curve.solve(new.x, new.control, fixed(new.control), new.kind, old)
-            sense = float(np.sign(found.slope * new.slope)) or 1.0        # points may have gone back, not the control
-            new = replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met)
+            new = curve.solve_again(new, fixed(new.control), old)
         except Failure:
             new = jump(new)
     raise Failure("points that let go of a tool touch it again and again", [])

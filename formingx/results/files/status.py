@@ -109,7 +109,8 @@ def of_folder(folder: Any) -> Status:
     most = max(moved, key=lambda c: abs(np.subtract(*moved[c])) / (max(map(abs, moved[c])) or 1.0), default=None)
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
-    left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if won > 0 else None
+    nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
+    left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if nearer else None
     return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], left,
                   counts.get("limits", {}), age, ended, len(done) == 1,
                   (most, *moved[most]) if most and not np.isclose(*moved[most], rtol=_STILL, atol=0.0) else None)
