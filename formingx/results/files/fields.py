@@ -17,6 +17,7 @@ Every triangle gets six nodes of its own, so that nothing is smeared over an int
 A membrane has displacement and thickness only. Rank 0 writes.
 """
 
+from functools import partial
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -120,26 +121,23 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
     fields: dict[int, Fields] = {}                          # by mesh
-    pieces = []
+    steps = []
+
+    def write(target: Any, text: str) -> None:
+        files.replace(target, lambda stream: stream.write(text))
+
     for number, state in _chosen(path, states):
         key = id(path.segment(state).problem)
         if key not in fields:
             fields[key] = Fields(path.alone(state))
         points = _gather(fields[key].points, comm)
         values = {name: _gather(v, comm) for name, v in fields[key].of(state).items()}
-        pieces.append((number, file.with_name(f"{file.stem}-{number}.vtu"),
-                       _as_vtu(points, values) if comm.rank == 0 else ""))
-
-    def put(target, text):
-        files.replace(target, lambda stream: stream.write(text))
-
-    def write():
-        for _, piece, text in pieces:
-            put(piece, text)
-        steps = [f'<DataSet timestep="{number}" file={quoteattr(piece.name)}/>' for number, piece, _ in pieces]
-        put(file, "\n".join(['<VTKFile type="Collection" version="0.1">', "<Collection>", *steps, "</Collection>",
-                             "</VTKFile>", ""]))
-    files.on_root(comm, write)
+        piece = file.with_name(f"{file.stem}-{number}.vtu")
+        text = _as_vtu(points, values) if comm.rank == 0 else ""
+        files.on_root(comm, partial(write, piece, text))
+        steps.append(f'<DataSet timestep="{number}" file={quoteattr(piece.name)}/>')
+    listed = ['<VTKFile type="Collection" version="0.1">', "<Collection>", *steps, "</Collection>", "</VTKFile>", ""]
+    files.on_root(comm, partial(write, file, "\n".join(listed)))
 
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
