@@ -39,8 +39,9 @@ from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
 from .physics.loads import CentrifugalLoad, Gravity, Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, PinnedNode, PrescribedDisplacement, SimplySupported, Support, Symmetry
+from .results.evaluate.point_stress import Stress
 from .results.evaluate.profile import Profile
-from .results.evaluate.stress import Stress, StressField
+from .results.evaluate.stress import StressField
 from .results.path import Path
 from .results.show.report import report
 from .runs import Process, load, solve, trace

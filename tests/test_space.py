@@ -442,7 +442,7 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),
     (lambda: disc(material=MATERIALS[3], contacts=[plug_above(True)]), "separates = True: in space a sheet that relax"),
     (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
-     "in space has no profile"),
+     "in three dimensions has no profile"),
     (lambda: fx.trace(disc(), until=fx.pole_height(0.1), progress=False), r"take displacement\(..., at="),
     (lambda: fx.mesh.sheet([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), r"crosses or touches itself near \(0.5, 0.5\)"),
     (lambda: fx.mesh.sheet([(0, 0), (2, 0), (1, 0), (1, 1)], 0.1), "crosses or touches itself near"),

@@ -28,10 +28,10 @@ def method_of(owner: type) -> Callable[[Function], Function]:
         owner: the class, such as `formingx.Path`.
 
     Returns:
-        The decorator. It gives the function back unchanged, so the extension may call it as a function, too.
+        The decorator. It returns the function unchanged, so the extension can also call it as a function.
 
     Raises:
-        TypeError: the class has an attribute of that name already.
+        TypeError: the class already has an attribute of that name.
 
     >>> from formingx.results.extend import method_of
     >>> @method_of(fx.Path)

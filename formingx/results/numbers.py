@@ -1,4 +1,4 @@
-"""Key numbers of a part, with their units: printed one a line, and rows of a report."""
+"""Key numbers of a formed part with their units, for printing and for the rows of a report."""
 
 from __future__ import annotations
 
@@ -10,18 +10,30 @@ from ..units import Units
 
 
 def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
-    """Return a point's coordinates, 0 where they are 1e-12 or less of the extent of points, shape (n, coordinates)."""
+    """Return the coordinates of a point without round-off.
+
+    Args:
+        point: the coordinates, length.
+        points: all points of the body, shape (n, coordinates), length.
+
+    Returns:
+        The coordinates; 0 replaces those of at most 1e-12 times the extent of `points`.
+    """
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 class KeyNumbers:
-    """Prints its `rows`; `units`: of the labels."""
+    """Base class of key numbers that print one row per number.
+
+    Attributes:
+        units: units of the printed values.
+    """
 
     units: Units
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """(what, its value with its unit), for people."""
+        """Rows of the printed table: pairs (name, value with its unit)."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -31,14 +43,29 @@ class KeyNumbers:
     __repr__ = __str__
 
     def _length(self, value: float) -> str:
+        """Return a length as text with its unit."""
         return self._said(value, self.units.length or "")
 
     def _said(self, value: float, unit: str) -> str:
+        """Return a value as text with five digits and its unit."""
         return f"{value:{'.5g' if abs(value) < 1e5 else '.0f'}} {unit}".rstrip()
 
 
 class PartNumbers(KeyNumbers):
-    """Common base of a part of a section and of a sheet in three dimensions."""
+    """Numbers that a section and a sheet in three dimensions have in common.
+
+    Attributes:
+        volume: volume of the part, length^3.
+        area: area of the middle surface, length^2.
+        draw_ratio: area over the reference area of the same material (areal draw ratio).
+        mean_wall: volume over area, length.
+        min_wall: minimum wall, length.
+        uniformity: minimum wall over mean wall.
+        variation: coefficient of variation of the wall.
+        weight: weight in grams, or None without a density.
+        scrap: volume beyond the trim over the volume of the whole sheet.
+        basis: the basis of volume, area and weight as text, such as a unit of depth; "" for the whole part.
+    """
 
     volume: float
     area: float
@@ -53,11 +80,16 @@ class PartNumbers(KeyNumbers):
 
     @property
     def weight_label(self) -> str:
-        """The words before the weight."""
+        """Label of the weight in `rows`."""
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return the rows; where: place of the minimum wall, as text; more: rows of one kind of part alone."""
+        """Return the rows common to all parts.
+
+        Args:
+            where: place of the minimum wall, as text.
+            more: further rows of this kind of part.
+        """
         rows = [("given for", self.basis)] if self.basis else []
         rows += [(self.weight_label, self._said(self.weight, self.units.weight))] if self.weight is not None else []
         rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),

@@ -22,11 +22,11 @@ from .states import States
 
 
 class Path(States):
-    """The states of a run, from the unloaded body to the target.
+    """Equilibrium path of a run: its states from the unloaded body to the target.
 
     Attributes:
         record: the solver's record of the run (`formingx.solve.record.Record`).
-        pilot: the path of the first run, to which the mesh was adapted (`trace(..., adapt_mesh=True)`); else None.
+        pilot: the path of the first run, from which `trace(..., adapt_mesh=True)` adapted the mesh; else None.
 
     >>> path
     Path(9 states, to State('target', pressure=0.045088, pole_height=12, pole_stretch=2.26198, enclosed_volume=2895.08,
@@ -45,10 +45,13 @@ class Path(States):
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
     def findings(self) -> list[Finding]:
-        """Return the findings of the checks before and after the run, worst first (`formingx.findings`); collective.
+        """Return the findings of the checks before and after the run, the worst first; collective.
 
-        A finding has a severity, a subject and a text. "serious": the results must not be used as they are. "warning":
-        the scene may be another than was meant, or a result less exact than usual. "note": neither.
+        A `formingx.findings.Finding` has a severity, a subject and a text. The severities are:
+
+        "serious": do not use the results as they are.
+        "warning": the scene may differ from the intended one, or a result is less accurate than usual.
+        "note": neither of these.
 
         >>> path.findings()
         []
@@ -56,30 +59,45 @@ class Path(States):
         return worst_first([*self.record.findings, *(found_at("end", self) if self.states else [])])
 
     def profile(self, state: State | None = None) -> Profile:
-        """Deformed outline and thickness of a sheet at a state (default: the last)."""
+        """Return the deformed outline and the thickness of a sheet in a state (default: the last).
+
+        Raises:
+            InputError: the body is not a sheet.
+        """
         state = state or self.last
         return self._view(self.segment(state)).profiles.of(state)
 
     def stress(self, state: State | None = None) -> StressField:
-        """Stresses and stretches at a state (default: the last), layer by layer."""
+        """Return the stresses and stretches in a state (default: the last), layer by layer.
+
+        Raises:
+            InputError: the body is a sheet in three dimensions.
+        """
         self.section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
         return self._view(self.segment(state)).stresses.of(state)
 
     def to_csv(self, file: Any, units: Units | None = None) -> None:
-        """Write one row per state: stage (of a process), kind, iterations and every measure (rank 0 writes).
+        """Write a CSV file with one row per state (rank 0 writes).
 
-        units: a `formingx.Units`, for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]".
+        The columns are the stage (of a process), the kind of state, the iterations and every output quantity.
+
+        Args:
+            file: its name ends in .csv.
+            units: units for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]".
         """
         from . import files
         files.write_path(self, file, units or NONE)
 
     def save(self, folder: Any) -> None:
-        """Write every state to a checkpoint folder, to look at later or to continue from (`formingx.load`).
+        """Write every state to a checkpoint folder, for `formingx.load`.
+
+        Args:
+            folder: a new folder, or one that holds the first states of this run.
 
         Raises:
             InputError: the folder holds another run.
-            OSError: it cannot be written.
+            OSError: the folder cannot be written.
         """
         from .files.checkpoint import Checkpoint
         kept = Checkpoint(folder, self)
@@ -87,33 +105,42 @@ class Path(States):
         kept.end("", self.findings())
 
     def to_vtk(self, file: Any, states: Any = None) -> None:
-        """Write fields of states (default: the last) for ParaView, a time step each: `formingx.results.files.fields`.
+        """Write the fields of states for ParaView, one time step per state.
 
-        A file run-3.vtu for state 3 stands beside run.pvd, which lists the time steps; the time is the number of the
-        state. The states of a remeshed run have their meshes.
+        The fields are listed in `formingx.results.files.fields`. State 3 is written to run-3.vtu, beside run.pvd, which
+        lists the time steps. The time is the number of the state. States of a remeshed run have their own meshes.
 
         Args:
             file: its name ends in .pvd.
-            states: a state, several in order, or "all".
+            states: a state, several in order, or "all"; default the last.
 
         Raises:
-            InputError: the name ends otherwise, or a state is not of the path.
+            InputError: the name has another ending, or a state is not of the path.
             OSError: a file cannot be written.
         """
         from .files import fields
         fields.to_vtk(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
-        """Draw the forming as a moving picture, a GIF or an MP4: the sheet's section and the loading curve (rank 0).
+        """Draw an animation of the forming: the section of the sheet and the loading curve (rank 0 writes).
 
-        Returns the file, which a notebook shows. units: a `formingx.Units`, for the labels.
+        The frames are evenly spaced over the process (`formingx.results.show.record.progress`). Between states the body
+        follows
+        the cubic path through them. The last frame is shown for one second more.
 
-        The frames are evenly spread over the process (`formingx.results.show.record.progress`), on the (cubic) path
-        through the states; the last one stands for a second more.
+        Args:
+            file: its name ends in .gif or .mp4.
+            frames: number of frames.
+            seconds: duration, s.
+            units: units for the labels.
+
+        Returns:
+            The file, which a notebook shows.
 
         Raises:
-            InputError: the name ends neither in .gif nor in .mp4, there is no ffmpeg to make an MP4, a number is not
-                allowed, or the mesh is no sheet.
+            InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. A number is not
+                allowed, or
+                the mesh is not a sheet.
         """
         from .show import animation
         animation.animate(self, file, frames, seconds, units or NONE)
@@ -121,14 +148,18 @@ class Path(States):
 
     def report(self, file: Any = "report.html", title: str = "", failure: Any = None, *, units: Units | None = None,
                density: float | None = None, trim: Any = None) -> FilePath:
-        """Write one HTML file that shows the run: the part, the process, curves, inputs, warnings (rank 0 writes).
-
-        Returns where it is.
+        """Write an HTML file on the run: part, process, curves, inputs and warnings (rank 0 writes).
 
         Args:
-            title: its heading.
+            file: its name ends in .html.
+            title: heading of the page.
             failure: the `ConvergenceError` that ended the run, if one did.
-            units: a `formingx.Units`, for the labels; density, trim: see `Path.part`.
+            units: units for the labels.
+            density: see `Path.part`.
+            trim: see `Path.part`.
+
+        Returns:
+            The path of the file.
 
         Raises:
             InputError: plotly is not installed.
@@ -137,57 +168,89 @@ class Path(States):
         return self._reader.report(file, title, failure, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Axes | None = None, **style: Any) -> Any:
-        """Draw column `y` over column `x`; returns the matplotlib axes."""
+        """Draw column `y` over column `x`.
+
+        Args:
+            y: name of a column.
+            x: name of a column.
+            axes: matplotlib axes; default new ones.
+            style: keyword arguments of matplotlib's `plot`.
+
+        Returns:
+            The matplotlib axes.
+        """
         from .show import plots
         return plots.curve(self, y, x, axes, **style)
 
     def plot_convergence(self, axes: Axes | None = None) -> Any:
-        """Draw the correction (3.5.1) of every Newton iteration of every state; returns the matplotlib axes."""
+        """Draw the correction of every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
+
+        Returns:
+            The matplotlib axes.
+        """
         from .show import plots
         return plots.convergence(self, axes)
 
     def view3d(self, file: Any, state: State | None = None, grid: float | None = None) -> Picture:
-        """Draw the sheet of a state (default: the last), coloured by thickness, as PNG; returns it, for a notebook.
+        """Draw the sheet in a state as a PNG file, coloured by thickness.
 
-        It is revolved about the axis, or, in plane strain, extruded; in three dimensions it is drawn whole, and with
-        `grid` the squares of that size (length) that were printed on the flat sheet.
+        An axisymmetric sheet is revolved about the axis, a sheet in plane strain is extruded.
+
+        Args:
+            file: its name ends in .png.
+            state: default the last.
+            grid: size of the squares printed on the flat sheet, length; for a sheet in three dimensions.
+
+        Returns:
+            The picture, which a notebook shows.
         """
         self._reader.view(file, state or self.last, grid)
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
-        """Return the wall of the part at a state (default: the last), place by place: to_csv, to_excel.
+        """Return the wall thickness of the part in a state (default: the last) as a table.
 
-        A `Wall`, from the axis to the rim; in three dimensions a `WallInSpace`, triangle by triangle.
+        Returns:
+            A `Wall`, from the axis to the rim. In three dimensions a `WallInSpace`, triangle by triangle. Both have
+            `to_csv`
+            and `to_excel`.
         """
         return self._reader.wall(state or self.last)
 
     def part(self, state: State | None = None, *, density: float | None = None, trim: Any = None, heights: Any = (),
              units: Units | None = None) -> Any:
-        """Return the formed part in numbers (`Part`): volume, weight, area, minimum wall, uniformity; print it.
+        """Return the key numbers of the formed part: volume, weight, area, minimum wall, uniformity.
 
-        They belong to the whole part, also where a half or a quarter is modelled; in plane strain per unit depth.
+        They belong to the whole part, also if a half or a quarter is modelled. In plane strain they are per unit depth.
 
         Args:
             state: default the last.
-            density: of the material in the reference configuration (under `ThermalExpansion` where it is free of
-                stress), in g/cm3, for the weight in grams; say the unit of length with `units` (without, it is cm).
-            trim: the radius at which the part is cut off, or ("height", h), lengths: the last place from the axis where
-                the middle line goes beyond it. In three dimensions a z, beyond which the part lies.
-            heights: give the wall at these heights too (`Wall.height`).
-            units: a `formingx.Units`.
+            density: density of the material, g/cm3, for the weight in grams. It refers to the reference configuration,
+                under
+                `ThermalExpansion` to the temperature of zero thermal strain. Give `units`, too: lengths without a unit
+                count as cm.
+            trim: radius at which the part is cut off, or ("height", h), length. The cut lies at the last place from the
+                axis
+                where the middle line passes it. In three dimensions a z coordinate beyond which the part lies.
+            heights: heights at which the wall is given, too (`Wall.height`), length.
+            units: units of the script.
+
+        Returns:
+            The numbers as a `Part`, which prints as a table.
 
         Raises:
-            InputError: the mesh is no sheet, or the part does not reach the trim or a height.
+            InputError: the mesh is not a sheet, or the part does not reach the trim or a height.
         """
         return self._reader.part(state or self.last, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:
-        """Return the gap that is left in each corner of a tool, state by state (`Filling`), and the pressure to fill
-        it.
+        """Return the remaining gap in each corner of a tool, state by state.
 
         Args:
-            tool: its name, the `Tool` or the `Contact`; may be left out where there is one.
+            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one.
+
+        Returns:
+            A `Filling`, which also gives the pressure at which a corner is filled.
 
         Raises:
             InputError: there is no such tool, or it has no corner that the body must fill.
@@ -196,15 +259,36 @@ class Path(States):
         return self._reader.filling(contact_of(self, tool, "filling")[0])
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
-        """Contact pressure, friction and gap along the face that meets a tool (`ContactTable`): to_csv, to_excel."""
+        """Return the contact pressure, friction and gap along the face that touches a tool.
+
+        Args:
+            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one.
+            state: default the last.
+
+        Returns:
+            A `ContactTable`, with `to_csv` and `to_excel`.
+
+        Raises:
+            InputError: there is no such tool, or the body is a sheet in three dimensions.
+        """
         self.section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
         alone = self.alone(state or self.last)
         return ContactFace(alone, contact_of(alone, tool, "contact")[0]).of(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
-        """Return the temperature in a state (default: the last) at reference points (R, Z), shape (n, 2), length:
-        shape (n,)."""
+        """Return the temperature of material points in a state.
+
+        Args:
+            points: reference positions (R, Z), shape (n, 2), length.
+            state: default the last.
+
+        Returns:
+            Temperatures, shape (n,).
+
+        Raises:
+            InputError: the scene has no temperature, or a point lies outside the body.
+        """
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last
@@ -212,42 +296,63 @@ class Path(States):
             return problem.temperature.at(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
-        """{tool: force on the whole tool at all states}, shape (states,), stress length^2 (plane strain: per depth).
+        """Return the force on each whole tool in all states.
 
-        Positive when it resists its travel; of a tool that stays, along Z.
+        A force is positive if it resists the travel of the tool. The force on a fixed tool is its Z component.
+
+        Returns:
+            {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.
         """
         from .evaluate.contact_face import tool_forces
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
-        """Return the energy balance: {what: energy up to each state, shape (states,)}, stress length^3 (per depth:
-        length^2).
+        """Return the energy balance of the whole part, state by state.
 
-        It belongs to the whole part, with the tools of all its images where a half or a quarter is modelled.
+        The images of a modelled half or quarter and their tools are included. The entries are:
 
-        Work done on the body by each load (its column; of a fixed one "pressure_on_bottom"), each driven support (its
-        name, or "support") and each tool that moves; by forces that a stage leaves without balance, as they fade
-        ("change"); what new meshes have added ("new_meshes"). Energy of changes of temperature ("heat"). Where it went:
-        "strain_energy", above its first value; "dissipated_energy" in materials; "friction"; "jumps"; "bonds" to tools
-        that the body may pull at, above their first value. "unbalanced": the error of the integrals, and of the run; of
-        more than 0.5 % of the largest part a warning tells, which is one of the `findings` from then on.
+        Work of each load (under the name of its column; "pressure_on_bottom" if its value is fixed), of each driven
+        support
+        (its name, or "support") and of each moving tool.
+
+        "change": work of forces left unbalanced at the beginning of a stage, which fade over the stage. "new_meshes":
+        energy
+        added by remeshing. "heat": energy added by changes of temperature.
+
+        "strain_energy" above its first value, "dissipated_energy" in materials, "friction", "jumps" (lost in
+        snap-through),
+        and "bonds" to adhesive tools, above their first value.
+
+        "unbalanced": error of the integrals and of the run. Above 0.5 % of the largest entry a warning is logged and
+        added
+        to the `findings`.
+
+        Returns:
+            {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
         """
         self.section_only("work")
         from .evaluate.work import work
         return work(self)
 
     def to_stl(self, file: Any, state: State | None = None) -> None:
-        """Write the part at a state (default: the last) as a solid of triangles, STL (rank 0 writes)."""
+        """Write the part in a state (default: the last) as a solid of triangles in STL (rank 0 writes)."""
         from .files.solid import to_stl
         to_stl(self._reader.solid(state or self.last), file, self.problem.comm)
 
     def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
-        """Write the part as shells, walls their section, for CalculiX (.inp), `parts` round the axis (rank 0 writes).
+        """Write the part as shell elements with the wall as thickness, for CalculiX (rank 0 writes).
 
-        Elements S8R, S6 at the axis, on the middle surface; sets ALL, WALL, RIM; the material is for you to give.
+        The elements are S8R, at the axis S6, on the middle surface. The sets are ALL, WALL and RIM. The file contains
+        no
+        material.
+
+        Args:
+            file: its name ends in .inp.
+            state: default the last.
+            parts: number of elements round the axis.
 
         Raises:
-            InputError: plane strain, fewer than 3 parts, or the mesh is no sheet.
+            InputError: plane strain, fewer than 3 parts, or the mesh is not a sheet.
         """
         from .files.shells import to_inp
         self.section_only("to_inp", "use shell_model")
@@ -256,19 +361,30 @@ class Path(States):
         to_inp(self.profile(state), parts, file, self.problem.comm)
 
     def to_gltf(self, file: Any, state: State | None = None, *, units: Units | None = None) -> None:
-        """Write the part at a state (default: the last) as binary glTF (.glb), coloured by its wall (rank 0 writes).
+        """Write the part in a state as binary glTF, coloured by its wall (rank 0 writes).
 
-        units: a `formingx.Units`; glTF is in metres, and a length that is not said is taken for m.
+        Args:
+            file: its name ends in .glb.
+            state: default the last.
+            units: units of the script; glTF is in metres, and lengths without a unit count as metres.
         """
         from .files.solid import to_gltf
         to_gltf(self._reader.solid(state or self.last), file, self.problem.comm, units or NONE)
 
     def section_only(self, what: str, instead: str = "") -> None:
-        """Raise an InputError if the body is a sheet in three dimensions, for which `what` is not available."""
+        """Raise an error for a method that does not exist in three dimensions.
+
+        Args:
+            what: name of the method.
+            instead: advice for the message.
+
+        Raises:
+            InputError: the body is a sheet in three dimensions.
+        """
         if self.scene.kinematics.components == 3:
             raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
 
     @cached_property
     def _reader(self) -> Reader:
-        """The reader of the kinematics."""
+        """The evaluation of states for the kinematics of the scene."""
         return (self.scene.kinematics.reader or SectionReader)(self)

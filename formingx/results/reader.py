@@ -1,6 +1,6 @@
 """Results that depend on the kinematics: the wall, the part, pictures and reports.
 
-A section is read here. An extension provides the reader of other bodies as `Kinematics.reader`.
+This module evaluates sections. An extension provides the reader of other bodies as `Kinematics.reader`.
 """
 
 from __future__ import annotations
@@ -22,33 +22,39 @@ if TYPE_CHECKING:
 
 
 class Reader(Protocol):
-    """Reader of the states of one path."""
+    """Interface of the class that evaluates the states of one path."""
 
     def wall(self, state: State) -> Sheet:
-        """Return the wall of the part, place by place."""
+        """Return the wall thickness of the part, one row per place."""
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
-        """Return the part in numbers; arguments: see `Path.part`."""
+        """Return the key numbers of the part; for the arguments see `Path.part`."""
 
     def filling(self, contact: FaceContact) -> Sheet:
         """Return the gap between the body and a tool in every state."""
 
     def view(self, file: object, state: State, grid: float | None) -> None:
-        """Draw the body of a state as PNG; arguments: see `Path.view3d`."""
+        """Draw the body in a state as a PNG file; for the arguments see `Path.view3d`."""
 
     def solid(self, state: State) -> tuple:
-        """Return points, shape (n, 3), triangles, shape (m, 3), and wall ratios, shape (n,), of the part as a solid."""
+        """Return the part as a closed surface of triangles.
+
+        Returns:
+            Points, shape (n, 3), length; corners of the triangles, shape (m, 3); wall over original thickness at the
+            points,
+            shape (n,).
+        """
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
                trim: object) -> FilePath:
-        """Write the report of the run; arguments: see `Path.report`."""
+        """Write the report of the run; for the arguments see `Path.report`."""
 
 
 class SectionReader:
     """Reader of an axisymmetric or plane-strain section.
 
     Args:
-        path: the path.
+        path: the path whose states are evaluated.
     """
 
     def __init__(self, path: Any):
@@ -56,11 +62,11 @@ class SectionReader:
         self._axisymmetric = path.scene.kinematics.axisymmetric
 
     def wall(self, state: State) -> Wall:
-        """Return the `Wall` of a state."""
+        """Return the `Wall` in a state."""
         return self._walls.of(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:
-        """Return the `Part` of a state."""
+        """Return the `Part` in a state; for the arguments see `Path.part`."""
         from .evaluate.part import part
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
 
@@ -77,18 +83,22 @@ class SectionReader:
         return filling(self._path, contact)
 
     def view(self, file: Any, state: State, grid: float | None) -> None:
-        """Draw the revolved or extruded section of a state; `grid` is not used."""
+        """Draw the revolved or extruded section in a state; `grid` is not used."""
         from .show import views
         draw = views.revolved if self._axisymmetric else views.extruded
         draw(self._path.profile(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return points, triangles and wall ratios of the revolved or extruded section."""
+        """Return points, triangles and wall ratios of the revolved or extruded section (`Reader.solid`)."""
         from .files.solid import coloured
         return coloured(self._path.profile(state), self._axisymmetric)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-        """Write the report of the run."""
+        """Write the report of the run; for the arguments see `Path.report`.
+
+        Returns:
+            The path of the file.
+        """
         from .show import report
         return report.write(report.of_path(self._path), file, title, failure, self._path.problem.comm, units, density,
                             trim)

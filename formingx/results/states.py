@@ -29,7 +29,7 @@ _WRITTEN = 5e-6
 
 
 class _View:
-    """Evaluation of the states of one problem: created once."""
+    """Evaluation objects of one problem, created once and shared by its states."""
 
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
@@ -38,10 +38,16 @@ class _View:
 
 
 class States:
-    """The states of a run, from the unloaded body to the target: base class of `Path`.
+    """Base class of `Path`: the states of a run from the unloaded body to the target.
+
+    Args:
+        record: the solver's record of the run (`formingx.solve.record.Record`).
+        timed: True if the process time is a column.
+        columns: further columns that the user asked for.
+        views: evaluation objects of problems, shared with another path.
 
     Attributes:
-        record: the solver's record of the run (`formingx.solve.record.Record`).
+        record: the solver's record of the run.
     """
 
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None,
@@ -54,7 +60,7 @@ class States:
 
     @property
     def segments(self) -> list[Segment]:
-        """(problem, states) one after the other: one, unless the run changed its problem on the way."""
+        """Segments (problem, states) of the run; more than one if the run was remeshed."""
         return self.record.segments
 
     @property
@@ -64,30 +70,33 @@ class States:
 
     @property
     def counts(self) -> Counts:
-        """Cost of the run."""
+        """Cost of the run: steps, iterations, factorisations."""
         return self.record.counts
 
     @property
     def scene(self) -> Any:
-        """The scene as it was given: on the mesh that the run began with."""
+        """Scene as given to the run, on the first mesh."""
         return self.problem.scene.first
 
     @property
     def problem(self) -> Any:
-        """The (last) `Problem`, for further evaluation at a state, within its `at(state)`."""
+        """Discretised problem of the last segment; evaluate it within `problem.state_context(state)`."""
         return self.record.problem
 
     def __len__(self) -> int:
         return len(self.states)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One measure over all states, shape (len(path),), in the user's units."""
+        """Return an output quantity in all states, shape (len(path),), in the units of the script."""
         self._check(name)
         return np.array([state.measures[name] for state in self.states])
 
     @property
     def columns(self) -> list[str]:
-        """Names of the measures that every state has (a run that went on may record others)."""
+        """Names of the output quantities that every state has.
+
+        A run that was continued from a checkpoint may add columns, which earlier states lack.
+        """
         return [name for name in self.states[0].measures if name in self.last.measures] if self.states else []
 
     @property
@@ -97,22 +106,22 @@ class States:
 
     @property
     def branch_points(self) -> list[tuple[State, State]]:
-        """Neighbours between which another path branches off: the tangent's determinant changes its sign without
-        limit point.
+        """Pairs of successive states between which a bifurcation lies.
 
-        Branch points of which the run warns, from the determinants that its states carry. Modes n = 0 alone, and an
-        odd number of them between two states; `Path.stability` sees all. None with a history.
+        There the determinant of the tangent changes its sign without a limit point. This finds only axisymmetric modes
+        (n = 0)
+        and only an odd number of them; `Path.stability` finds all. The list is empty for materials with history.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
     @property
     def jumps(self) -> list[State]:
-        """States that the body snapped to; see `State.jump`."""
+        """States reached by snap-through; see `State.jump`."""
         return [state for state in self.states if state.kind == "jump"]
 
     @property
     def ended(self) -> str:
-        """Reason for which the run ended before its targets, as a result; "" if it did not."""
+        """Reason why the run ended before its targets; "" if it reached them."""
         return self.record.ended
 
     @property
@@ -121,11 +130,16 @@ class States:
         return self.record.last
 
     def met(self, target: Target) -> State | None:
-        """Return the state that hit a target of the run, or None."""
+        """Return the state that met a target of the run, or None."""
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
     def value(self, measure: str | Bound, state: State) -> float:
-        """Return a column, by its name, or a measure bound to the state's problem (`Target.bind`), at a state."""
+        """Return an output quantity in a state.
+
+        Args:
+            measure: name of a column, or a quantity bound to the state's problem (`Target.bind`).
+            state: a state of this path.
+        """
         segment = self.segment(state)
         if isinstance(measure, str):
             self._check(measure)
@@ -134,11 +148,14 @@ class States:
             return measure.value(problem.x, state.control)
 
     def state(self, stage: str | None = None, time: float | None = None) -> State:
-        """Return the last state (of a stage), or the one at a process time (in a stage): solved for where none lies
-        there.
+        """Return a state by its stage and its process time.
+
+        Args:
+            stage: name of a stage; default any.
+            time: process time; default the last state. A state is solved for if none lies at this time.
 
         Raises:
-            InputError: there is no such stage, or it does not pass that time.
+            InputError: there is no such stage, or it does not reach that time.
             ConvergenceError: see `at`.
         """
         if stage is not None:
@@ -159,18 +176,19 @@ class States:
         return exact or self.at(process_time(time), after=there[0])
 
     def at(self, target: Target, after: State | None = None) -> State:
-        """Return the first state of the path that meets the target: solved for, not interpolated; the path stays as
-        it is.
+        """Return the first state of the path that meets a target.
 
-        A value just beyond the path's last state, as one written with six digits may lie, is solved for there.
+        The state is solved for, not interpolated. The path does not change. A target slightly beyond the last state,
+        such as
+        a value rounded to six digits, is accepted.
 
         Args:
             target: for example `pressure(0.4)`.
-            after: look only beyond this state of the path, for example beyond a limit point.
+            after: search only beyond this state of the path, for example beyond a limit point.
 
         Raises:
             InputError: the path does not pass through that value there.
-            ConvergenceError: it does, between two states, but no state was found there.
+            ConvergenceError: two states enclose the value, but the solver did not converge between them.
         """
         if after is not None and after not in self.states:
             raise InputError("Path.at: after: must be a state of this path")
@@ -210,7 +228,7 @@ class States:
             f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """Return the state between two neighbours that meets a target; the problem stands at the first."""
+        """Return the state between two successive ones that meets a target, starting from the first."""
         if segment.problem.has_history:                      # states between depend on the way to them
             found = self._run_to(segment, left, right, target, bound)
         else:
@@ -221,7 +239,12 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """Return the state that a run would reach that continues from `left` to the target."""
+        """Return the state that a run from `left` reaches at the target, with its history variables.
+
+        Raises:
+            InputError: the stage controls an output quantity, so it cannot be restarted between states.
+            ConvergenceError: the run does not reach the target.
+        """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
                              f" measure: none can be solved for there afterwards; run with intermediate=[...]"
@@ -243,22 +266,37 @@ class States:
         return record.last
 
     def between(self, a: State, b: State, fraction: float) -> State:
-        """Return a body on the smooth (cubic) path from a state to the next; for drawing: it is no solution."""
+        """Return a state interpolated on the cubic path between two successive states, for drawing.
+
+        It is not in equilibrium.
+
+        Args:
+            a: a state.
+            b: the next state.
+            fraction: position between them, 0 to 1.
+        """
         if a.setting != b.setting:                           # a stage begins
             return b
         x, control = self.segment(b).curve.interpolate(a, b, fraction)
         return replace(b, x=x, control=control)
 
     def distance(self, a: State, b: State) -> float:
-        """Arc length from a state to the next along the tangent (dimensionless)."""
+        """Return the arc length from a state to the next, along the tangent (dimensionless)."""
         return self.segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
-        """Columns along the smooth path through the states, `points` to each piece; for drawing.
+        """Return columns along a smooth path through the states, for drawing.
 
-        Values at the states themselves are theirs. Between them, quantities of displacements and control alone
-        follow the cubic path; other columns (forces, energies) follow a monotone cubic through their values, by arc
-        length.
+        Quantities that depend on displacements and control alone follow the cubic path between two states. Other
+        columns, such
+        as forces and energies, follow a monotone cubic in arc length through their values.
+
+        Args:
+            columns: names of columns.
+            points: number of points from one state to the next.
+
+        Returns:
+            Values of each column, shape (m,).
         """
         self._check(*columns)
         rows = []
@@ -269,7 +307,7 @@ class States:
         return list(np.array(rows).T)
 
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
-        """Rows of columns after the first, to the last, of states with one setting."""
+        """Return rows of columns between the states of one stage, from behind the first to the last."""
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns
         at = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
@@ -287,21 +325,26 @@ class States:
         return rows
 
     def describe(self, state: State) -> str:
-        """Return a state's main numbers in one line."""
+        """Return the main numbers of a state in one line."""
         return self.record.describe(state)
 
     def _check(self, *names: str) -> None:
+        """Check that names are columns.
+
+        Raises:
+            InputError: a name is not a column.
+        """
         for name in names:
             if name not in self.columns:
                 raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     def _measure(self, state: State) -> None:
-        """Fill the columns of an accepted state."""
+        """Compute the output quantities of a newly accepted state."""
         segment = self.segments[-1]
         self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
-        """Fill the columns of the last of some states, which may be the first of all."""
+        """Compute the output quantities of the last of the given states."""
         state = states[-1]
         state.measures = self._measures(segment, state)
         if "dissipated_power" in state.measures:
@@ -309,10 +352,10 @@ class States:
                 states[-2].measures["dissipated_energy"] + self._dissipated(segment, states))
 
     def _dissipated(self, segment: Segment, states: list[State]) -> float:
-        """Energy that materials have dissipated between the last two of some states, by Simpson's rule.
+        """Return the energy dissipated by materials between the last two states, by Simpson's rule.
 
-        Half way in time the body is on the curve that the run takes it along; its history variables are advanced to
-        there.
+        In the middle of the step the body lies on the predicted curve, and its history variables are advanced to that
+        time.
         """
         before, state = states[-2:]
         if not before.time < state.time:                     # as where a mesh is made again
@@ -340,19 +383,19 @@ class States:
             a * (3 - 1 / share) + half / (share * (1 - share)) + b * (3 - 1 / (1 - share))) / 6
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
+        """Return {column: value} of a state."""
         columns = self._view(segment).columns
         with segment.problem.state_context(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def segment(self, state: State | None = None) -> Segment:
-        """Return the segment that a state (None: the last) is of, or lies in."""
+        """Return the segment that contains a state (default: the last)."""
         mesh = (state or self.last).setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
     def alone(self, state: State) -> Any:
-        """Return the part of the path on the mesh that a state is on: all of it, unless the mesh was made again on
-        the way."""
+        """Return the part of the path on the mesh of a state; the whole path unless the run was remeshed."""
         if len(self.segments) == 1:
             return self
         segment = self.segment(state)
@@ -366,6 +409,7 @@ class States:
         return self._view(self.segments[-1]).verdict
 
     def _view(self, segment: Segment) -> _View:
+        """Return the evaluation objects of a segment's problem."""
         key = id(segment.problem)
         if key not in self._views:
             self._views[key] = _View(segment.problem, self._timed, self._own)
@@ -373,5 +417,5 @@ class States:
 
 
 def _pieces(states: list[State]) -> list[list[State]]:
-    """Neighbours with the same setting."""
+    """Return the states in groups of successive ones with equal stage data."""
     return [list(group) for _, group in itertools.groupby(states, key=lambda state: state.setting)]

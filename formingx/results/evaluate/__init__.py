@@ -1,1 +1,1 @@
-"""Evaluation of a state: profile, stress."""
+"""Evaluation of states: profile, wall, part, stress, contact, filling, energy balance, admissibility."""

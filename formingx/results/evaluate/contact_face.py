@@ -1,4 +1,4 @@
-"""Contact of a tool with a face of the body, point by point: pressure, friction, gap; the tool's force."""
+"""Contact of a tool with a face of the body, point by point: pressure, friction, gap; force on the tool."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from ..files.sheet import Sheet
 
 @dataclass(frozen=True, repr=False)
 class ContactTable(Sheet):
-    """A face that meets a tool, at the n points where contact acts (nodes or Gauss points), by R in the reference
-    configuration.
+    """Contact quantities at the n contact points (nodes or Gauss points) of a face, ordered by reference radius.
 
     Attributes:
-        rest: (R, Z), shape (n, 2), length.
-        points: (r, z) now, shape (n, 2), length.
+        rest: reference positions (R, Z), shape (n, 2), length.
+        points: deformed positions (r, z), shape (n, 2), length.
         gap: distance from the tool, negative inside it, shape (n,), length.
-        pressure: of contact, per deformed area, shape (n,), stress.
-        friction: tangential traction of the body on the tool per deformed area, along the tool's profile, (n,), stress.
-        comm: of the run.
+        pressure: contact pressure per deformed area, shape (n,), stress.
+        friction: tangential traction of the body on the tool per deformed area, along the tool's profile, shape (n,),
+            stress.
+        comm: MPI communicator of the run.
     """
 
     rest: np.ndarray
@@ -45,12 +45,16 @@ class ContactTable(Sheet):
 
 
 class ContactFace:
-    """The face of one contact of a problem (`FaceContact`), its points from all ranks in one order; collective.
+    """The face of one contact (`FaceContact`) with the points of all ranks in one order; collective.
+
+    Args:
+        path: the path whose states are evaluated.
+        contact: the `FaceContact`.
 
     Attributes:
-        rest: the points in the reference configuration, shape (n, 2), length, by R, then Z.
-        nodes, nearest: nodes of the face in the reference configuration, edge by edge, shape (m, 2), length, and the
-            numbers of the points that stand for them: they themselves, or the nearest Gauss points, shape (m,).
+        rest: reference positions of the n contact points, ordered by R, then Z, shape (n, 2), length.
+        nodes: reference positions of the nodes of the face, edge by edge, shape (m, 2), length.
+        nearest: number of the contact point nearest to each node, shape (m,).
     """
 
     def __init__(self, path: Any, contact: Any):
@@ -65,7 +69,7 @@ class ContactFace:
             self._rest_tangents = _tangents(self.rest[self._edges])
 
     def of(self, state: Any) -> ContactTable:
-        """Return the contact face in a state; without pressure if its tool is inactive."""
+        """Return the contact quantities in a state; without pressure if the tool is inactive."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
@@ -84,7 +88,14 @@ class ContactFace:
         return ContactTable(self.rest, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Deformed over reference area at the nodes, the mean of the edges on both sides, shape (n,)."""
+        """Return deformed over reference area at the nodes, the mean of the adjacent edges.
+
+        Args:
+            points: deformed positions of the contact points, shape (n, 2), length.
+
+        Returns:
+            The area ratios, shape (n,).
+        """
         n, rest, now = len(points), self.rest[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._rest_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:
@@ -94,21 +105,32 @@ class ContactFace:
         return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
 
     def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(rest positions, columns side by side) of all ranks' nodes, by R, then Z."""
+        """Return (reference positions, further columns) of the points of all ranks, ordered by R, then Z."""
         rows = gathered(self._path.problem.comm, np.column_stack([self._contact.points, *columns]))
         rows, n = rows[np.lexsort((rows[:, 1], rows[:, 0]))], self._contact.points.shape[1]
         return rows[:, :n], rows[:, n:]
 
     def _edge_points(self) -> np.ndarray:
-        """Return the two ends and the middle of every edge of the face, shape (m, 3, 2); same on all ranks, ghosts
-        twice."""
+        """Return ends and middle of every edge of the face, shape (m, 3, 2), on all ranks; ghost edges occur twice."""
         mesh = self._path.problem.scene.mesh
         X = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(self._contact.contact.on)))
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
-    """Return the contacts (`FaceContact`) of a tool: by its name, as the `Tool` or a `Contact`; None: the only one."""
+    """Return the contacts of a tool.
+
+    Args:
+        path: the path.
+        tool: name of the tool, the `Tool` or a `Contact`; None if there is only one.
+        caller: name of the calling method, for the message.
+
+    Returns:
+        The `FaceContact` objects of the tool.
+
+    Raises:
+        InputError: there is no such tool, or there are several and `tool` is None.
+    """
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]
@@ -122,15 +144,19 @@ def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
 
 
 def tool_forces(path: Any) -> dict[str, np.ndarray]:
-    """{tool: force that it takes from the body, at all states, shape (states,)}: stress length^2 (length per depth).
+    """Return the force of the body on each tool in all states.
 
-    Of a tool that moves along its travel, positive when it resists the travel; of one that stays along Z, positive when
-    the body pushes it up.
+    The force on a moving tool is taken along its travel, positive if it resists the travel. The force on a fixed tool
+    is
+    taken along Z, positive if the body pushes the tool up.
+
+    Returns:
+        {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.
     """
     return {name: path[column] for name, column in Tooling.of_problem(path.problem).force_columns.items()}
 
 
 def _tangents(points: np.ndarray) -> np.ndarray:
-    """dx/ds at the two ends and the middle of three-node edges, shape (m, 3, 2)."""
+    """Return dx/ds at the two ends and the middle of three-node edges, shape (m, 3, 2)."""
     a, b, m = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)

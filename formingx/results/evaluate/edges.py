@@ -1,4 +1,4 @@
-"""Size of elements at the edges of tools over which a body slides."""
+"""Check of the element size at edges of tools over which the body slides."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ _TURN = 40.0
 
 
 class Edge(NamedTuple):
-    """Convex edge of a tool that turns most between two neighbouring contact points, one of which slides over it.
+    """Convex edge of a tool between two neighbouring contact points, at least one of which slides.
 
-    turn: degrees; tool: its name, or the face that touches it; point: (r, z) now, length.
+    Attributes:
+        turn: angle between the tool normals at the two points, degrees.
+        tool: name of the tool, or of the face that touches it.
+        point: position (r, z) between the two points, length.
     """
 
     turn: float
@@ -25,10 +28,12 @@ class Edge(NamedTuple):
 
 
 def coarsest(path: Any, state: Any) -> Edge | None:
-    """Return the edge in a state on which contact points are the furthest apart; None if nothing slides over one;
-    collective.
+    """Return the edge at which the tool normal turns most from one contact point to the next; collective.
 
-    Neighbours are next to each other in the order of R, then Z. Supported points do not slide.
+    Neighbours are points that follow each other by R, then Z. Supported points count as not sliding.
+
+    Returns:
+        The edge, or None if the body slides over no edge.
     """
     found: list[Edge] = []
     with path.problem.state_context(state) as problem:
@@ -57,7 +62,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
 
 
 def findings(edge: Edge | None) -> list[Finding]:
-    """Return the finding on the coarsest edge over which the body slides, in a list; [] if its elements are small."""
+    """Return a warning on the coarsest edge over which the body slides; [] if its elements are small enough."""
     if edge is None or edge.turn < _TURN:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="

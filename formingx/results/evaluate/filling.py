@@ -17,7 +17,12 @@ _FLAT = 1e-6         # radians: a joint that turns less is no corner
 
 
 class Corner(NamedTuple):
-    """A corner of a tool that the body must fill: (r, z) of its middle, and its radius, lengths."""
+    """Corner of a tool that the body must fill.
+
+    Attributes:
+        at: middle of the corner (r, z), length.
+        radius: fillet radius, length.
+    """
 
     at: tuple[float, float]
     radius: float
@@ -25,13 +30,13 @@ class Corner(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Filling(Sheet):
-    """The gaps in the k corners of a tool, in n states.
+    """The remaining gaps in the k corners of a tool, in n states.
 
     Attributes:
-        corners: of the tool.
+        corners: corners of the tool.
         control: {name of the pressure, or of another control: its values, shape (n,)}.
-        gaps: the largest distance from the points of each corner to the face, shape (n, k), length.
-        comm: of the run.
+        gaps: largest distance from each corner to the body, shape (n, k), length.
+        comm: MPI communicator of the run.
     """
 
     corners: list[Corner]
@@ -46,17 +51,23 @@ class Filling(Sheet):
 
     @property
     def pressure(self) -> np.ndarray:
-        """Values of the controlled quantity, shape (n,)."""
+        """Values of the control, usually a pressure, shape (n,)."""
         return next(iter(self.control.values()))
 
     def pressure_at(self, gap: float, corner: int | None = None) -> float:
-        """Return the pressure beyond which no more than a gap is left, linear between states.
+        """Return the pressure at which a gap is reached, interpolated linearly between states.
+
+        Beyond this pressure the gap remains smaller.
 
         Args:
-            corner: its number in `corners`; None: in all of them.
+            gap: remaining gap, length.
+            corner: number of a corner in `corners`; default all of them.
+
+        Returns:
+            The value of the control, stress for a pressure.
 
         Raises:
-            InputError: that gap is not reached, or there is no such corner.
+            InputError: the gap is not reached, or there is no such corner.
         """
         gap = non_negative("pressure_at: gap", gap)
         if corner is not None and corner not in range(len(self.corners)):
@@ -73,7 +84,15 @@ class Filling(Sheet):
 
 
 def filling(path: Any, contact: Any) -> Filling:
-    """See `Path.filling`; contact: the `FaceContact`."""
+    """Return the filling of the corners of a tool (`Path.filling`).
+
+    Args:
+        path: the path.
+        contact: the `FaceContact` of the tool.
+
+    Raises:
+        InputError: the tool has no corner that the body must fill.
+    """
     from ...contact.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
     number = path.problem.contacts.index(contact)
@@ -94,8 +113,11 @@ def filling(path: Any, contact: Any) -> Filling:
 
 
 def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
-    """Return the corners of a tool that open towards the body, each with points on it, shape (m, 2): arcs and sharp
-    turns."""
+    """Return the arcs and sharp corners of a tool that open towards the body.
+
+    Returns:
+        Pairs (corner, points on it), points of shape (m, 2), length.
+    """
     found = []
     pieces = list(tool.pieces)
     for i, piece in enumerate(pieces):

@@ -1,4 +1,4 @@
-"""The formed part in numbers: volume, weight, area, minimum wall, uniformity."""
+"""Key numbers of the formed part: volume, weight, area, minimum wall, uniformity."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from .wall import Wall
 
 @dataclass(frozen=True, repr=False)
 class Part(PartNumbers):
-    """A whole part, also where a half is modelled, to its rim or its trim; in plane strain per unit depth.
+    """Whole part to its rim or its trim, also if a half is modelled; in plane strain per unit depth.
 
     Attributes:
-        volume: between the two faces, length^3 (a rim that bulges is left out).
-        area: of the middle surface, length^2.
-        draw_ratio: area over the area that it had in the reference configuration (areal draw ratio).
+        volume: volume between the two faces without a bulging rim, length^3.
+        area: area of the middle surface, length^2.
+        draw_ratio: area over the reference area of the same material (areal draw ratio).
         mean_wall: volume over area, length.
         min_wall: minimum wall, length.
-        min_wall_radius: reference radius there, length.
-        min_wall_at: (r, z) of the middle line there, length.
-        min_wall_height: height there (as in `Wall`), length.
-        min_wall_reference: ("R", reference radius), for a parison ("Z", reference height of its inner face).
-        uniformity: minimum wall over mean wall, 1 for an even part.
-        variation: standard deviation of the wall over the middle surface, over its mean: coefficient of variation.
-        weight: grams if a density in g/cm3 was given, else None; of the material before thermal expansion, so that it
-            does not change with the temperature.
-        walls: {height: wall there}, lengths.
-        capacity: volume within the inner face, between planes across its ends, length^3: the whole of a closed bottle;
-            of a pot to its rim, or to the trim.
+        min_wall_radius: reference radius of the minimum wall, length.
+        min_wall_at: its place (r, z) on the middle line, length.
+        min_wall_height: its height (as in `Wall`), length.
+        min_wall_reference: its reference position: ("R", radius), for a parison ("Z", height on the inner face).
+        uniformity: minimum wall over mean wall, 1 for a uniform part.
+        variation: coefficient of variation of the wall over the middle surface: standard deviation over mean.
+        weight: weight in grams, or None without a density. It uses the volume before thermal expansion, so it does not
+            change with the temperature.
+        walls: {height: wall at this height}, length.
         scrap: volume beyond the trim over the volume of the whole sheet.
-        basis: basis of volume, area, weight and capacity, as text: the whole part of which a half was modelled, a unit
-            of depth; "" for an axisymmetric part.
-        units: of the labels.
+        capacity: volume inside the inner face, up to planes across its ends, length^3. A closed bottle counts whole, a
+            pot up to its rim or trim.
+        basis: basis of volume, area, weight and capacity as text, such as a unit of depth. It also tells if only a half
+            was modelled; "" for an axisymmetric part.
+        units: units of the printed values.
     """
 
     volume: float
@@ -62,7 +62,7 @@ class Part(PartNumbers):
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """(what, its value with its unit), for people."""
+        """Rows of the printed table: pairs (name, value with its unit)."""
         along, rest = self.min_wall_reference
         where = (f"height {self._length(self.min_wall_height)}, r = {self._length(self.min_wall_at[0])}, from {along} ="
                  f" {self._length(rest)}")
@@ -72,7 +72,20 @@ class Part(PartNumbers):
 
 def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,
          heights: Sequence[float] = (), units: Units = NONE, planes: MirrorPlanes = NO_PLANES) -> Part:
-    """Return the part in numbers, see `Path.part`; planes: symmetry planes that cut the body."""
+    """Return the key numbers of a part (`Path.part`).
+
+    Args:
+        wall: the wall in a state.
+        axisymmetric: False in plane strain.
+        density: density, g/cm3.
+        trim: radius, or ("height", h), at which the part is cut off, length.
+        heights: heights at which the wall is given, too, length.
+        units: units of the script.
+        planes: symmetry planes that cut the body.
+
+    Raises:
+        InputError: the part does not reach the trim or a height.
+    """
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
     units = units if axisymmetric else units.per_depth()
@@ -102,7 +115,15 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
-    """Return the share of each of the n - 1 strips between nodes that belongs to the part, 0 to 1."""
+    """Return the fraction of each strip between nodes that belongs to the part, 0 to 1, shape (n - 1,).
+
+    Args:
+        wall: the wall at n nodes.
+        trim: radius, or ("height", h), at which the part is cut off, length.
+
+    Raises:
+        InputError: the part does not reach the trim.
+    """
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
         return inside
@@ -119,7 +140,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume within the inner one of the two faces, as far as strips between nodes belong to the part."""
+    """Return the volume inside the inner face, over the strips between nodes that belong to the part, length^3."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside
@@ -129,7 +150,7 @@ def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
 
 
 def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Volumes between successive pairs of points of two lines, shape (m - 1,): of polygons, turned about the axis."""
+    """Return the volumes between two lines, from each pair of points to the next, shape (m - 1,), length^3."""
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
     for a, b in zip(corners, corners[1:] + corners[:1]):
@@ -138,17 +159,17 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarr
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Volumes between the axis and lines from a to b, shape (n, 2), going up, shape (n,)."""
+    """Return the volumes between the axis and lines from a to b, shape (n, 2); positive if b is above a, shape (n,)."""
     (r, z), (s, w) = a.T, b.T
     return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
 
 
 def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Areas that the straight pieces of a line sweep about the axis (lengths in plane strain), shape (m - 1,)."""
+    """Return the areas swept by the pieces of a line about the axis (plane strain: their lengths), shape (m - 1,)."""
     length = np.hypot(*np.diff(line, axis=0).T)
     return np.pi * (line[1:, 0] + line[:-1, 0]) * length if axisymmetric else length
 
 
 def _sums(fine_values: np.ndarray, nodes: int) -> np.ndarray:
-    """Return the sums of values over each piece between two of n nodes, on equal parts of it, shape (n - 1,)."""
+    """Return sums of finely spaced values over each piece between two of n nodes, shape (n - 1,)."""
     return fine_values.reshape(nodes - 1, -1).sum(1)

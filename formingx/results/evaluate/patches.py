@@ -1,9 +1,9 @@
-"""Fields that are known at the quadrature points of cells, smoothed: a cubic for each cell, fitted to its patch.
+"""Recovery of smooth fields from values at quadrature points: a cubic for each cell, fitted to its patch.
 
-The patch of a cell is the cells of its layer that share a corner with it, so nothing is smeared over an interface; a
-cubic in (R, Z) is fitted to the values on it by least squares. In the manner of the patches around nodes of Zienkiewicz
-and Zhu, Int. J. Numer. Meth. Engng 33 (1992) 1331 (doi:10.1002/nme.1620330702), but one for each cell: so no boundary
-needs a rule of its own.
+The patch of a cell consists of the cells of the same layer that share a corner with it. So nothing is averaged over an
+interface. A cubic in (R, Z) is fitted to the values on the patch by least squares. This is similar to the patches
+around nodes of Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 33 (1992) 1331 (doi:10.1002/nme.1620330702). A patch
+per cell needs no special rule at boundaries.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ _KEPT = 2**25                  # numbers: operators of the fits are kept for the
 
 
 class Patches:
-    """The patches of `mine`, some of n cells; of all of them the points are known.
+    """Patches of m cells out of n, with the quadrature points of all n cells.
 
     Args:
-        points: quadrature points (R, Z), shape (n, q, 2).
+        points: quadrature points (R, Z), shape (n, q, 2), length.
         corners: numbers of the corners of the cells, shape (n, 3).
         layer: number of the layer of each cell, shape (n,).
         mine: numbers of the cells to fit, shape (m,).
@@ -46,7 +46,11 @@ class Patches:
         self._kept: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Coefficients of the cubics, shape (m, 10, k), of values at the points of all cells, shape (n, q, k)."""
+        """Return the coefficients of the fitted cubics, shape (m, 10, k).
+
+        Args:
+            values: values at the quadrature points of all cells, shape (n, q, k).
+        """
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
         for some in self._chunks():
             patch = self._patch[some]
@@ -54,7 +58,7 @@ class Patches:
         return found
 
     def _operator(self, some: slice) -> np.ndarray:
-        """Return the operator from values at the points of patches to coefficients, shape (cells, 10, points)."""
+        """Return the matrices from values at the points of patches to coefficients, shape (cells, 10, points)."""
         if some.start in self._kept:
             return self._kept[some.start]
         patch = self._patch[some]
@@ -67,7 +71,12 @@ class Patches:
         return operator
 
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Values of the cubics at points of each cell, shape (m, p, 2): shape (m, p, k)."""
+        """Return the values of the fitted cubics, shape (m, p, k).
+
+        Args:
+            coefficients: coefficients from `fit`, shape (m, 10, k).
+            points: points (R, Z) in each fitted cell, shape (m, p, 2), length.
+        """
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, some: slice, points: np.ndarray) -> np.ndarray:
@@ -78,4 +87,5 @@ class Patches:
         return powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
     def _chunks(self) -> list[slice]:
+        """Return slices of the fitted cells, small enough for the memory."""
         return [slice(k, k + _CHUNK) for k in range(0, len(self._patch), _CHUNK)]

@@ -1,4 +1,4 @@
-"""The outline of a sheet and its thickness, against reference radius and against arc length."""
+"""Outline and thickness of a sheet against reference radius and arc length."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ FACES = (("bottom", "top"), ("inner", "outer"))
 
 @dataclass(frozen=True)
 class Profile:
-    """A sheet in one state, at the n nodes of its bottom face, from the axis to the rim.
+    """Outline of a sheet in one state, at the n nodes of its bottom face from the axis to the rim.
 
-    The wall of a parison or a sphere has its inner face for a bottom, and its outer face for a top.
+    For the wall of a parison or a sphere, the bottom is the inner face and the top the outer face.
 
     Attributes:
-        rest_bottom, rest_top: points (R, Z) of the two faces, opposite each other in the reference configuration,
-            shape (n, 2), length.
-        bottom, top: where they are now, (r, z), shape (n, 2), length.
+        rest_bottom: reference positions (R, Z) on the bottom face, shape (n, 2), length.
+        rest_top: reference positions (R, Z) opposite them on the top face, shape (n, 2), length.
+        bottom: deformed positions (r, z) of the bottom points, shape (n, 2), length.
+        top: deformed positions (r, z) of the top points, shape (n, 2), length.
 
     >>> wall = path.profile().thickness                                                   # from the pole to the rim
     >>> [round(float(h), 3) for h in (wall[0], wall[-1])]
@@ -37,28 +38,27 @@ class Profile:
 
     @property
     def reference_radius(self) -> np.ndarray:
-        """R of the points of the bottom face, shape (n,), length."""
+        """Reference radius R on the bottom face, shape (n,), length."""
         return self.rest_bottom[:, 0]
 
     @property
     def reference_length(self) -> np.ndarray:
-        """Length of the middle line in the reference configuration from the axis, shape (n,), length; of a flat
-        sheet: R."""
+        """Arc length of the reference middle line from the axis, shape (n,), length; R for a flat sheet."""
         return _length_along((self.rest_bottom + self.rest_top) / 2)
 
     @property
     def original_thickness(self) -> np.ndarray:
-        """Distance of the two points in the reference configuration, shape (n,), length."""
+        """Reference distance between the two points, shape (n,), length."""
         return np.hypot(*(self.rest_top - self.rest_bottom).T)
 
     @property
     def thickness(self) -> np.ndarray:
-        """Distance between the two points now, shape (n,), length: where the sheet is sheared, more than its wall."""
+        """Deformed distance between the two points, shape (n,), length; larger than the wall of a sheared sheet."""
         return np.hypot(*(self.top - self.bottom).T)
 
     @property
     def thickness_ratio(self) -> np.ndarray:
-        """Thickness over original thickness, shape (n,)."""
+        """Deformed over reference distance between the two points, shape (n,)."""
         return self.thickness / self.original_thickness
 
     @property
@@ -68,21 +68,28 @@ class Profile:
 
     @property
     def wall_thickness(self) -> np.ndarray:
-        """Shortest distance from the points of the bottom face to the top face now, shape (n,), length."""
+        """Shortest distance from the deformed points of the bottom face to the top face, shape (n,), length."""
         return distance_to_line(self.bottom, fine(self.top))
 
     @property
     def middle(self) -> np.ndarray:
-        """Midpoints (r, z) of top and bottom, shape (n, 2), length."""
+        """Midpoints (r, z) between top and bottom, shape (n, 2), length."""
         return (self.top + self.bottom) / 2
 
     @property
     def arc_length(self) -> np.ndarray:
-        """Length of the deformed middle line from the axis, shape (n,), length."""
+        """Arc length of the deformed middle line from the axis, shape (n,), length."""
         return _length_along(self.middle)
 
     def thickness_ratio_at(self, radius: float) -> float:
-        """Thickness ratio at a reference radius, linear between the nodes; an InputError if it is not of the sheet."""
+        """Return the thickness ratio at a reference radius, interpolated linearly between the nodes.
+
+        Args:
+            radius: reference radius, length.
+
+        Raises:
+            InputError: the radius lies outside the sheet.
+        """
         least, most = self.reference_radius[[0, -1]]
         if not abs(finite("thickness_ratio_at: radius", radius) - (least + most) / 2) <= (0.5 + 1e-9) * (most - least):
             raise InputError(f"thickness_ratio_at: radius = {radius:g}: must be from {least:g} to {most:g}")
@@ -90,7 +97,15 @@ class Profile:
 
 
 def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Shortest distance, shape (m,), of points, (m, 2), to the straight pieces between points of a line, (n, 2)."""
+    """Return the shortest distances of points from a polygon.
+
+    Args:
+        points: shape (m, 2), length.
+        line: corners of the polygon, shape (n, 2), length.
+
+    Returns:
+        The distances, shape (m,), length.
+    """
     a, b = line[:-1], line[1:]
     along = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
     away = points[:, None] - a - np.clip(along, 0, 1)[..., None] * (b - a)
@@ -98,23 +113,33 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 class Profiles:
-    """Makes the `Profile` of a state; the mesh must have boundaries `bottom` and `top`, or `inner` and `outer`."""
+    """Computes the `Profile` of states of a sheet.
+
+    Args:
+        problem: the discretised problem. Its mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
+    """
 
     def __init__(self, problem: Any):
         self._problem = problem
         self._probe: Probe | None = None
 
     def of(self, state: Any) -> Profile:
-        """Return the profile of a state (collective)."""
+        """Return the profile of a state; collective."""
         self._probe = at = self._probe or self._make_probe()
         deformed = at.points + at.displacement_in(state)
         n = len(at.points) // 2
         return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
+        """Return the probe that evaluates displacements at the points of both faces.
+
+        Raises:
+            InputError: the mesh has no pair of faces, or three dimensions.
+        """
         mesh = self._problem.scene.first.mesh
         if self._problem.scene.kinematics.components == 3:
-            raise InputError("a sheet in space has no profile: use path.wall(), its section(), or path.view3d")
+            raise InputError("a sheet in three dimensions has no profile: use path.wall(), its section(), or"
+                             " path.view3d")
         faces = next((pair for pair in FACES if all(name in mesh.boundaries for name in pair)), None)
         if faces is None:
             raise InputError(f"a profile needs boundaries {' or '.join(f'{a!r} and {b!r}' for a, b in FACES)};"
@@ -126,7 +151,12 @@ class Profiles:
 
 
 def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
-    """Points along the parabolas through the nodes of a line's edges (end, middle, end, ...)."""
+    """Return points along the parabolas through three-node edges, `parts` to an edge.
+
+    Args:
+        line: nodes of the edges (end, middle, end, ...), shape (n, 2), length.
+        parts: pieces per edge.
+    """
     a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
     xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
     inner = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
@@ -134,9 +164,11 @@ def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
 
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """For each node of a line of edges (`Mesh.line_of`) the point of another where its normal meets it.
+    """Return for each node of a face the opposite point, where its normal meets the other face, shape (n, 2).
 
-    The ends belong together; where a normal meets nothing (beside an oblique rim), so does the nearest end.
+    The ends of both faces belong together. A normal beside an oblique rim may miss the other face: then its nearest end
+    is
+    taken.
     """
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)
@@ -163,8 +195,10 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return unit vectors, shape (n, 2)."""
     return vectors / np.hypot(*vectors.T)[:, None]
 
 
 def _length_along(points: np.ndarray) -> np.ndarray:
+    """Return the arc length from the first point of a polygon, shape (n,), length."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

@@ -1,4 +1,7 @@
-"""Sticking points that lift off and touch their tool again elsewhere: walls between them depend on the steps."""
+"""Check of sticking points that separate from their tool and stick again elsewhere.
+
+The wall between such points depends on the step lengths.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +20,13 @@ _LARGE = 0.1
 
 
 class Resticking(NamedTuple):
-    """The contact point that moved most along its tool while it was open between two closures.
+    """The point that moved most along its tool while it was open between two closures.
 
     Attributes:
-        tool: its name, or the face that touches it.
-        points: number of points that closed their gaps again.
-        shift: distance between positions of sticking, summed over the run, over the length of face of the point.
-        point: its reference position, shape (2,), length.
+        tool: name of the tool, or of the face that touches it.
+        points: number of points whose gaps closed again.
+        shift: sum of the distances between successive sticking positions, over the tributary length of the point.
+        point: reference position of the point, shape (2,), length.
     """
 
     tool: str
@@ -33,12 +36,14 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the point whose positions of sticking are furthest apart in a run, or None; collective.
+    """Return the point with the largest shift between sticking positions; collective.
 
-    Of a remeshed run the states on the last mesh count.
+    A point that sticks again elsewhere changes the strain beside it by `shift`. Whether a point separates may depend on
+    small changes of the forces, so `shift` also estimates the error due to the step lengths. In a remeshed run only the
+    states on the last mesh are examined.
 
-    A point that sticks again elsewhere changes the stretch beside it by `shift`. Whether it lifts off may depend on
-    small changes of the forces, so this is also the size of the error by the steps.
+    Returns:
+        The point, or None if no gap closed again.
     """
     found = []
     for number, contact in enumerate(path.problem.histories):
@@ -56,7 +61,7 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return the shift of each own point over its length of face, shape (n,)."""
+    """Return the shift of each locally owned point over its tributary length, shape (n,)."""
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
     for touch in touches:
@@ -68,7 +73,7 @@ def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
 
 
 def findings(item: Resticking | None) -> list[Finding]:
-    """Return the finding on points that stick again elsewhere."""
+    """Return a warning on points that stick again elsewhere."""
     if item is None or item.shift < _WALL:
         return []
     size = f"by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else f"by {100 * _LARGE:.0f} % or more"

@@ -1,4 +1,4 @@
-"""Snap-through with history variables: which of several equilibria a body reaches depends on the way there."""
+"""Check of snap-through with history variables: the state reached after a jump depends on the path to it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ _WALL = 0.05
 
 
 class Snap(NamedTuple):
-    """The jump of a run in which the wall changed most.
+    """The snap-through of a run in which the wall changed most.
 
     Attributes:
-        jumps: how many there were. state: its number in the path.
-        before, after: the wall over the original thickness at `point`, reference radius (length).
+        jumps: number of jumps in the run.
+        state: number of the state after the jump, in the path.
+        before: wall over original thickness before the jump, where it changed most.
+        after: wall over original thickness at the same place after the jump.
+        point: reference radius of this place, length.
     """
 
     jumps: int
@@ -29,12 +32,16 @@ class Snap(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the wall, over the wall before."""
+        """Change of the wall over the wall before the jump."""
         return abs(self.after / self.before - 1)
 
 
 def largest(path: Any) -> Snap | None:
-    """Return the largest jump of a path with friction or relaxing material; None: no jump, or no wall; collective."""
+    """Return the largest jump of a path with friction or a viscoelastic material; collective.
+
+    Returns:
+        The jump, or None if there was none or the body has no wall.
+    """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:
         return None
@@ -54,7 +61,7 @@ def largest(path: Any) -> Snap | None:
 
 
 def findings(snap: Snap | None) -> list[Finding]:
-    """Return the finding on the largest jump of the wall."""
+    """Return a warning on the largest jump of the wall."""
     if snap is None or snap.change < _WALL:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"

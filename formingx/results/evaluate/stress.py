@@ -1,22 +1,25 @@
-"""Stresses and stretches of a state, layer by layer: nothing is smeared over an interface.
+r"""Stresses and stretches of a state, layer by layer: nothing is averaged over an interface.
 
-P = d(energy density)/dF, the energy of `solid`: material and volume term; S = F^-1 P; Cauchy stress
-sigma = F S F^T / J. F and S are projected (L2) on piecewise linear fields, one for each layer; all else follows from
-them point by point. (S does not turn with the sheet: projecting sigma instead would spoil the small stress normal to
-an inflated sheet with the large one along it.)
+With the energy density W of `solid` (material and volume term):
 
-How far the stresses of the elements are off is estimated as Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987)
-337 (doi:10.1002/nme.1620240206), do: from their distance to a smoother field. That field comes from cubics fitted to F
-and S (`patches`), whose order is higher; projected fields are not nearer to the truth than the elements' own.
+.. math::
+    P = \partial W / \partial F, \qquad S = F^{-1} P, \qquad \sigma = F S F^T / J
+
+F and S are projected (L2) on piecewise linear fields, one for each layer. All other quantities follow from them point
+by point. S does not rotate with the sheet: a projection of the Cauchy stress would spoil the small stress normal to an
+inflated sheet by the large one along it.
+
+The error of the stresses is estimated as by Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337
+(doi:10.1002/nme.1620240206): as the distance to a smoother field. This field comes from cubics fitted to F and S
+(`patches`), whose order is higher. Projected fields are no more accurate than the stresses of the elements.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import basix
 import basix.ufl
@@ -35,6 +38,7 @@ from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...physics.kinematics import BLOCK
 from ...ranks import gathered
 from .patches import Patches
+from .point_stress import Stress
 from .stress_error import Fitted, StressError, StressPeak
 
 # The entries of F and of S that are not zero, in the order (r, z, hoop; out of plane in plane strain).
@@ -43,79 +47,8 @@ _COUNT = len(BLOCK) + len(_S)
 log = logging.getLogger("formingx")
 
 
-class FaceStress(NamedTuple):
-    """Cauchy stress on a face, shape (n,) each: normal and shear (continuous across an interface), and along it."""
-
-    normal: np.ndarray
-    shear: np.ndarray
-    meridional: np.ndarray
-    hoop: np.ndarray
-
-
-@dataclass(frozen=True)
-class Stress:
-    """Stresses and stretches at n points. Components in the order r, z, hoop (out of plane, in plane strain).
-
-    Attributes:
-        points: reference points (R, Z), shape (n, 2), length.
-        deformation_gradient: F, shape (n, 3, 3).
-        second_piola: S, shape (n, 3, 3), stress.
-
-    >>> pole = path.stress().at([(0.0, 0.15)])
-    >>> pole.principal_stretches.round(1).tolist(), pole.principal_stresses[:, 0].round(1).tolist()
-    ([[2.3, 0.2, 2.3]], [4.0])
-    """
-
-    points: np.ndarray
-    deformation_gradient: np.ndarray
-    second_piola: np.ndarray
-
-    @cached_property
-    def first_piola(self) -> np.ndarray:
-        """P = F S, force per reference area (row: of the force, column: of the face), shape (n, 3, 3)."""
-        return self.deformation_gradient @ self.second_piola
-
-    @cached_property
-    def cauchy(self) -> np.ndarray:
-        """sigma = P F^T / J, tension positive, shape (n, 3, 3), stress."""
-        F = self.deformation_gradient
-        return self.first_piola @ F.transpose(0, 2, 1) / (_det(F) * F[:, 2, 2])[:, None, None]
-
-    @property
-    def hydrostatic_pressure(self) -> np.ndarray:
-        """-tr(sigma)/3, shape (n,), stress."""
-        return -np.trace(self.cauchy, axis1=1, axis2=2) / 3
-
-    @property
-    def principal_stretches(self) -> np.ndarray:
-        """The larger and the smaller stretch in the plane, and the hoop stretch, shape (n, 3)."""
-        F = self.deformation_gradient
-        larger = (np.hypot(F[:, 0, 0] + F[:, 1, 1], F[:, 0, 1] - F[:, 1, 0])
-                  + np.hypot(F[:, 0, 0] - F[:, 1, 1], F[:, 0, 1] + F[:, 1, 0])) / 2
-        return np.column_stack([larger, np.abs(_det(F)) / larger, F[:, 2, 2]])
-
-    @property
-    def principal_stresses(self) -> np.ndarray:
-        """The principal Cauchy stresses from the largest to the smallest, shape (n, 3), stress."""
-        s = self.cauchy
-        mean, radius = (s[:, 0, 0] + s[:, 1, 1]) / 2, np.hypot((s[:, 0, 0] - s[:, 1, 1]) / 2, s[:, 0, 1])
-        return np.sort(np.column_stack([mean + radius, mean - radius, s[:, 2, 2]]))[:, ::-1]
-
-    def on_face(self, normal: Any) -> FaceStress:
-        """Return the tractions on the deformed faces whose reference normals are `normal`, shape (2,) or (n, 2)."""
-        N = np.broadcast_to(np.asarray(normal, dtype=float), self.points.shape)
-        n = np.linalg.solve(self.deformation_gradient[:, :2, :2].transpose(0, 2, 1), N[..., None])[..., 0]
-        n /= np.linalg.norm(n, axis=1)[:, None]
-        m = np.column_stack([n[:, 1], -n[:, 0]])
-        s = self.cauchy[:, :2, :2]
-
-        def component(a, b):
-            return np.einsum("ni,nij,nj->n", a, s, b)
-        return FaceStress(component(n, n), component(m, n), component(m, m), self.cauchy[:, 2, 2])
-
-
 class StressField:
-    """The stresses of one state: `at` points of a layer, or `at_quadrature_points`, where they are not smoothed.
+    """Stresses of one state: smoothed (`at`), or as computed (`at_quadrature_points`).
 
     >>> field = path.stress(path.at(fx.pole_height(6.0)))
     >>> field.at([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
@@ -127,13 +60,17 @@ class StressField:
         self._nodes = recovery.project(state)
 
     def at(self, points: ArrayLike, layer: str | None = None) -> Stress:
-        """Projected stresses at reference points (R, Z), shape (n, 2), the same on all ranks; collective.
+        """Return the projected stresses at points; collective.
 
         Args:
-            layer: of which layer; may be left out where there is one only. On an interface it picks the side.
+            points: reference positions (R, Z), shape (n, 2), length, equal on all ranks.
+            layer: name of a layer; optional if there is only one. At an interface it selects the side.
+
+        Returns:
+            The stresses at the n points.
 
         Raises:
-            InputError: an unknown layer, or a point outside it.
+            InputError: the layer is unknown, or a point lies outside it.
         """
         recovery = self._recovery
         layer = recovery.layer(layer)
@@ -148,9 +85,13 @@ class StressField:
         return _unpack(at, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
-        """Projected stresses at places (k, 2) of the reference cell in each of this rank's m cells: of m k points.
+        """Return the projected stresses at points of each of this rank's m cells, each from its own layer.
 
-        Every cell is of its own layer: at an interface each side has its own values. The points are not filled in.
+        Args:
+            reference: k points of the reference cell, shape (k, 2).
+
+        Returns:
+            The stresses at m k points; `points` is left empty.
         """
         recovery = self._recovery
         owned = len(own_cells(recovery.problem.forms.domain))
@@ -163,43 +104,54 @@ class StressField:
         return _unpack(np.zeros((owned * len(reference), COORDINATES)), values.reshape(-1, _COUNT))
 
     def at_quadrature_points(self, layer: str | None = None) -> Stress:
-        """Stresses as they are at the quadrature points of a layer, all ranks' together; collective."""
+        """Return the stresses as computed at the quadrature points of a layer, of all ranks; collective.
+
+        Args:
+            layer: name of a layer; optional if there is only one.
+        """
         return self._recovery.raw(self._state, self._recovery.layer(layer))
 
     def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
-        """Estimate the error of the stresses at the quadrature points: in each cell and in all; collective.
+        """Estimate the error of the stresses at the quadrature points, per cell and in total; collective.
 
-        sigma_h is the stress there, sigma* the stress of the fitted F and S (see the module); the integrals are sums
-        over the quadrature points. Where the solution is smooth, the estimate tends to the true error as meshes are
-        refined; at a sharp corner under load it does not fall.
+        The error is the difference between the computed stress and the stress from the fitted F and S (see the module).
+        The
+        integrals are sums over the quadrature points. For a smooth solution the estimate tends to the true error on
+        refined
+        meshes. At a loaded sharp corner it does not decrease.
 
         Args:
-            layer: the cells of one layer only.
-            exact: the true Cauchy stress, shape (n, 3, 3), as a function of reference points, shape (n, 2): it takes
-                the place of sigma*, and the errors are the true ones.
+            layer: name of a layer; default all.
+            exact: exact Cauchy stress, shape (n, 3, 3), as a function of reference positions, shape (n, 2). With it,
+                the
+                true error is returned.
+
+        Returns:
+            The errors of the cells.
 
         Raises:
-            InputError: an unknown layer, or an `exact` that is no function or gives another shape.
+            InputError: the layer is unknown, or `exact` is not a function or returns another shape.
         """
         mine, comm = self._recovery.of_layer(layer), self._recovery.problem.comm
         return StressError(*(gathered(comm, v[mine]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """`StressError.mean` of this rank's cells, shape (m,), stress; collective."""
+        """Return `StressError.mean` in this rank's cells, shape (m,), stress; collective."""
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
         """Return the largest principal Cauchy stress, and whether the mesh resolves it; collective.
 
-        Logs a warning if it does not (`StressPeak.converged`).
+        A warning is logged if the mesh does not resolve it (`StressPeak.converged`).
 
         Args:
-            layer: of one layer only.
-            radii: only of cells whose middle lies between these two reference radii: a clamped rim, for one, has a peak
-                of its own.
+            layer: name of a layer; default all.
+            radii: two reference radii. Only cells with their middle between them are examined, for example without a
+                clamped
+                rim and its stress peak.
 
         Raises:
-            InputError: an unknown layer, or no cell between the radii.
+            InputError: the layer is unknown, or no cell lies between the radii.
         """
         comm, fitted = self._recovery.problem.comm, self._fitted
         mine = self._recovery.of_layer(layer)
@@ -218,11 +170,16 @@ class StressField:
 
     @cached_property
     def _fitted(self) -> Fitted:
+        """F and S fitted to the patches of all locally owned cells."""
         return self._recovery.fit(self._state)
 
 
 class Stresses:
-    """Makes the `StressField` of a state; forms and matrix are created once, when first asked for."""
+    """Computes the `StressField` of states; forms and matrix are created once, at first use.
+
+    Args:
+        problem: the discretised problem.
+    """
 
     def __init__(self, problem: Any):
         self.problem = problem
@@ -232,14 +189,19 @@ class Stresses:
         self._located: dict[str, tuple[np.ndarray, Place]] = {}
 
     def of(self, state: Any) -> StressField:
-        """Return the stresses of a state (collective)."""
+        """Return the stresses of a state; collective."""
         if not self._ready:
             self._prepare()
             self._ready = True
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> Place:
-        """Locate points in a layer; the points of the last call are kept; collective."""
+        """Return the cells that contain points of a layer; the last result is cached; collective.
+
+        Args:
+            points: reference positions (R, Z), shape (n, 2), length.
+            layer: name of the layer.
+        """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
             forms, there = self.problem.forms, self.problem.followed(points)
@@ -248,7 +210,11 @@ class Stresses:
         return before[1]
 
     def layer(self, name: str | None) -> str:
-        """Return a layer's name, checked."""
+        """Return the name of a layer, or of the only one for None.
+
+        Raises:
+            InputError: there is no such layer, or there are several and `name` is None.
+        """
         if name is None:
             if len(self.cells) > 1:
                 raise InputError(f"stress: which layer? known: {', '.join(map(repr, self.cells))}")
@@ -257,11 +223,12 @@ class Stresses:
         return name
 
     def project(self, state: Any) -> np.ndarray:
-        """Nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included."""
+        """Return the nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included; collective."""
         with self.problem.state_context(state):
             return self._projected()
 
     def _projected(self) -> np.ndarray:
+        """Return the L2 projection of F and S in the present state of the problem."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -275,12 +242,12 @@ class Stresses:
         return nodes
 
     def raw(self, state: Any, layer: str) -> Stress:
-        """F and S at the quadrature points of a layer, all ranks."""
+        """Return F and S at the quadrature points of a layer, of all ranks; collective."""
         points, values, _ = self._at_quadrature(state, layer)
         return _unpack(*(gathered(self.problem.comm, v).reshape(-1, v.shape[-1]) for v in (points, values)))
 
     def fit(self, state: Any) -> Fitted:
-        """F and S fitted to their values at the quadrature points, and derived values; collective."""
+        """Return F and S fitted to their values at the quadrature points; collective."""
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
@@ -296,8 +263,11 @@ class Stresses:
         return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest sigma_1 of sigma* at the corners of this rank's cells, (m,), and the corner (R, Z), (m,
-        2)."""
+        """Return the largest fitted principal stress at the corners of each of this rank's m cells.
+
+        Returns:
+            The stresses, shape (m,), and the positions (R, Z) of the corners, shape (m, 2), length.
+        """
         own = own_cells(self.problem.forms.domain)
         X = of_cells(self.problem.forms.domain, own)[:, :3]
         assert self._patches is not None
@@ -306,18 +276,18 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Return the locally owned cells of a layer (None: of all), shape (m,)."""
+        """Return the numbers of the locally owned cells of a layer (None: of all), shape (m,)."""
         own = own_cells(self.problem.forms.domain)
         return np.isin(own, self.cells[self.layer(name)]) if name is not None else np.ones(len(own), dtype=bool)
 
     def _owned(self, layer: str) -> np.ndarray:
-        """Return this rank's own cells of a layer."""
+        """Return the numbers of the locally owned cells of a layer."""
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(points, F and S, reference volumes) at the q quadrature points of this rank's m cells of a layer.
+        """Return quadrature points, F and S, and reference volumes in this rank's m cells of a layer.
 
-        Shapes (m, q, 2), (m, q, _COUNT), (m, q).
+        The shapes are (m, q, 2), (m, q, _COUNT) and (m, q).
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -343,8 +313,7 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
-        """[(entries of S (UFL), quadrature metadata)] of a body: of its material, and of the terms that keep its
-        volume."""
+        """Return [(entries of S (UFL), quadrature metadata)]: of the material, and of the volume term."""
         F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(material, names, F):
@@ -353,6 +322,7 @@ class Stresses:
         return parts
 
     def _prepare(self) -> None:
+        """Create spaces, forms and the mass matrix of the projection."""
         problem, forms, mesh = self.problem, self.problem.forms, self.problem.scene.mesh
         bodies, domain = forms.bodies, forms.domain            # a membrane has none, and says so
         self.cells = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
@@ -390,7 +360,7 @@ class Stresses:
         self._solver.setErrorIfNotConverged(True)
 
     def _idle(self) -> list:
-        """Boundary conditions that keep at 0 the unknowns of nodes that belong to no cell of their layer."""
+        """Return boundary conditions that set the unknowns of nodes outside each layer to 0."""
         n = len(self.cells)
         if n == 1:
             return []
@@ -404,18 +374,14 @@ class Stresses:
                                 self.space.sub(k)) for k in range(n)]
 
 
-def _det(F: np.ndarray) -> np.ndarray:
-    """Return the determinant in the plane, of gradients (n, 3, 3), shape (n,)."""
-    return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]
-
-
 def _cauchy(values: np.ndarray) -> np.ndarray:
-    """Cauchy stress, shape (m, q, 3, 3), of F and S, shape (m, q, _COUNT)."""
+    """Return the Cauchy stress, shape (m, q, 3, 3), from F and S, shape (m, q, _COUNT)."""
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
+    """Return the `Stress` at points from the entries of F and S, shape (n, _COUNT)."""
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]

@@ -1,4 +1,4 @@
-"""Estimated error of the stresses of a state: cell by cell, in all, and at their peak."""
+"""Estimated error of the stresses in a state: per cell, in total, and at the stress peak."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ RESOLVED = 0.05
 
 
 class StressError(NamedTuple):
-    """Estimated errors of the Cauchy stress of n cells of all ranks; |.| is the root of the sum of all squares.
+    """Estimated errors of the Cauchy stress in n cells of all ranks.
 
-    Volumes are reference volumes (axisymmetric: of the whole ring; plane strain: of unit depth); those of the deformed
-    cells are the same as far as the volume is kept.
+    |.| is the Frobenius norm, sigma_h the computed and sigma* the fitted stress. Volumes are reference volumes:
+    axisymmetric of the whole ring, in plane strain of unit depth.
 
     Attributes:
-        points: reference points (R, Z) in the middle of the cells, shape (n, 2), length.
-        volume: of the cells, shape (n,).
+        points: reference positions (R, Z) of the middles of the cells, shape (n, 2), length.
+        volume: volumes of the cells, shape (n,).
         cells: root of the integral of |sigma* - sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
         stress: root of the integral of |sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
     """
@@ -43,21 +43,21 @@ class StressError(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """`total` over the root of the integral of |sigma_h|^2 + |sigma* - sigma_h|^2; 0 without any stress."""
+        """`total` over the root of the integral of |sigma_h|^2 + |sigma* - sigma_h|^2; 0 without stress."""
         whole = np.hypot(np.linalg.norm(self.stress), self.total)
         return float(self.total / whole) if whole > 0 else 0.0
 
 
 class StressPeak(NamedTuple):
-    """The largest principal Cauchy stress, and where the estimated errors leave room for a larger one.
+    """The largest principal Cauchy stress, and the place where the estimated error allows a larger one.
 
     Attributes:
-        value: the largest sigma_1 of the fitted stress sigma* at a corner of a cell, stress.
-        point: the reference point (R, Z) where it is, shape (2,), length.
-        error: the largest |sigma* - sigma_h| at a quadrature point of the cells there, stress.
-        doubtful: sigma_1 in the cell where sigma_1 and such an error add up to most, stress.
-        doubtful_point: the corner (R, Z) of that cell where it is, shape (2,), length.
-        doubtful_error: the error of that cell, stress.
+        value: largest fitted principal stress at a corner of a cell, stress.
+        point: reference position (R, Z) of this corner, shape (2,), length.
+        error: largest |sigma* - sigma_h| at a quadrature point of the adjacent cells, stress.
+        doubtful: principal stress in the cell where principal stress plus error is largest, stress.
+        doubtful_point: reference position (R, Z) of the corner of this cell, shape (2,), length.
+        doubtful_error: error of this cell, stress.
     """
 
     value: float
@@ -69,8 +69,13 @@ class StressPeak(NamedTuple):
 
     @classmethod
     def among(cls, sigma: np.ndarray, at: np.ndarray, error: np.ndarray) -> StressPeak:
-        """Return the peak of n cells: largest sigma_1, shape (n,), the corner where it is, (n, 2), largest error,
-        (n,)."""
+        """Return the peak over n cells.
+
+        Args:
+            sigma: largest principal stress in each cell, shape (n,), stress.
+            at: corner (R, Z) where it occurs, shape (n, 2), length.
+            error: largest error in each cell, shape (n,), stress.
+        """
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
         there = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
         return cls(float(sigma[top]), at[top], float(error[there].max()), float(sigma[worst]), at[worst],
@@ -78,7 +83,7 @@ class StressPeak(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """True if nowhere sigma_1 and its error add up to more than 1.05 times the largest sigma_1."""
+        """True if principal stress plus error is everywhere at most 1.05 times the largest principal stress."""
         return self.doubtful + self.doubtful_error - self.value <= RESOLVED * abs(self.value)
 
     def __str__(self) -> str:
@@ -91,17 +96,19 @@ class StressPeak(NamedTuple):
 
 
 def _show(point: np.ndarray) -> str:
+    """Return a point as text."""
     return f"(R, Z) = ({point[0]:.4g}, {point[1]:.4g})"
 
 
 class Fitted(NamedTuple):
-    """Recovered F and S of m locally owned cells, at q quadrature points of each.
+    """Fitted F and S of m locally owned cells with q quadrature points each.
 
     Attributes:
-        points: reference points (R, Z), shape (m, q, 2), length.
-        volume: reference volumes that belong to them, shape (m, q).
-        raw, smooth: sigma_h and sigma*, shape (m, q, 3, 3), stress.
-        cubics: the cubics of the fit (`Patches`), shape (m, 10, k).
+        points: quadrature points (R, Z), reference positions, shape (m, q, 2), length.
+        volume: reference volumes of the quadrature points, shape (m, q).
+        raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
+        smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.
+        cubics: coefficients of the fitted cubics (`Patches`), shape (m, 10, k).
     """
 
     points: np.ndarray
@@ -111,7 +118,14 @@ class Fitted(NamedTuple):
     cubics: np.ndarray
 
     def error(self, exact: Callable | None = None) -> StressError:
-        """See `StressField.error`."""
+        """Return the errors of the cells of all ranks (`StressField.error`); collective.
+
+        Args:
+            exact: exact Cauchy stress as a function of reference positions; default the fitted one.
+
+        Raises:
+            InputError: `exact` is not a function, or returns another shape.
+        """
         better = self.smooth
         if exact is not None:
             if not callable(exact):

@@ -1,6 +1,7 @@
-"""Tension of a membrane: in compression it wrinkles, and has no state, since it does not resist bending.
+"""Check of a membrane for compression: without bending stiffness it wrinkles.
 
-(Tension field theory begins there: Steigmann, Proc. R. Soc. London A 429 (1990) 141.)
+Tension field theory describes the wrinkled state (Steigmann, Proc. R. Soc. London A 429 (1990) 141). It is not
+implemented here.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ class Resultant(NamedTuple):
 
     Attributes:
         direction: "meridional" or "hoop".
-        value: over shear modulus times thickness.
-        point: reference point (R, Z) of the mid-surface where it is, length.
+        value: the resultant over shear modulus times thickness.
+        point: reference position (R, Z) on the mid-surface, length.
     """
 
     direction: str
@@ -35,18 +36,20 @@ class Resultant(NamedTuple):
 
     @property
     def compressed(self) -> bool:
-        """True if it is a compression, and no round-off."""
+        """True if the resultant is compressive beyond round-off."""
         return self.value < -_COMPRESSED
 
 
 class Tension:
-    """Smallest principal resultant of a membrane in a state, per deformed length.
+    r"""Smallest principal stress resultant of a membrane per deformed length.
 
-    With F = diag(l1, l3, l2) and P = dW/dF of the stored energy, the resultant of a layer of thickness h is
-    h l3 (l_i P_ii - l3 P_33).
+    For F = diag(l1, l3, l2) and a layer of reference thickness h:
+
+    .. math::
+        P = \partial W / \partial F, \qquad N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33})
 
     Args:
-        problem: of a scene whose model is a `Membrane`.
+        problem: discretised problem of a scene whose model is a `Membrane`.
     """
 
     def __init__(self, problem: Any):
@@ -63,20 +66,24 @@ class Tension:
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def least(self, state: Any) -> Resultant:
-        """Return the smallest resultant of a state; in plane strain along the section alone; collective."""
+        """Return the smallest resultant in a state, in plane strain only along the section; collective."""
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
         return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
 
     def hoop(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
-        """(points (R, Z) from the axis to the rim, (n, 2), hoop resultants by length in the reference configuration,
-        (n,)); collective."""
+        """Return the hoop resultants along a membrane, from the axis to the rim; collective.
+
+        Returns:
+            Reference positions (R, Z), shape (n, 2), length, and resultants per reference length, shape (n,).
+        """
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
         return values[:, 2:4], values[:, 4]
 
     def _values(self, state: Any) -> np.ndarray:
+        """Return rows (both principal resultants, R, Z, hoop resultant per reference length) at quadrature points."""
         problem, domain = self._problem, self._problem.forms.domain
         with problem.state_context(state):
             cells = own_cells(domain)
@@ -85,7 +92,11 @@ class Tension:
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
-    """Return (number of the first state of a path in which a membrane is compressed, where) or None; collective."""
+    """Return the first state of a path in which a membrane is compressed; collective.
+
+    Returns:
+        Number of the state and its smallest resultant, or None.
+    """
     k = 0
     for segment in path.segments:
         scene = segment.problem.scene
@@ -99,7 +110,7 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
 
 
 def findings(first: tuple[int, Resultant] | None) -> list[Finding]:
-    """Return the finding on the first compression of a membrane (`first_compression`)."""
+    """Return a finding on the first compression of a membrane (`first_compression`)."""
     if first is None:
         return []
     k, (direction, value, point) = first

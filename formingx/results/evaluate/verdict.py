@@ -1,4 +1,4 @@
-"""Admissibility of a state, checked during the run before it is accepted."""
+"""Admissibility check of a state before the run accepts it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ class Limits:
     """Limits of an admissible state, and limits from which a run warns.
 
     Attributes:
-        volume: root mean square of J - 1. (Creases at clamped rims, and at corners of coarse blocks, stay below 0.17.)
-        inside_out: part of the elements that may have a point with J <= 0.
-        fewest: number of them that always may: corners are singular.
-        inside: depth of the body in a tool, over the thickness and over the length of an edge: beyond both it stands in
-            the tool.
-        sunk: penetration of contact points over the wall that is left there: above it the body did not follow the tool.
+        volume: root mean square of J - 1. (Creases at clamped rims and at corners of coarse blocks stay below 0.17.)
+        inside_out: fraction of the elements that may have a point with J <= 0.
+        fewest: number of such elements that is always allowed, because corners are singular.
+        inside: depth of the body in a tool, over the thickness and over the length of an edge. Only a depth beyond both
+            is inadmissible.
+        sunk: penetration of contact points over the local wall. Above this limit the body did not follow the tool.
             (Williams' plug on coarse elements reaches 0.051.)
-        warns: the amount by which penetration may change a force before a run warns: that is its accuracy.
-        ends: the amount by which it may before a run ends.
-        stiffest: that change over the part of the body's energy that penetration holds: at most, of a body pressed
+        warns: relative change of a tool force by penetration from which a run warns.
+        ends: relative change of a tool force by penetration from which a state is inadmissible.
+        stiffest: largest ratio of this change to the fraction of the energy stored in penetration, as for a body
+            pressed
             flat.
-        small: of arc length: half of a difference quotient.
-        felt: penetration over the thickness below which it ends no run: at a first touch the body holds nothing yet.
-        thinnest: the largest pole stretch; it is 1e150 for a wall that is not above 0.
-        pulls: force by which a tool without friction is pulled, over the forces that press on it.
+        small: half of a difference quotient, over the arc length.
+        felt: penetration over the thickness below which a state is always admissible, as at a first touch.
+        thinnest: largest pole stretch; it is 1e150 for a negative wall.
+        pulls: tensile force on a frictionless tool over the compressive forces on it.
     """
 
     volume: float = 0.25
@@ -60,10 +61,10 @@ class Depth(NamedTuple):
 
     Attributes:
         share: depth over the allowed depth.
-        depth: length.
+        depth: penetration depth, length.
         place: deformed position, shape (2,) or (3,), length.
         contact: the `FaceContact`.
-        name: of the tool, or of the face that touches it.
+        name: name of the tool, or of the face that touches it.
     """
 
     share: float
@@ -74,13 +75,17 @@ class Depth(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Text on a contact point in three dimensions."""
+        """Message about a contact point in three dimensions."""
         at = ", ".join(f"{v:.5g}" for v in self.place)
         return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({at})"
 
 
 class Verdict:
-    """Admissibility check of the states of one problem; constant data are found once."""
+    """Admissibility check of the states of one problem.
+
+    Args:
+        problem: the discretised problem.
+    """
 
     def __init__(self, problem: Any):
         self._problem, self._solid = problem, problem.scene.model.solid
@@ -91,12 +96,15 @@ class Verdict:
             self._rest = _lengths(self._outline.rest)
 
     def of(self, state: State) -> str:
-        """Return the reason for which a state with known `measures` is inadmissible; "" if it is admissible;
-        collective."""
+        """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
+
+        Args:
+            state: a state with its output quantities.
+        """
         return next(self._reasons(state), "")
 
     def findings(self, state: State) -> list[Finding]:
-        """Return the findings on the contact of a state that a body can have; collective."""
+        """Return the warnings on the contact in an admissible state; collective."""
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
@@ -116,6 +124,7 @@ class Verdict:
         return found
 
     def _reasons(self, state: State) -> Iterator[str]:
+        """Yield every reason why a state is inadmissible."""
         measures = state.measures
         for name, value in measures.items():
             if not np.isfinite(value):
@@ -158,7 +167,7 @@ class Verdict:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
     def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Yield the deepest points in tools; own: on the face of the contact, for a warning; else on any face."""
+        """Yield the deepest point in each tool: of the contact's own face (a warning), or of any face."""
         points, length = along(edges), _lengths(edges)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
@@ -171,10 +180,10 @@ class Verdict:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
-        """Yield the deepest contact point of each tool in three dimensions if its penetration is above `allowed`.
+        """Yield the deepest contact point in each tool in three dimensions, if it is deeper than allowed.
 
         Args:
-            allowed: of a contact, the allowed penetration of its points, shape (n,) or a number, length.
+            allowed: function of a contact that returns the allowed penetration, shape (n,) or a number, length.
         """
         if self._problem.scene.kinematics.components < 3:
             return
@@ -188,7 +197,7 @@ class Verdict:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, _name(contact))
 
     def _sunk(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
-        """Contact points that the penalty lets too deep into tools: over the wall there now, whose volume is kept."""
+        """Yield contact points whose penetration is too large compared with the local wall."""
         weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
@@ -208,16 +217,20 @@ def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
 
 
 def _most_inside(contact: Any) -> np.ndarray:
-    """Return the allowed penetration of contact points, shape (n,), length; infinite for lagged points that touch
-    since this step, on which no force acts yet."""
+    """Return the allowed penetration of contact points, shape (n,), length.
+
+    It is infinite for lagged points that touch since this step: no force acts on them yet.
+    """
     most = _LIMITS.inside * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
 def _force_error(contact: Any, state: State, images: int) -> float:
-    """Return the relative change of the force F on a tool by penetration; 0 for a tool that stays; collective.
+    """Return the relative change of the force F on a moving tool by penetration; collective.
 
-    The tool advances by 2 E/F into the body (E: energy of penetration). This times dF/dtravel, over F, is the change.
+    With the energy E of penetration, the tool advances by 2 E/F into the body. The change of force is this distance
+    times
+    dF/dtravel. It is 0 for a fixed tool.
 
     Args:
         images: number of images of the modelled body in the whole part, to which `strain_energy` belongs.
@@ -237,11 +250,12 @@ def _force_error(contact: Any, state: State, images: int) -> float:
 
 
 def _harder(contact: Any, error: float) -> str:
+    """Return advice on a larger penalty, as text."""
     return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warns * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
-    """Return True if a tool without friction, from which the body separates, is pulled along its travel; collective."""
+    """Return True if the body pulls at a frictionless tool along its travel; collective."""
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
@@ -250,9 +264,10 @@ def _pulled(contact: Any, state: State) -> bool:
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:
-    """Lengths of curved edges, shape (m, 3, 2), first end, last, middle; shape (m,)."""
+    """Return the lengths of curved edges, shape (m,), from (first end, last end, middle), shape (m, 3, 2)."""
     return np.linalg.norm(np.diff(along(edges, 4), axis=1), axis=-1).sum(1)
 
 
 def _name(contact: Any) -> str:
+    """Return the name of a contact's tool, or of the face that touches it."""
     return contact.contact.name or contact.contact.on

@@ -21,10 +21,12 @@ _FURTHEST = 2.0
 
 
 def findings(error: float, where: str, away: float | None = None) -> list[Finding]:
-    """Return the findings on a root mean square of J - 1, in the state that `where` names.
+    """Return the findings on the volume error of a state.
 
     Args:
-        away: the same away from clamped faces, see `away_from_clamps`; None: not known, or there are none.
+        error: root mean square of J - 1.
+        where: name of the state, for the message.
+        away: the same away from clamped faces (`away_from_clamps`); None if unknown or without clamps.
     """
     if error <= BOUND:
         return []
@@ -38,17 +40,21 @@ def findings(error: float, where: str, away: float | None = None) -> list[Findin
 
 
 def away_from_clamps(path: Any) -> float | None:
-    """Return the root mean square of J - 1 in the last state away from clamped faces, or None; collective.
+    """Return the root mean square of J - 1 in the last state away from clamped faces; collective.
 
-    Away: farther than `_NEAR` lengths of the face, the wall of a sheet, over which the effect of its singular corners
-    decays (Saint-Venant).
+    The effect of the singular corners of a clamped face decays over its length, the wall of a sheet (Saint-Venant).
+    Points
+    nearer than `_NEAR` times this length are left out.
+
+    Returns:
+        The error, or None without clamped faces.
     """
     faces, reach = _clamped(path)
     return path.problem.volume_error_away(path.last, faces, reach) if len(faces) else None
 
 
 def _clamped(path: Any) -> tuple[np.ndarray, float]:
-    """Nodes of the clamped faces of a solid, shape (n, 2), and `_NEAR` times the length of the longest one."""
+    """Return the nodes of the clamped faces of a solid, shape (n, 2), and `_NEAR` times the longest face, length."""
     scene = path.problem.scene
     clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
     faces = [scene.mesh.nodes_of(name) for name in clamped]
@@ -57,7 +63,7 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def of_point(path: Any) -> list[Finding]:
-    """Return the findings on the point at which J is furthest from 1 in the last state of a path; collective."""
+    """Return the findings on the point of the last state at which J differs most from 1; collective."""
     furthest = path.problem.furthest_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _FURTHEST < J < _FURTHEST:

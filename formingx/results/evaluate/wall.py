@@ -1,4 +1,4 @@
-"""The wall of a formed part, place by place from the axis to the rim: a table to read, plot and send on."""
+"""Wall thickness of a formed part from the axis to the rim, as a table."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .profile import Profile, distance_to_line
 
 @dataclass(frozen=True, repr=False)
 class Wall(Sheet):
-    """The wall at the n nodes of the bottom (inner) face of a sheet, from the axis to the rim, in one state.
+    """Wall of a sheet in one state, at the n nodes of the bottom (inner) face from the axis to the rim.
 
     Attributes:
-        profile: both faces, in the reference configuration and now.
-        layers: {name of a layer: its share of the wall, shape (n,)}, from the bottom up: of the material line across
-            the sheet there.
-        comm: of the run.
+        profile: reference and deformed positions of both faces.
+        layers: {name of a layer: its fraction of the wall, shape (n,)}, from the bottom up, along the material line
+            across the sheet.
+        comm: MPI communicator of the run.
     """
 
     profile: Profile
@@ -35,12 +35,12 @@ class Wall(Sheet):
 
     @property
     def reference_radius(self) -> np.ndarray:
-        """Reference radius R of the material, shape (n,), length."""
+        """Reference radius R, shape (n,), length."""
         return self.profile.reference_radius
 
     @property
     def arc_length(self) -> np.ndarray:
-        """Length of the deformed middle line from the axis, shape (n,), length."""
+        """Arc length of the deformed middle line from the axis, shape (n,), length."""
         return self.profile.arc_length
 
     @property
@@ -50,12 +50,12 @@ class Wall(Sheet):
 
     @property
     def z(self) -> np.ndarray:
-        """Z of the middle line, shape (n,), length."""
+        """Z coordinate of the middle line, shape (n,), length."""
         return self.profile.middle[:, 1]
 
     @property
     def height(self) -> np.ndarray:
-        """Distance along the axis from the pole, the part's base; from its lowest point if it has no pole; (n,)."""
+        """Axial distance from the pole; without a pole, from the lowest point, shape (n,), length."""
         return np.abs(self.z - self.z[0]) if abs(self.r[0]) <= 1e-9 * np.ptp(self.r) else self.z - self.z.min()
 
     @cached_property
@@ -65,7 +65,7 @@ class Wall(Sheet):
 
     @property
     def ratio(self) -> np.ndarray:
-        """The wall over the original thickness there, shape (n,)."""
+        """Wall over original thickness, shape (n,)."""
         return self.wall / self.profile.original_thickness
 
     @property
@@ -76,10 +76,13 @@ class Wall(Sheet):
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}
 
     def at_height(self, height: float) -> float:
-        """Return the wall where the part's middle line passes a height (the least, if it does more than once), length.
+        """Return the wall at a height of the middle line, length; the smallest if it passes the height several times.
+
+        Args:
+            height: height as in `Wall.height`, length.
 
         Raises:
-            InputError: it does not pass that height.
+            InputError: the middle line does not reach the height.
         """
         height, h = finite("at_height: height", height), self.height
         k = np.flatnonzero((h[:-1] - height) * (h[1:] - height) <= 0)
@@ -91,14 +94,18 @@ class Wall(Sheet):
 
 
 class Walls:
-    """Makes the `Wall` of states of a path."""
+    """Computes the `Wall` of states of a path.
+
+    Args:
+        path: the path whose states are evaluated.
+    """
 
     def __init__(self, path: Any):
         self._path = path
         self._lines: tuple[list[str], Any] | None = None
 
     def of(self, state: Any) -> Wall:
-        """Return the wall in a state (collective)."""
+        """Return the wall in a state; collective."""
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}
@@ -116,8 +123,19 @@ class Walls:
 
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
-    """(layers from the bottom up, where the material lines across cross the k interfaces in the reference
-    configuration, shape (k, n, 2))."""
+    """Return the k interfaces between layers along the material lines across a sheet.
+
+    Args:
+        mesh: the mesh.
+        profile: outline of the sheet, n nodes.
+
+    Returns:
+        Names of the layers from the bottom up, and the reference positions where each material line crosses each
+        interface, shape (k, n, 2), length.
+
+    Raises:
+        InputError: the layers do not lie above each other.
+    """
     if len(mesh.layers) == 1:
         return list(mesh.layers), np.zeros((0, *profile.rest_bottom.shape))
     edges = _interfaces(mesh)
@@ -137,8 +155,7 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
-    """{(layer, layer): straight pieces of the line between them in the reference configuration, shape (m, 2, 2)};
-    same on all ranks."""
+    """Return {(layer, layer): edges of their interface, reference positions, shape (m, 2, 2)}, equal on all ranks."""
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
     layer = np.full(len(_compat.cell_nodes(domain)), -1)
@@ -160,8 +177,10 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Intersect the lines start + s across, 0 <= s <= 1, with straight pieces, shape (m, 2, 2): s, (n,), nan if
-    nowhere."""
+    """Return the parameters s at which lines start + s across meet straight pieces, shape (n,).
+
+    The pieces have shape (m, 2, 2). s is nan if a line meets none of them within 0 <= s <= 1.
+    """
     a, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
     det = across[:, None, 0] * along[:, 1] - across[:, None, 1] * along[:, 0]
@@ -174,8 +193,7 @@ def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.n
 
 
 def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
-    """Mean distance of a layer's nodes from the middle of the bottom face in the reference configuration: which of
-    two is the lower."""
+    """Return the mean reference distance of a layer's nodes from the bottom face, to order two layers."""
     cells = mesh.cells.find(mesh.layers[layer])
     points = gathered(mesh.comm, of_cells(mesh.domain, cells))
     return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.rest_bottom).mean())

@@ -1,12 +1,12 @@
-"""The energy balance of a run: work done on the body by each item, and its uses.
+"""Energy balance of a run: work done on the body by each load and tool, stored and dissipated energy.
 
-Between two states of one control the body moves on the cubic through both and their tangents. Loads are integrated
-along it (Gauss's rule). Reactions of supports and tools are no smooth functions of a guessed body, so their force is a
-cubic in arc length, too: through both values, with the slopes that the body's forces have along the tangents. Where a
-point is about to touch, a parabola does without the slope there; in a flow, and in a jump, straight lines serve.
+Between two states of one stage the body moves on the cubic through both states and their tangents. The work of loads is
+integrated along it by Gauss quadrature. Reactions of supports and tools are not smooth on such an interpolated body. So
+a reaction is also interpolated by a cubic in arc length: from its values and its slopes along the two tangents. If a
+point is about to touch, the slope at that end is left out (parabola). In a flow and in a jump, straight lines are used.
 
-A step over which this does not balance is halved: a state in its middle is solved for, from where the step began, until
-another half changes nothing that counts.
+If the energies of a step do not balance, the step is halved: a state in its middle is solved for from its start. The
+halving is repeated until the change is negligible.
 """
 
 from __future__ import annotations
@@ -36,21 +36,25 @@ _PARTS = 0.5, 0.35, 0.65   # of a step at which it is halved
 
 
 class _Line(NamedTuple):
-    """A function of 0 <= s <= 1: its coefficients (numbers or arrays), from the constant on."""
+    """Polynomial in s, 0 <= s <= 1.
+
+    Attributes:
+        coefficients: numbers or arrays, in ascending order of powers.
+    """
 
     coefficients: tuple
 
     def at(self, s: float) -> Any:
-        """Value."""
+        """Return the value at s."""
         return sum(c * s**k for k, c in enumerate(self.coefficients))
 
     def slope(self, s: float) -> Any:
-        """Return the derivative."""
+        """Return the derivative at s."""
         return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
 
 
 def _through(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
-    """Return the cubic from a to b, with the slopes at the ends that have one."""
+    """Return the polynomial from a to b with the given slopes at its ends: cubic, parabola or straight line."""
     by = b - a
     if start is None and end is None:
         return _Line((a, by))
@@ -67,8 +71,14 @@ def _integral(f: _Line, y: _Line) -> float:
 
 
 class _Reaction(NamedTuple):
-    """Reaction of a driven support or a tool at a state: force along its travel, and the travel, length;
-    slope and by_arc: their slopes by arc length."""
+    """Reaction of a driven support or a tool in a state.
+
+    Attributes:
+        force: force along the travel.
+        slope: derivative of the force by arc length.
+        travel: travel, length.
+        by_arc: derivative of the travel by arc length.
+    """
 
     force: float
     slope: float
@@ -77,10 +87,10 @@ class _Reaction(NamedTuple):
 
 
 class Ledger:
-    """The energy balance of the states of one problem, of the whole part.
+    """Energy balance of the states of one problem, for the whole part.
 
     Args:
-        segment: the `Segment`.
+        segment: the `Segment` with the problem and its states.
     """
 
     def __init__(self, segment: Any):
@@ -96,7 +106,7 @@ class Ledger:
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
-        """Return {item: energy added in each state, shape (states,)}."""
+        """Return {entry: energy added from the previous state to each state, shape (states,)}."""
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._between(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
@@ -108,7 +118,7 @@ class Ledger:
 
     def _halved(self, a: Any, b: Any, whole: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
-        """Return the energies from a state to the next, `whole` at a first look, by way of states between."""
+        """Return the energies of a step, computed through states between its ends; `whole` is the first estimate."""
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return whole
@@ -119,7 +129,7 @@ class Ledger:
         return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
 
     def _middle(self, a: Any, b: Any) -> Any:
-        """Return a state about half-way between two, also in time, solved from the first; None if there is none."""
+        """Return a state near the middle of a step, solved for from the start of the step, or None."""
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
             return None
@@ -142,17 +152,17 @@ class Ledger:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """Return True for a step whose time does not follow the control."""
+        """Return True for a step in which the process time is independent of the control."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _between(self, a: Any, b: Any) -> dict[str, float]:
-        """Return the energies added from a state to the next."""
+        """Return the energies added in a step."""
         images = self._problem.scene.symmetry_factor
         found = {name: images * value for name, value in self._of_body(a, b).items()}
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _of_body(self, a: Any, b: Any) -> dict[str, float]:
-        """Return the same of the body as modelled, without the losses of jumps."""
+        """Return the energies added in a step to the body as modelled, without losses of jumps."""
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
@@ -183,7 +193,7 @@ class Ledger:
         return found
 
     def _by_loads(self, a: Any, x: _Line, control: _Line) -> dict[str, float]:
-        """Work of loads, and of forces that fade, along a line from a state."""
+        """Return the work of loads, and of fading unbalanced forces, along a line from a state."""
         problem = self._problem
         names = [name for name, _ in self._loads]
         found = dict.fromkeys(names, 0.0)
@@ -200,12 +210,13 @@ class Ledger:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return the reactions of driven supports and tools at a state; computed once."""
+        """Return the reactions of driven supports and tools in a state; cached."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._found(state) if self._driven else {}
         return self._ends[id(state)][1]
 
     def _found(self, state: Any) -> dict[str, _Reaction]:
+        """Return the reactions of driven supports and tools in a state."""
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
         scale = forms.stress * forms.volume / forms.length
@@ -237,7 +248,9 @@ class Ledger:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Owned unknowns (u_r, u_z) of its face, shape (n, 2); of points in contact, where it shares the face."""
+        """Return the owned unknowns of a contact face, shape (n, 2); of closed points alone if contacts share the
+        face.
+        """
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]
@@ -245,14 +258,14 @@ class Ledger:
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _kinked(self, state: Any) -> bool:
-        """Return True if a point of the body is where a tool begins to resist."""
+        """Return True if a contact point lies at the gap at which the tool begins to resist."""
         with self._problem.state_context(state) as at:
             x, control = state.x[: at.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
                               for c in at.present]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
-        """Return the energy dissipated by friction: mean traction times inelastic slip, while the point touched."""
+        """Return the energy dissipated by friction: mean traction times inelastic slip of the closed points."""
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
         if a.setting != b.setting or not contacts:
@@ -267,8 +280,7 @@ class Ledger:
         return lost
 
     def _warmed(self, a: Any, b: Any) -> float:
-        """Return the stored energy that comes with the temperature, by the trapezium rule: the body as it was, and
-        as it is."""
+        """Return the stored energy added by a change of temperature at constant displacement (trapezoidal rule)."""
         cold, warm = a.memory[-1], b.memory[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
@@ -277,21 +289,22 @@ class Ledger:
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:
-        """Return the stored energy at a state."""
+        """Return the stored energy in a state."""
         with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
-        """Return the energy of tools that the body may pull at."""
+        """Return the energy stored in adhesive tools."""
         with self._problem.state_context(state) as at:
             return sum(resultants.energy(c, state.x[: at.n_owned], state.control) for c in at.present if c.law.pulls)
 
     def _sum(self, values: Any) -> float:
+        """Return the sum over all ranks."""
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """Return the work put in less the losses of a row."""
+    """Return the external work and the negative losses of a row."""
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
@@ -302,11 +315,12 @@ def _left(row: dict[str, float], a: Any, b: Any) -> float:
 
 
 def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
+    """Return the friction traction on the contact points in a state."""
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
 
 def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
-    """Slip, elastic or not, of points that went straight from x to `end`, shape (n, 2), while they touched, (n,)."""
+    """Return the slip of points that moved straight from x to `end`, shape (n, 2), while they touched, shape (n,)."""
     near, foot = law.nearest(end), -law.theta
     touched, touches = touch.distance > foot, near.distance > foot
     way = near.distance - touch.distance
@@ -330,7 +344,7 @@ def _called(scene: Any, item: Any) -> str:
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """See `Path.work`."""
+    """Return the energy balance of a run, and log a warning if it does not close (`Path.work`)."""
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
     tell(new, path.problem.comm.rank)
@@ -339,7 +353,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return the finding on an energy balance that is off by more than `_PROMISED` of its largest part."""
+    """Return a finding on an energy balance that does not close within `_PROMISED` of its largest entry."""
     size = max(float(np.abs(values).max()) for values in balanced.values())
     off = np.abs(balanced["unbalanced"])
     k = int(np.argmax(off))
@@ -352,10 +366,10 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
 
 
 def balance(path: Any) -> dict[str, np.ndarray]:
-    """Return the parts of the energy balance, see `Path.work`.
+    """Return the entries of the energy balance (`Path.work`).
 
     Raises:
-        InputError: a melt of K-BKZ type, whose stored energy is no function of its state.
+        InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
     """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: what it stores is no function of its state")
