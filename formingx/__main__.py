@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from . import InputError, compare
-from .results.files import checkpoint, status
+from .results.files import checkpoint_data, status
 from .results.show import report
 from .units import NONE, Units
 
@@ -157,7 +157,7 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _open(options: argparse.Namespace) -> None:
-    about, states = checkpoint.contents(options.folder)
+    about, states = checkpoint_data.contents(options.folder)
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
     lines = [f"{part:{width}}  {line}" for part, line in record.summary.items()]
@@ -180,8 +180,9 @@ def _states(record: report.Record) -> list[str]:
 
 def _report(options: argparse.Namespace) -> None:
     out = options.out or Path(options.folder) / "report.html"
-    report.write(report.of_checkpoint(*checkpoint.contents(options.folder)), out, options.title, None, MPI.COMM_WORLD,
-                 _units(options.units), options.density, options.trim)
+    record = report.of_checkpoint(*checkpoint_data.contents(options.folder))
+    report.write(record, out, options.title, None, MPI.COMM_WORLD, _units(options.units), options.density,
+                 options.trim)
     _say(f"The report is in {out}")
 
 
@@ -199,7 +200,7 @@ def _status(options: argparse.Namespace) -> None:
 
 
 def _watch(options: argparse.Namespace) -> None:
-    if not checkpoint.begun(options.folder):
+    if not checkpoint_data.begun(options.folder):
         _say(f"waiting up to {options.patience:g} s for a run to write its first state to {options.folder}")
     for found in status.watch(options.folder, options.every, options.patience):
         _say(str(found))

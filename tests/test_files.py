@@ -26,7 +26,7 @@ import formingx as fx
 from formingx.__main__ import main
 from formingx.contact.tooling import Tooling
 from formingx.findings import Finding
-from formingx.results.files import checkpoint
+from formingx.results.files import checkpoint_data
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
@@ -627,7 +627,7 @@ def test_a_checkpoint_says_how_its_run_ended(tmp_path, capsys):
     assert main(["status", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
     assert "the target is met" in said and "could not go on" not in said and "warning: snap-through: it snapped" in said
-    record = report.of_checkpoint(*checkpoint.contents(tmp_path / "run"))
+    record = report.of_checkpoint(*checkpoint_data.contents(tmp_path / "run"))
     assert Finding("warning", "snap-through", "it snapped") in record.all_findings()
 
 

@@ -11,7 +11,7 @@ from formingx.checks.check import before_run
 from formingx.checks.towards import moulds
 from formingx.findings import SEVERITIES, Finding, register, worst_first
 from formingx.results.evaluate import volume
-from formingx.results.files import checkpoint, status
+from formingx.results.files import checkpoint_data, status
 
 ABOVE = fx.tools.plane(5.0)
 
@@ -120,7 +120,7 @@ def test_status_of_a_body_that_goes_on_while_its_pressure_falls(tmp_path):
         fx.trace(sheet(contacts=[]), until=fx.pressure(0.2), max_steps=14, progress=False, checkpoint=tmp_path / "run")
     (tmp_path / "run" / "end.json").unlink()
     found = status.of_folder(tmp_path / "run")
-    states = checkpoint.contents(tmp_path / "run")[1]
+    states = checkpoint_data.contents(tmp_path / "run")[1]
     falling = states[-1]["measures"]["pressure"] < max(state["measures"]["pressure"] for state in states)
     assert falling and found.moved[0] in ("enclosed_volume", "pole_height", "strain_energy")
     assert found.left is None and "the body goes on" in str(found)

@@ -15,7 +15,7 @@ from conftest import ROOT, run_script, treloar
 from test_contact import cup
 
 import formingx as fx
-from formingx.results.files import checkpoint
+from formingx.results.files import checkpoint, checkpoint_data
 
 SCENES = {"hinged": (treloar, fx.pole_stretch(3.0)), "stick": (lambda: cup("stick"), fx.pressure(8.0)),
           "coulomb": (lambda: cup(0.3), fx.pressure(8.0)),
@@ -359,7 +359,7 @@ def test_errors_come_on_all_ranks():
 
 def test_contents_need_no_scene(whole):
     folder, _, path = whole["hinged"]
-    about, states = checkpoint.contents(folder)
+    about, states = checkpoint_data.contents(folder)
     assert about["summary"]["material of sheet"] == "NeoHookean(c10=2.0)" and len(states) == len(path)
     assert states[-1]["measures"] == path.last.measures
     np.testing.assert_allclose(states[-1]["profile"]["top"], path.profile().top, atol=1e-12)
@@ -401,7 +401,7 @@ def test_ctrl_c_ends_in_one_line_and_the_run_goes_on(tmp_path):
 
 @pytest.mark.parametrize("damage", ["swapped", "superscript", "truncated", "deep", "step", "checksums"])
 def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
-    from formingx.results.files.checkpoint import contents
+    from formingx.results.files.checkpoint_data import contents
     scene, folder = treloar(), tmp_path / "run"
     fx.trace(scene, until=fx.pole_stretch(1.3), progress=False, checkpoint=folder)
     state = folder / "0001" / "state.json"

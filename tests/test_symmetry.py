@@ -9,7 +9,7 @@ import formingx as fx
 from formingx.extensions.space.sheet import Sheet
 from formingx.io.stl import volume
 from formingx.mesh.grid import Grid, gathered, to_mesh
-from formingx.results.files import checkpoint
+from formingx.results.files import checkpoint_data
 from formingx.results.show import record
 
 C10, UNITS = 0.4, fx.Units(length="mm", stress="MPa")
@@ -177,7 +177,7 @@ def test_tool_beside_a_plane_is_one_of_two():
 def test_report_of_a_checkpoint_knows_the_planes(tmp_path):
     path = fx.trace(block("half"), until=fx.travel(-0.4), progress=False)
     path.save(tmp_path / "run")
-    found = record.of_checkpoint(*checkpoint.contents(tmp_path / "run"))
+    found = record.of_checkpoint(*checkpoint_data.contents(tmp_path / "run"))
     assert found.planes.planes == path.scene.symmetry.planes and found.per_depth
     text = path.report(tmp_path / "bar.html", units=UNITS, density=1.0).read_text()
     assert "given for the whole part (a half was modelled), per mm of depth" in text and "N/mm" in text

@@ -1,4 +1,4 @@
-"""Plain data with arrays in it, as JSON beside one file of bytes, which is read at once."""
+"""Plain data that contains arrays: JSON, and one binary file for the arrays."""
 
 from typing import Any
 
@@ -8,9 +8,14 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 
 
 def pack(data: Any) -> tuple[Any, bytes]:
-    """Return the data as JSON can hold it, and all arrays in it one after the other, little-endian.
+    """Split plain data into JSON data and the bytes of its arrays.
 
-    An array stands there as {"array": [its first byte, its type, its shape]}.
+    Args:
+        data: numbers, strings, lists, dictionaries and arrays.
+
+    Returns:
+        The data with {"array": [first byte, type, shape]} in place of each array, and the bytes of all arrays in order,
+        little-endian.
     """
     found: list[bytes] = []
     at = 0
@@ -32,6 +37,10 @@ def pack(data: Any) -> tuple[Any, bytes]:
 
 def unpack(data: Any, content: bytes) -> Any:
     """Return the argument of `pack`; its arrays are read-only.
+
+    Args:
+        data: JSON data from `pack`.
+        content: bytes of the arrays.
 
     Raises:
         ValueError: the two do not belong together.

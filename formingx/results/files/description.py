@@ -1,4 +1,4 @@
-"""A scene as plain data: to tell whether two scenes are the same, and for people to read."""
+"""Description of a scene as plain data, to compare scenes and to be read by people."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,10 +16,11 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 
 
 def describe(problem: Any) -> dict[str, Any]:
-    """Describe a problem as plain data for JSON; the same on any number of ranks; collective.
+    """Return the description of a problem as plain data for JSON; collective.
 
-    "mesh": counts, and sums over its cells that change with any coordinate, order of the cells or tag; "unknowns":
-    their number; then every part of the scene by its public attributes.
+    The entry "mesh" holds counts, and sums over the cells that change with any coordinate, tag or order of the cells.
+    "unknowns" is their number. The other entries are the public attributes of the parts of the scene. The description
+    is the same on any number of ranks.
     """
     scene = problem.scene
     known = set(_PARTS) | {"mesh", "temperature", "preformed"}
@@ -41,7 +42,12 @@ def describe(problem: Any) -> dict[str, Any]:
 
 
 def plain(value: Any, depth: int = 8) -> Any:
-    """Numbers, words, lists and dictionaries in place of objects."""
+    """Return numbers, strings, lists and dictionaries in place of objects.
+
+    Args:
+        value: any object.
+        depth: levels of nested objects.
+    """
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic | np.ndarray):
@@ -59,7 +65,10 @@ def plain(value: Any, depth: int = 8) -> Any:
 
 
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """(place, value in a, value in b) wherever two plain values differ; None where there is none."""
+    """Yield (place, value in a, value in b) for each difference between two plain values.
+
+    A value that exists on one side only is None on the other.
+    """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
             yield from differences(a.get(key), b.get(key), f"{where}.{key}" if where else key)
@@ -74,7 +83,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """{name: sum over a layer that changes with the value at any of its points} of functions of a `Sample`."""
+    """Return {name: weighted sum over a layer} of functions of a `Sample`; it changes with the value at any point."""
     at = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(at.places)))).ravel()
@@ -83,6 +92,7 @@ def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
 
 
 def _mesh(problem: Any) -> dict[str, Any]:
+    """Return counts and sums of the mesh."""
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(own := own_cells(domain))
     x = of_cells(domain, own)[..., :COORDINATES] / problem.forms.length

@@ -1,20 +1,24 @@
-"""Fields of states on the whole body, for ParaView and other programs that read VTK's XML files.
+"""Fields of states on the whole body, as VTK's XML files for ParaView. Rank 0 writes.
 
-Every triangle gets six nodes of its own, so that nothing is smeared over an interface. The fields:
+Every triangle has six nodes of its own, so nothing is averaged over an interface. The fields:
 
     displacement            (u_r, u_z), in three dimensions (u_x, u_y, u_z), length
-    stretches               the larger and the smaller in the plane, and the hoop stretch (`Stress.principal_stretches`)
-    principal_stresses      of the Cauchy stress, from the largest to the smallest, stress
-    cauchy_rr, _zz, _rz, _hoop  its components; hydrostatic_pressure: minus a third of its trace, stress
-    stress_error            its estimated error, one value in each triangle (`StressError.mean`), stress
-    elastic_stretch_1, _2   of each relaxing branch: the larger root of the eigenvalues of F Cv^-1 F^T (F A F^T of a
-                            `TransientNetwork`), without change of volume: 1 when it has relaxed, the largest stretch
-                            when nothing has; linear in each triangle; nan in layers without such a branch
-    contact_pressure        normal traction per deformed area at the face, stress, of all tools; where there are any
-                            (the first two nodes from the axis share their areas: there it is less accurate)
-    thickness, thickness_ratio  of the sheet there, where the mesh has two faces that face each other
+    stretches               the larger and the smaller in the section, and the hoop stretch
+                            (`Stress.principal_stretches`)
+    principal_stresses      principal Cauchy stresses, from the largest to the smallest, stress
+    cauchy_rr, _zz, _rz, _hoop  components of the Cauchy stress, stress
+    hydrostatic_pressure    minus a third of its trace, stress
+    stress_error            its estimated error, constant in each triangle (`StressError.mean`), stress
+    elastic_stretch_1, _2   larger principal stretch of the elastic part of F in each relaxing branch (see below)
+    contact_pressure        normal traction per deformed area of all tools, stress; less accurate at the two nodes
+                            nearest the axis, which share their areas
+    thickness, thickness_ratio  thickness of a sheet at this place
 
-A membrane has displacement and thickness only. Rank 0 writes.
+The elastic stretch is the larger root of the eigenvalues of F Cv^-1 F^T in the section, for a `TransientNetwork` of F A
+F^T, without volume change. It is 1 if the branch has relaxed, and the largest stretch if it has not relaxed at all. It
+is linear in each triangle, and nan in layers without such a branch.
+
+A membrane has displacement and thickness only.
 """
 
 from functools import partial
@@ -36,7 +40,10 @@ _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1
 
 
 class Fields:
-    """Evaluates the fields of a path's states at the nodes of all cells.
+    """Computes fields of the states of a path at the nodes of all cells.
+
+    Args:
+        path: the path.
 
     Attributes:
         points: reference positions of the nodes of this rank's cells, shape (cells, nodes, components), length.
@@ -56,7 +63,11 @@ class Fields:
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
-        """{name: values, shape (cells, nodes, components)} of a state; collective."""
+        """Return the fields of a state; collective.
+
+        Returns:
+            {name: values, shape (cells, nodes, components)}.
+        """
         problem, forms, shape = self._problem, self._problem.forms, self.points.shape[:2]
         with problem.state_context(state):
             found = {"displacement": self._eval(self._u)}
@@ -93,13 +104,13 @@ class Fields:
         return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
 
     def _eval(self, expression: Any) -> np.ndarray:
+        """Return the values of a UFL expression at the nodes of this rank's cells."""
         if not len(self._cells):
             return np.zeros((0, len(_NODES[self.dimension]), self._components))
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
-        """Return the normal traction per deformed area at the faces that tools meet, zero elsewhere, shape (cells,
-        nodes)."""
+        """Return the contact pressure at the nodes of the cells, zero away from tools, shape (cells, nodes)."""
         from scipy.spatial import cKDTree
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
@@ -113,10 +124,15 @@ class Fields:
 
 
 def to_vtk(path: Any, file: Any, states: Any = None) -> None:
-    """Write a .pvd file and beside it a .vtu file for each state: elements with quadratic fields; rank 0 writes.
+    """Write fields of states as VTU files, and a PVD file that lists their times (`Path.to_vtk`).
+
+    Args:
+        path: the path.
+        file: its name ends in .pvd.
+        states: a state, several in order, or "all"; default the last.
 
     Raises:
-        InputError: the name does not end in .pvd, or a state is not of the path.
+        InputError: the name has another ending, or a state is not of the path.
         OSError: a file cannot be written.
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
@@ -141,7 +157,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
-    """Return the content of a .vtu file with quadratic cells, from arrays of shape (cells, nodes, components)."""
+    """Return a VTU file as text: points and {name: values}, shape (cells, nodes, components)."""
     import pyvista
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
     cells, nodes = points.shape[:2]
@@ -158,13 +174,17 @@ def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
 
 
 def _three(array: np.ndarray) -> np.ndarray:
-    """Return vectors as rows of three components: a section lies in the plane z = 0 of ParaView."""
+    """Return vectors of three components, with zeros in place of the missing ones."""
     rows = array.reshape(-1, array.shape[-1])
     return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1])))
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
-    """Return [(number, state)]; a state that is not on the path (of `Path.at`) gets the next number."""
+    """Return [(number, state)] for the argument `states`; a state of `Path.at` gets the number after the last.
+
+    Raises:
+        InputError: a state is not of the path, or none is given.
+    """
     if isinstance(states, str):
         if states != "all":
             raise InputError(f"states = {states!r}: must be states of the path, or 'all'")
@@ -180,12 +200,16 @@ def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
 
 
 def _gather(values: np.ndarray, comm: Any) -> Any:
+    """Return values of all ranks on rank 0."""
     parts = comm.gather(values, root=0)
     return np.concatenate(parts) if parts else None
 
 
 def _across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Between which lines from bottom to top, k and k + 1, points (m, 2) are, and how far, 0 to 1: shape (m,) each."""
+    """Return for points (m, 2) the number k of the strip between lines k and k + 1, and the position in it, 0 to 1.
+
+    The lines lead from the bottom to the top of a sheet. Both results have shape (m,).
+    """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     along = top - bottom
     for i, x in enumerate(points):

@@ -1,4 +1,4 @@
-"""Progress bar for long work after a run: a report, a checkpoint that is written or read."""
+"""Progress bar for long tasks after a run: a report, or a checkpoint that is written or read."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -7,7 +7,15 @@ from typing import Any
 
 @contextlib.contextmanager
 def progress(comm: Any, words: str) -> Iterator[Callable[[float], None]]:
-    """On rank 0, after two seconds: call what it gives with the part that is done, from 0 to 1."""
+    """Show a progress bar on rank 0, if the block takes longer than two seconds.
+
+    Args:
+        comm: MPI communicator.
+        words: text before the bar.
+
+    Yields:
+        Function to be called with the finished fraction, 0 to 1.
+    """
     from tqdm import tqdm
     with tqdm(total=1.0, desc=words, delay=2, disable=comm.rank != 0, leave=False,
               bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}") as bar:

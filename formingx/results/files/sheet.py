@@ -1,4 +1,4 @@
-"""Columns of numbers as files that other programs open: CSV, and Excel."""
+"""Tables that are written as CSV or Excel files."""
 
 import math
 from typing import Any
@@ -14,7 +14,11 @@ _LONGEST = 32_767     # characters of a cell in Excel
 
 
 class Sheet:
-    """A table with named columns, one row to a place; `comm`: its rank 0 writes. Prints its first and last rows."""
+    """Base class of tables with named columns; it prints its first and last rows.
+
+    Attributes:
+        comm: MPI communicator; its rank 0 writes.
+    """
 
     comm: Any
 
@@ -24,19 +28,28 @@ class Sheet:
         raise NotImplementedError
 
     def to_csv(self, file: Any, units: Units = NONE) -> None:
-        """Write a CSV file, its name ending in .csv; `units` go into the header, as in "wall [mm]".
+        """Write the table as a CSV file.
+
+        Args:
+            file: its name ends in .csv.
+            units: units for the header, as in "wall [mm]".
 
         Raises:
-            InputError: the name ends otherwise. OSError: it cannot be written.
+            InputError: the name has another ending.
+            OSError: the file cannot be written.
         """
         tabular.write_rows(file, self._header(units), self._rows(), self.comm)
 
     def to_excel(self, file: Any, units: Units = NONE) -> None:
-        """Write an Excel file, its name ending in .xlsx.
+        """Write the table as an Excel file.
+
+        Args:
+            file: its name ends in .xlsx.
+            units: units for the header.
 
         Raises:
-            InputError: the name ends otherwise, openpyxl is not installed, or a text is none that Excel takes.
-            OSError: it cannot be written.
+            InputError: the name has another ending, openpyxl is not installed, or Excel does not accept a text.
+            OSError: the file cannot be written.
         """
         file = tabular.named("to_excel", file, ".xlsx")
         try:
@@ -68,14 +81,16 @@ class Sheet:
         return str(self)
 
     def _header(self, units: Units) -> list[str]:
+        """Return the names of the columns with their units."""
         return [units.heading(name) for name in self.columns]
 
     def _rows(self) -> list[tuple]:
+        """Return the rows of the table."""
         return list(zip(*self.columns.values(), strict=True))
 
 
 def _words(column: Any) -> list[str]:
-    """Numbers to the fifth digit of the largest in the column; words as they are."""
+    """Return a column as text: numbers to the fifth digit of the largest."""
     values = np.asarray(column)
     if values.dtype.kind != "f":
         return [str(v) for v in values]

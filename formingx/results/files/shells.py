@@ -1,4 +1,4 @@
-"""The part as shell elements with the wall as their thickness: an input file for CalculiX (and Abaqus).
+"""Part as shell elements with the wall as thickness: an input file for CalculiX and Abaqus.
 
 G. Dhondt, CalculiX CrunchiX User's Manual: S8R and S6 elements, *SHELL SECTION with *NODAL THICKNESS.
 """
@@ -12,10 +12,18 @@ from . import tabular
 
 
 def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(points, shape (n, 3), walls, (n,), elements S6, (m, 6), and S8R, (k, 8), numbers from 0) of a body turned round.
+    """Return quadratic shell elements on the middle surface of a body of revolution.
 
-    The middle surface: its nodes are half way between each node of the bottom face and the top one, and as many
-    elements as there are edges of faces go along it, `parts` round the axis.
+    The nodes lie half-way between opposite nodes of the two faces. Along the section there is one element per edge of a
+    face.
+
+    Args:
+        profile: the `Profile` of the section.
+        parts: number of elements round the axis.
+
+    Returns:
+        Nodes, shape (n, 3), length; walls, shape (n,), length; node numbers from 0 of the S6 elements, shape (m, 6),
+        and of the S8R elements, shape (k, 8).
     """
     wall = (distance_to_line(profile.bottom, fine(profile.top))
             + distance_to_line(profile.top, fine(profile.bottom))) / 2
@@ -40,7 +48,14 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
-    """Write the nodes, elements and walls, a set for each end, its name ending in .inp (rank 0 writes)."""
+    """Write nodes, elements, walls, and the set of nodes at the rim (rank 0 writes).
+
+    Args:
+        profile: the `Profile` of the section.
+        parts: number of elements round the axis.
+        file: its name ends in .inp.
+        comm: MPI communicator.
+    """
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)
     lines = ["*HEADING", "formingx: middle surface of a formed part, turned about z; its walls as thickness",

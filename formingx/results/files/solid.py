@@ -1,4 +1,4 @@
-"""The part as a solid of triangles: STL, for CAD and 3-D printing, and binary glTF, coloured, for viewers and pages.
+"""Part as a solid of triangles: STL for CAD and 3-D printing, coloured binary glTF for viewers and web pages.
 
 STL: 3D Systems (1988), binary. glTF 2.0: Khronos, ISO/IEC 12113:2022, binary (GLB), in metres.
 """
@@ -17,9 +17,15 @@ _PARTS = 4          # straight pieces for an element's edge
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
-    """(points, shape (n, 3), triangles, shape (m, 3), seen from outside counter-clockwise) of a sheet.
+    """Return the closed surface of a sheet, revolved about the axis or, in plane strain, extruded by its width.
 
-    It is turned about the axis in this number of `parts`, or, in plane strain, extruded as far as it is wide.
+    Args:
+        profile: the `Profile` of the section.
+        axisymmetric: False in plane strain.
+        parts: number of strips round the axis.
+
+    Returns:
+        Points, shape (n, 3), length, and triangles, shape (m, 3), counter-clockwise seen from outside.
     """
     line = np.vstack([fine(profile.bottom, _PARTS), fine(profile.top, _PARTS)[::-1]])      # its edges are curved
     n = len(line)
@@ -47,7 +53,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
 
 
 def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`solid`, and the wall ratio at its points, shape (n,)."""
+    """Return points and triangles as `solid`, and wall over original thickness at the points, shape (n,)."""
     points, triangles = solid(profile, axisymmetric)
     n = len(profile.bottom)
     ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
@@ -56,15 +62,25 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
 
 
 def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
-    """Write what `coloured` gives as a binary STL file, its name ending in .stl (rank 0 writes)."""
+    """Write a surface from `coloured` as a binary STL file (rank 0 writes).
+
+    Args:
+        surface: points, triangles and wall ratios.
+        file: its name ends in .stl.
+        comm: MPI communicator.
+    """
     file = tabular.named("to_stl", file, ".stl")
     tabular.on_root(comm, lambda: write_stl(*surface[:2], file))
 
 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
-    """Write what `coloured` gives as a binary glTF file (.glb), coloured by the wall ratio (rank 0 writes).
+    """Write a surface from `coloured` as a binary glTF file, coloured by the wall ratio (rank 0 writes).
 
-    units: of the script; a length that is not said is taken for m.
+    Args:
+        surface: points, triangles and wall ratios.
+        file: its name ends in .glb.
+        comm: MPI communicator.
+        units: units of the script; a length without a unit counts as metre.
     """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")
@@ -98,7 +114,7 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
 
 
 def _ends(number: np.ndarray) -> list[np.ndarray]:
-    """Triangles of the two cut faces of an extruded sheet, across from face to face."""
+    """Return the triangles of the two cut faces of an extruded sheet."""
     found = []
     for row, sense in ((number[0], 1), (number[1], -1)):
         half = len(row) // 2

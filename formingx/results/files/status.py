@@ -1,4 +1,4 @@
-"""Status of a run that writes a checkpoint: read from its last states, while it runs."""
+"""Status of a run, read from the last states of its checkpoint while it runs."""
 
 import time
 from collections.abc import Container, Iterator
@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import non_negative, positive
 from ...findings import Finding, alarming
-from . import checkpoint
+from . import checkpoint_data
 
 _RECENT = 20
 """Number of the last steps from which the pace is taken."""
@@ -22,20 +22,23 @@ _MET = 1e-9
 
 @dataclass(frozen=True)
 class Status:
-    """The last complete step of a run.
+    """Progress of a run at its last completed step.
 
     Attributes:
-        states: in the checkpoint. stage: its name, or "". `verdict`: see `State`.
-        target: (measure, the value that ends the stage, its value now), or None.
-        spent, left: seconds that the run has worked, and about how many it takes to the end of the stage at the pace of
-            its last steps; None: it came no nearer in them.
-        limits: {reason for shorter steps: count}, in the whole run.
-        age: seconds since the last state was written.
-        ended: {"failure": what ended it, or "", "findings": [Finding]} of a run that has ended; None: it goes on, or
-            was killed.
-        begun: the stage has no step yet.
-        moved: the quantity that changed most over the last steps, with its values before and after them, or None: a
-            body may go on while the pressure falls past a maximum.
+        states: number of states in the checkpoint.
+        stage: name of the stage, or "".
+        verdict: reason why the last state is inadmissible, or "" (`State.verdict`).
+        target: (quantity, its value at the end of the stage, its value now), or None.
+        spent: computing time so far, s.
+        left: estimated time to the end of the stage at the pace of the last steps, s. None if they came no nearer to
+            the target.
+        limits: {reason for shorter steps: count}, over the whole run.
+        age: time since the last state was written, s.
+        ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or was
+            killed.
+        begun: True if the stage has no completed step yet.
+        moved: (quantity, value before, value after) for the quantity that changed most over the last steps, or None. It
+            shows progress while the target does not come nearer, such as the pole height after a pressure maximum.
     """
 
     states: int
@@ -52,7 +55,7 @@ class Status:
 
     @property
     def findings(self) -> list[Finding]:
-        """Findings that are more than notes: on the last state, and on the run when it has ended."""
+        """Warnings and serious findings on the last state and, after the end, on the run."""
         ended = [] if self.ended is None else alarming(self.ended["findings"])
         state = [Finding("serious", "state", self.verdict)] if self.verdict else []
         return state + [finding for finding in ended if not (state and finding.about == "state")]
@@ -77,7 +80,7 @@ class Status:
         return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
 
     def _without_pace(self) -> str:
-        """Return the reason for which the remaining time is not known."""
+        """Return the reason why the remaining time is unknown."""
         if self.target is None:
             return "the time left is not known, as no column holds what the stage aims at"
         if self.begun:
@@ -95,8 +98,8 @@ def of_folder(folder: Any) -> Status:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    n, states, age = checkpoint.latest(folder, _RECENT)
-    last, ended = states[-1], checkpoint.ended(folder)
+    n, states, age = checkpoint_data.latest(folder, _RECENT)
+    last, ended = states[-1], checkpoint_data.ended(folder)
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
     kept: dict[str, Any] = done[-1]["stepping"] if done else {}
     counts = kept.get("counts", {})
@@ -117,7 +120,17 @@ def of_folder(folder: Any) -> Status:
 
 
 def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
-    """Return (column, value) of the target that a step aims at: of a pressure, the column of the controlled load."""
+    """Return the target of a step, as a column and its value.
+
+    The target of a pressure refers to the column of the controlled load.
+
+    Args:
+        stepping: data of the step control, from a checkpoint.
+        measures: names of the columns.
+
+    Returns:
+        (column, value), or None without a target.
+    """
     if "until" not in stepping:
         return None
     name, goal = stepping["until"]
@@ -126,28 +139,29 @@ def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, floa
 
 
 def _words(seconds: float) -> str:
-    """Return a duration with two digits."""
+    """Return a duration in a suitable unit with two digits."""
     size, unit = next(((s, u) for s, u in ((86400, "days"), (3600, "h"), (60, "min")) if seconds >= 2 * s), (1, "s"))
     return f"{seconds / size:.2g} {unit}"
 
 
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
-    """Yield the status now, and whenever there are new states, until the run ends or has had none for `patience`
-    seconds.
+    """Yield the status now and after each new state, until the run ends.
 
-    A folder that is not there yet, or empty, or holds no state, is waited for as long: see `checkpoint.begun`.
+    A folder that does not exist yet, is empty, or holds no state is waited for (`checkpoint_data.begun`).
 
     Args:
-        every: seconds between two looks.
+        folder: the checkpoint.
+        every: time between two readings, s.
+        patience: time without a new state after which to stop, s.
 
     Raises:
-        InputError: it holds something else, is damaged, or holds no state by then.
+        InputError: the folder holds other files, is damaged, or holds no state in time.
     """
     every, patience = positive("watch: every", every), non_negative("watch: patience", patience)
     seen, since = -1, time.monotonic()
     while True:
         waited = time.monotonic() - since >= patience
-        found = of_folder(folder) if checkpoint.begun(folder) or waited else None
+        found = of_folder(folder) if checkpoint_data.begun(folder) or waited else None
         if found is not None and (found.states != seen or found.ended is not None):
             yield found
             seen, since, waited = found.states, time.monotonic(), patience == 0

@@ -1,4 +1,4 @@
-"""Files that people open: CSV of a path and of a profile, JSON summaries. Rank 0 writes, whole files or none."""
+"""Tables of paths and profiles as CSV, summaries as JSON. Rank 0 writes; a file is written whole or not at all."""
 
 import csv
 import json
@@ -16,7 +16,10 @@ from ...units import NONE, Units
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
     """Write one row per state: stage (of a process), kind, iterations, then every column of the path.
 
-    units: of the header; in plane strain per unit depth.
+    Args:
+        path: the path.
+        file: its name ends in .csv.
+        units: units for the header; in plane strain per unit depth.
     """
     units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
@@ -36,7 +39,17 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """Write a CSV file with a header and all digits; raise an InputError unless its name ends in .csv."""
+    """Write a CSV file with a header and all digits.
+
+    Args:
+        file: its name ends in .csv.
+        header: names of the columns.
+        rows: rows of the table.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: the name has another ending.
+    """
     file = named("to_csv", file, ".csv")
 
     def write(stream):
@@ -50,13 +63,13 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
-    """Write a JSON file of key numbers; NaN is refused."""
+    """Write key numbers as a JSON file; NaN raises a ValueError."""
     text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
     on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
 
 
 def versions() -> dict[str, str]:
-    """Versions of the programs that a result depends on."""
+    """Return {program: version} of the programs that a result depends on."""
     import dolfinx
     import petsc4py
     from petsc4py import PETSc
@@ -65,7 +78,10 @@ def versions() -> dict[str, str]:
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
-    """Return the result of an action that rank 0 alone takes, on all ranks; its exceptions, too. Collective."""
+    """Return the result of a function that rank 0 alone calls, on all ranks; collective.
+
+    An exception of the function is raised on all ranks.
+    """
     result, error = None, None
     if comm.rank == 0:
         try:
@@ -80,7 +96,16 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
 
 
 def named(caller: str, file: Any, *endings: str) -> Any:
-    """Return a file's name as a path, or an InputError unless it ends in one of these."""
+    """Return the name of a file as a path.
+
+    Args:
+        caller: name of the calling method, for the message.
+        file: the name.
+        endings: allowed endings.
+
+    Raises:
+        InputError: the name has another ending.
+    """
     file = place(f"{caller}: file", file)
     if file.suffix.lower() not in endings:
         other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())

@@ -1,1 +1,1 @@
-"""Pictures, moving pictures and reports."""
+"""Pictures, animations and reports."""

@@ -1,7 +1,7 @@
-"""The forming as a moving picture: section and loading curve, frame by frame, evenly spread over the process.
+"""Animation of the forming: the section and the loading curve, in frames evenly spaced over the process.
 
-The curve is the loading curve of the stage's control: a plug's force against its travel, a pressure against the
-pole's height.
+The loading curve belongs to the control of the stage: the force of a plug over its travel, or a pressure over the pole
+height.
 """
 
 import shutil
@@ -20,7 +20,19 @@ from .record import progress
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:
-    """See `Path.animate`."""
+    """Draw the animation of a path (`Path.animate`).
+
+    Args:
+        path: the path.
+        file: its name ends in .gif or .mp4.
+        frames: number of frames.
+        seconds: duration, s.
+        units: units for the labels.
+
+    Raises:
+        InputError: the name has another ending, ffmpeg is missing for an MP4, a number is not allowed, or the path has
+            one state only.
+    """
     file = files.named("animate", file, ".gif", ".mp4")
     if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(f"animate: file {str(file)!r}: an MP4 needs the program ffmpeg, which is not there; a .gif"
@@ -46,7 +58,11 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """(state, next state, fraction between them) of frames evenly spread over the progress of the process."""
+    """Return frames evenly spaced over the progress of the process.
+
+    Returns:
+        For each frame a state, the next state, and the position between them, 0 to 1.
+    """
     profiles = [path.profile(state) for state in path.states]
     at = progress({c: path[c] for c in path.columns}, profiles)
     found = []
@@ -57,7 +73,13 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
-    """{stage: (x, y) of its curve}: a fixed item is not used; while nothing is driven, a force over time."""
+    """Return the columns (x, y) of the loading curve of each stage.
+
+    Fixed loads are left out. A stage without a control shows a force over time.
+
+    Returns:
+        {stage: (x, y)}.
+    """
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
         values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}
@@ -115,7 +137,7 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float], unit
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write the frames; the last one stands for a second more."""
+    """Write the frames as a GIF; the last one is shown for one second more."""
     from PIL import Image
     pictures = [picture.quantize(256, dither=Image.Dither.NONE) for picture in pictures]
     each = max(int(1000 * seconds / len(pictures)), 20)
@@ -124,7 +146,11 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
 
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write H.264, which every player reads; the last frame stands for a second more."""
+    """Write the frames as H.264, which every player reads; the last one is shown for one second more.
+
+    Raises:
+        OSError: ffmpeg failed.
+    """
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds
     stream.close()                                           # ffmpeg writes the file by its name

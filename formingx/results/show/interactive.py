@@ -1,4 +1,4 @@
-"""The drawings of a report as data for plotly.js: sections, surfaces and curves; `report.js` puts them on the page."""
+"""Data of a report's drawings for plotly.js: sections, surfaces and curves. The script `report.js` draws them."""
 
 import base64
 import functools
@@ -20,7 +20,7 @@ STATIONS = 101
 
 @functools.cache
 def library() -> str:
-    """plotly.js, packed.
+    """Return the compressed source of plotly.js.
 
     Raises:
         InputError: plotly is not installed.
@@ -34,12 +34,19 @@ def library() -> str:
 
 
 def packed(text: str) -> str:
-    """Return a text, compressed, in letters that a page can hold."""
+    """Return a text in compressed form, encoded in characters that an HTML page can hold."""
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
 def data(records: list[Record], names: list[str], units: Units, more: dict[str, Any] | None = None) -> str:
-    """Everything that `report.js` draws, as JSON; more: added to each run, such as the "mesh" of a sheet."""
+    """Return all data that `report.js` draws, as JSON.
+
+    Args:
+        records: the runs.
+        names: names of the runs.
+        units: units for the labels.
+        more: further data of each run, such as the "mesh" of a sheet.
+    """
     runs = [_run(record, name, units) | (more or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]
@@ -48,7 +55,7 @@ def data(records: list[Record], names: list[str], units: Units, more: dict[str, 
 
 
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
-    """One run: the section and its colours, frame by frame."""
+    """Return the data of one run: its section and the colours, frame by frame."""
     ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
     at, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(at[a]), "to": float(at[b - 1])}
@@ -65,6 +72,7 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
 
 
 def _sheet(record: Record, units: Units) -> dict[str, Any]:
+    """Return the profiles and fields of a sheet, frame by frame."""
     n = len(record.profiles[-1].bottom)
     some = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
@@ -88,7 +96,9 @@ def _label(record: Record, units: Units, key: str) -> str:
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
-    """Outlines of the tools of a section, with a shell on their solid side; how far each has come in every state."""
+    """Return the outlines of the tools of a section, with a shell on their solid side, and their travel in every
+    frame.
+    """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []
@@ -105,7 +115,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """Return the loading of each stage: a tool's own force against its travel, a pressure against the pole's height."""
+    """Return the loading curves of each stage: force of a tool over its travel, or pressure over the pole height."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
@@ -120,7 +130,7 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """(x, y, their values) of the control of a stage."""
+    """Return (name of x, name of y, x, y) of the loading curves of a stage."""
     found, measures = [], record.measures
     for column, values in measures.items():
         if np.ptp(values[stage]) <= 1e-9 * (np.ptp(values) or 1.0):
@@ -141,7 +151,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
 
 
 def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return the controlled quantity, the forces of all tools and the temperature of the body over process time."""
+    """Return curves of the control, the tool forces and the temperature of the body over the process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
@@ -165,16 +175,15 @@ def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
-    """Return a curve; the states on it as dots, where they are not too many."""
+    """Return a curve, with dots at the states unless there are too many."""
     return {"x": rounded(x), "y": rounded(y), "name": name, "marker": {"size": 4},
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
 
 def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
-    """Return the gap left in every corner of the tools that stay, over process time where it runs, else against the
-    pressure.
+    """Return curves of the remaining gap in every corner of the fixed tools.
 
-    Without time, in the last stage.
+    They run over the process time, or, without it, over the pressure in the last stage.
     """
     traces, timed = [], any(record.timed for record in records)
     for record, name in zip(records, names):
@@ -190,7 +199,7 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return the wall at the end against height and against arc length, in all and of each layer."""
+    """Return curves of the final wall over height and over arc length, in total and of each layer."""
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
     for record, name in zip(records, names):
@@ -210,6 +219,7 @@ def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[s
 
 
 def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> dict[str, Any] | None:
+    """Return a chart of curves, or None without curves."""
     if not traces:
         return None
     return {"title": title, "x": x, "y": y, "zero": zero,
@@ -217,7 +227,12 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
 
 
 def rounded(values: Any, each: bool = False) -> list:
-    """Return numbers as lists; each: with `DIGITS` digits each, else with the digits of the largest."""
+    """Return numbers as lists with few digits.
+
+    Args:
+        values: an array.
+        each: True for `DIGITS` digits of each number, False for the digits of the largest.
+    """
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)
     unit = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - DIGITS)

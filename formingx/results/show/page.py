@@ -1,4 +1,4 @@
-"""Pieces of an HTML page."""
+"""Elements of an HTML page."""
 
 import base64
 import html
@@ -8,7 +8,13 @@ from typing import Any
 
 
 def page(title: str, body: list[str], tail: str = "") -> str:
-    """Return a whole page: its heading is in the body; tail: text after it, such as scripts."""
+    """Return a whole HTML page.
+
+    Args:
+        title: title of the window; the heading is part of the body.
+        body: elements of the page.
+        tail: text behind the body, such as scripts.
+    """
     style = resources.files(__package__).joinpath("report.css").read_text()
     return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><style>{style}</style></head>\n<body>"
@@ -16,8 +22,12 @@ def page(title: str, body: list[str], tail: str = "") -> str:
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """Return a table; columns of numbers stand to the right; with a head of empty words: two columns of words,
-    without it."""
+    """Return an HTML table; columns of numbers are aligned right.
+
+    Args:
+        head: names of the columns. Two empty names give a table of names and values without a head.
+        rows: the cells.
+    """
     numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
 
     def line(tag, row):
@@ -37,26 +47,38 @@ def _is_number(text: str) -> bool:
 
 
 def details(title: str, content: str) -> str:
-    """Return a section that is folded until it is opened."""
+    """Return a section that is closed until the reader opens it."""
     return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
 
 
 def figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    """Return a matplotlib figure with a caption; kind "small": not over the whole width."""
+    """Return a matplotlib figure with a caption.
+
+    Args:
+        figure: the figure.
+        caption: text below it.
+        kind: "wide", or "small" for less than the full width.
+    """
     stream = io.BytesIO()
     figure.savefig(stream, dpi=140)
     return picture(stream.getvalue(), caption, kind)
 
 
 def picture(png: bytes, caption: str, kind: str) -> str:
-    """Return a PNG with a caption."""
+    """Return a PNG picture with a caption.
+
+    Args:
+        png: content of the file.
+        caption: text below it.
+        kind: "wide", or "small" for less than the full width.
+    """
     text = html.escape(caption, quote=True)
     return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
             f"<figcaption>{text}</figcaption></figure>")
 
 
 def lines(text: str) -> str:
-    """Text with its line breaks."""
+    """Return a text whose line breaks HTML keeps."""
     return html.escape(text).replace("\n", "<br>")
 
 

@@ -1,4 +1,4 @@
-"""A picture or a film that was written to a file, which shows itself at the end of a notebook's cell."""
+"""Picture or animation in a file, which a notebook shows."""
 
 import base64
 import os
@@ -7,10 +7,10 @@ from typing import Any
 
 
 class Picture(os.PathLike):
-    """A picture (.png, .gif) or a film (.mp4) that was written; a notebook shows it as it is at that moment.
+    """Picture (.png, .gif) or film (.mp4) in a file; a notebook shows its present content.
 
     Attributes:
-        file: where it is (`pathlib.Path`).
+        file: path of the file (`pathlib.Path`).
     """
 
     def __init__(self, file: Any):

@@ -1,4 +1,4 @@
-"""Curves with matplotlib, drawn without a screen."""
+"""Curves drawn with matplotlib, without a screen."""
 
 from typing import Any
 
@@ -6,9 +6,12 @@ from ...figures import figure
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
-    """Column y over column x of a path: the states as dots, the path as a line, limit points ringed, jumps as diamonds.
+    """Draw column y over column x of a path.
 
-    Returns the axes; `axes.figure.savefig` saves.
+    States are dots on the line of the path. Limit points are circled, states after jumps are diamonds.
+
+    Returns:
+        The matplotlib axes; `axes.figure.savefig` saves them.
     """
     axes = axes if axes is not None else figure()[1]
     drawn, = axes.plot(*path.curve(x, y), **style)
@@ -22,7 +25,11 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 
 
 def convergence(path: Any, axes: Any = None) -> Any:
-    """Correction (3.5.1) against iteration, one line per state (as thesis figures 3.2 and 5.7); returns the axes."""
+    """Draw the correction (Song 1993, eq. 3.5.1) over the iterations, one line per state (as in figures 3.2 and 5.7).
+
+    Returns:
+        The matplotlib axes.
+    """
     axes = axes if axes is not None else figure()[1]
     lines = [[i.correction for i in state.history if i.correction > 0] for state in path.states]
     number = [k for line in lines for k in (*range(1, len(line) + 1), None)]
@@ -34,8 +41,13 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
 
 def main_columns(columns: list[str]) -> tuple[str, str]:
-    """(x, y) of the loading curve: the controlled quantity over how far the body has gone, or its force over the
-    travel."""
+    """Return the columns (x, y) of the main loading curve.
+
+    They are the force of a tool over its travel, or the controlled pressure over the pole height.
+
+    Args:
+        columns: names of all columns.
+    """
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
         own = travel.replace("travel", "force")
@@ -46,8 +58,14 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
-    """Draw the deformed sheet as strips between its two faces; scale: factors of (r, z), colours: of the n nodes,
-    (n, 4)."""
+    """Draw the deformed sheet as strips between its two faces.
+
+    Args:
+        axes: matplotlib axes.
+        profile: the `Profile`.
+        scale: factors of r and z.
+        colours: RGBA at the n nodes, shape (n, 4).
+    """
     import numpy as np
     from matplotlib.collections import PolyCollection
     bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
@@ -57,7 +75,12 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
-    """Corners (r, z), low and high, of a box around sheets (and their mirror images at r = 0), with some room."""
+    """Return two corners (r, z), low and high, of a box around sheets, with a margin.
+
+    Args:
+        profiles: profiles of the sheets.
+        mirrored: True to include their mirror images at r = 0.
+    """
     import numpy as np
     points = np.vstack([side for profile in profiles for side in (profile.bottom, profile.top)])
     low, high = points.min(0), points.max(0)
@@ -68,7 +91,14 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """Draw the deformed sheet filled between its faces, r to the right, lengths times `scale`."""
+    """Draw the deformed sheet filled between its faces.
+
+    Args:
+        profile: the `Profile`.
+        axes: matplotlib axes; r points to the right.
+        scale: factor of all lengths.
+        style: keyword arguments of matplotlib's `fill`.
+    """
     import numpy as np
     points = scale * np.vstack([profile.bottom, profile.top[::-1]])
     axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})

@@ -1,4 +1,4 @@
-"""A run as plain data, made from a path or from a checkpoint alone, for reports and pictures."""
+"""Run as plain data, from a path or from a checkpoint alone, for reports and pictures."""
 
 import sys
 from collections.abc import Sequence
@@ -32,25 +32,36 @@ FRAMES = 100
 
 @dataclass
 class Record:
-    """A run as plain data.
+    """Run with n states as plain data.
 
     Attributes:
-        summary: {part of the scene: one line}; versions: {program: version}; axisymmetric: else plane strain, or in
-            three dimensions.
-        kinds: of the states; stages: their names, "" in a run without; measures: {column: shape (n,)}.
-        histories: of the n states, rows (residual, correction, work) of Newton's iterations.
-        profiles: of the n states, each a `Profile`, or None: of no sheet, or of a state that is not drawn (`frames`).
-        counts: cost of the run; until: its target (quantity, value), or None.
-        tooling: the `Tooling` of the scene; travels: of the n states, `Tooling.travels`.
-        forces: {tool: the force that it takes, shape (n,)}, positive when it resists its travel; of a tool that stays,
-            along Z.
-        fields: of the n states, {name: values at the nodes of the bottom face, or of both faces, shape (m,)}; more than
-            the profiles say; of those that are drawn. (A checkpoint knows the temperature alone.)
-        heat: {tool: (conductance, its temperature as text)} where tools take heat; unit: of temperatures, or "".
-        layers: of the last state, as in `Wall`; script: the file that ran; or "".
-        findings: `Path.findings`; of a checkpoint those with which the run ended, as is failure: what ended it, or "".
-        `verdicts`: `State.verdict` of the n states.
-        planes: symmetry planes that cut the body; drawn: approximate number of drawn states.
+        summary: {part of the scene: one line of text}.
+        versions: {program: version}.
+        axisymmetric: False in plane strain and in three dimensions.
+        kinds: kinds of the states.
+        stages: stages of the states, "" in a run without stages.
+        measures: {column: values, shape (n,)}.
+        histories: for each state, rows (residual, correction, work) of the Newton iterations.
+        profiles: for each state a `Profile`; None without a sheet, or if the state is not drawn (`frames`).
+        counts: cost of the run.
+        until: target of the run (quantity, value), or None.
+        tooling: the `Tooling` of the scene.
+        travels: for each state the travels of the tools (`Tooling.travels`), length.
+        forces: {tool: force of the body on it, shape (n,)}, positive if it resists the travel. The force on a fixed
+            tool is
+            its Z component.
+        fields: for each drawn state {name: values at the nodes of the profile, shape (m,)}. A record from a checkpoint
+            has the temperature only.
+        layers: layers of the wall in the last state, as in `Wall`.
+        script: file of the script, or "".
+        findings: findings of the run (`Path.findings`), from a checkpoint those at its end.
+        failure: error message that ended the run, or "".
+        verdicts: reason why each state is inadmissible, or "" (`State.verdict`).
+        heat: {tool: (conductance, its temperature as text)} for tools that conduct heat.
+        unit: unit of temperatures, or "".
+        space: True for a sheet in three dimensions.
+        planes: symmetry planes that cut the body.
+        drawn: approximate number of drawn states.
     """
 
     summary: dict[str, str]
@@ -85,22 +96,22 @@ class Record:
 
     @property
     def control(self) -> str:
-        """The column of the controlled quantity."""
+        """Column of the controlled quantity."""
         return next(iter(self.measures))
 
     @property
     def progress(self) -> np.ndarray:
-        """Progress of the process in each state, see `progress`, shape (n,)."""
+        """Progress of the process in each state (function `progress`), shape (n,)."""
         return progress(self.measures, self.profiles)
 
     @property
     def timed(self) -> bool:
-        """True if process time runs."""
+        """True if the process time advances."""
         return bool(np.ptp(self.measures.get("process_time", 0.0)) > 0)
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the states that are drawn, see `frames`."""
+        """Numbers of the drawn states (function `frames`)."""
         return frames(self.progress, self.kinds, self.stages, self.drawn)
 
     @property
@@ -109,7 +120,7 @@ class Record:
         return [k for k in self.frames if self.profiles[k] is not None]
 
     def all_findings(self) -> list[Finding]:
-        """Return the findings on the numbers of the run, worst first."""
+        """Return the findings of the run and on its numbers, the worst first."""
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
@@ -139,11 +150,18 @@ class Record:
 
     @property
     def limits(self) -> dict[str, int]:
-        """{reason for shorter steps: count}, the most frequent first; empty where it is not known."""
+        """{reason for shorter steps: count}, the most frequent first; empty if unknown."""
         return dict(sorted(self.counts.get("limits", {}).items(), key=lambda entry: -entry[1]))
 
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
-        """{"tool, corner": gap left in that corner of a tool that stays} in each of some states with profiles."""
+        """Return the remaining gaps in the corners of fixed tools.
+
+        Args:
+            states: numbers of states with profiles.
+
+        Returns:
+            {"tool, corner": gaps, shape (len(states),), length}.
+        """
         found = {}
         for contact in self.tooling.contacts if states else ():
             if contact.direction is not None or contact.on not in ("top", "bottom", "inner", "outer"):
@@ -156,12 +174,13 @@ class Record:
         return found
 
     def _from(self, where: np.ndarray) -> str:
-        """Return the first state at which a condition holds, as text."""
+        """Return the first state that satisfies a condition, as text; where: shape (n,)."""
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
 
     def _of_volume(self) -> list[Finding]:
+        """Return the findings on the volume error of the states."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > volume.BOUND))
@@ -171,16 +190,18 @@ class Record:
         return clamped or volume.findings(errors[k], where)
 
     def _of_verdict(self) -> list[Finding]:
+        """Return a finding on the first inadmissible state."""
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
             Finding("serious", "state", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be"
                     f" used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
-        """Return the texts of all findings on the run, also of notes, worst first."""
+        """Return the texts of all findings on the run, notes included, the worst first."""
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
+        """Return the smallest thickness of the sheet in the first drawn state, or None."""
         last = self.profiles[-1]
         return float(last.thickness.min()) if last is not None else None
 
@@ -220,7 +241,12 @@ def of_path(path: Any) -> Record:
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
-    """Return the record of what `formingx.results.files.checkpoint.contents` gives."""
+    """Return the record of a checkpoint.
+
+    Args:
+        about: data of its scene.json (`formingx.results.files.checkpoint_data.contents`).
+        states: data of its states.
+    """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])
@@ -238,7 +264,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
-    """`Record.heat` and `Record.unit` of a scene's heat as plain data (`description.plain`)."""
+    """Return `Record.heat` and `Record.unit` from the heat transfer of a scene as plain data (`description.plain`)."""
     if not heat:
         return {}
 
@@ -249,7 +275,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """Return the temperature at the stations of profiles, from the history variables in a checkpoint."""
+    """Return the temperature at the nodes of profiles, from the history variables in a checkpoint."""
     from scipy.spatial import cKDTree
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     at = None
@@ -264,9 +290,15 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 
 
 def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAMES) -> list[int]:
-    """Numbers of about `most` of n states at which a process has come so far (`progress`), shape (n,).
+    """Return the numbers of the states to be drawn.
 
-    Ends of stages and limit points are among them; others are spread over the process and over the states alike.
+    Ends of stages and limit points are included. The others are spaced evenly over both the process and the states.
+
+    Args:
+        at: progress of the process in n states (`progress`), shape (n,).
+        kinds: kinds of the states.
+        stages: stages of the states.
+        most: approximate number of drawn states.
     """
     n = len(at)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
@@ -276,10 +308,14 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
-    """Return the progress of a process in each of n states, from 0 to 1, shape (n,).
+    """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    By process time where it runs; else by the controlled quantity, over its range, and how far the sheet moves, over
-    the whole way that it moves, in equal parts.
+    It follows the process time if the time advances. Otherwise it is the mean of two measures: the path length of the
+    control over its range, and the path length of the sheet's motion over its total.
+
+    Args:
+        measures: {column: values, shape (n,)}.
+        profiles: profiles of the states.
     """
     n = len(profiles)
     way, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
@@ -295,12 +331,12 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
 
 
 def words(name: str) -> str:
-    """Return a column's name for people."""
+    """Return the name of a column with spaces."""
     return name.replace("_", " ")
 
 
 class _Fields:
-    """Stress, contact pressure and temperature at the stations of a profile, from both faces of a sheet."""
+    """Stress, contact pressure and temperature at the nodes of a profile, from both faces of a sheet."""
 
     def __init__(self, path: Any, profile: Profile):
         self._path, self._points = path, [profile.rest_bottom, profile.rest_top]
@@ -310,7 +346,7 @@ class _Fields:
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
-        """Return the values of a state, shape (m,) each; collective."""
+        """Return {name: values, shape (m,)} in a state; collective."""
         path, points, here = self._path, self._points, {}
         if path.problem.scene.heat is not None:
             here["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
@@ -323,8 +359,10 @@ class _Fields:
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
-    """Contact pressure at the stations of a profile, of the nodes of a face near either of its faces in the
-    reference configuration, (m,)."""
+    """Return the contact pressure at the nodes of a profile, from the contact points nearest to them, shape (m,).
+
+    The face of the sheet that is nearer to the contact points is used.
+    """
     from scipy.spatial import cKDTree
     tree = cKDTree(table.rest)
     away, at = zip(*(tree.query(p) for p in points))

@@ -1,7 +1,8 @@
-"""One HTML file that shows a run, or several side by side, and opens without a network.
+"""Report on one or several runs: one HTML file that needs no network.
 
-First the answer, then the process as moving drawings, then inputs, warnings and, folded, how it was computed. It is
-made from paths or from checkpoints alone; plotly.js and the data are in the file, packed.
+It shows first the part, then the process as animated drawings, then inputs and warnings, and last the numerical
+details in closed sections. It is made from paths or from checkpoints alone. The file contains plotly.js and the data
+in compressed form.
 """
 
 import datetime
@@ -30,36 +31,47 @@ from .record import Record, of_checkpoint, of_path, words
 
 def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, names: Sequence[str] | None = None,
            units: Units = NONE, density: float | None = None, trim: Any = None) -> FilePath:
-    """Write one HTML file that shows runs side by side (rank 0 writes); returns where it is.
+    """Write one HTML file that shows runs side by side (rank 0 writes).
 
     Args:
         runs: paths, or folders of checkpoints.
-        title: its heading.
-        names: of the runs; default 1, 2, ...
-        units: units of the numbers of the scripts, for the labels.
-        density: in g/cm3, for the weights in grams; trim: where parts are cut off, see `Path.part`.
+        file: its name ends in .html.
+        title: heading of the page.
+        names: names of the runs; default 1, 2, ...
+        units: units of the scripts, for the labels.
+        density: density in g/cm3, for the weights in grams.
+        trim: place at which parts are cut off, see `Path.part`.
+
+    Returns:
+        The path of the file.
 
     Raises:
-        InputError: no run, another number of names, a file that is not .html, a folder that is no checkpoint, or plotly
-            is not installed.
+        InputError: there is no run, or the number of names differs. The name of the file has another ending, a folder
+            is
+            no checkpoint, or plotly is not installed.
         OSError: the file cannot be written.
 
     >>> fx.report([path], "report.html", "A disc inflated", units=fx.Units(length="mm", stress="MPa")).name
     'report.html'
     """
-    from ..files import checkpoint
+    from ..files import checkpoint_data
     runs = several("report: runs", runs, "paths or folders of checkpoints")
     names = [f"run {k}" for k in range(1, len(runs) + 1)] if names is None else several("report: names", names, "words")
     if not runs or len(names) != len(runs):
         raise InputError(f"report: {len(runs)} runs and {len(names)} names: give at least one run, and a name for each")
-    records = [of_path(run) if hasattr(run, "problem") else of_checkpoint(*checkpoint.contents(run)) for run in runs]
+    records = [of_path(run) if hasattr(run, "problem") else of_checkpoint(*checkpoint_data.contents(run))
+               for run in runs]
     comm = next((run.problem.comm for run in runs if hasattr(run, "problem")), MPI.COMM_WORLD)
     return write(records, file, title or "Runs side by side", None, comm, units, density, trim, names)
 
 
 def write(records: Record | list[Record], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
-    """See `report` and `Path.report`."""
+    """Write the report of one or several records (`report`, `Path.report`).
+
+    Returns:
+        The path of the file.
+    """
     records = [records] if isinstance(records, Record) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
 
@@ -74,6 +86,7 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
 
 
 def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:
+    """Return the part of a section in numbers, or None."""
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
@@ -84,6 +97,7 @@ def _part(record: Record, units: Units, density: float | None, trim: Any) -> Par
 
 
 def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
+    """Return the page as HTML."""
     alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
     for record, name in zip(records, names):
@@ -102,7 +116,11 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
 
 
 def scripts(data: str) -> str:
-    """Return the end of a page that draws `interactive.data` where `PROCESS` and an element "charts" are."""
+    """Return the scripts at the end of a page; they draw the data in the elements `PROCESS` and "charts".
+
+    Args:
+        data: result of `interactive.data`.
+    """
     packed = (("library", interactive.library()), ("data", interactive.packed(data)))
     code = resources.files(__package__).joinpath("report.js").read_text()
     tail = "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
@@ -122,7 +140,7 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 
 
 def _trouble(failure: Any, lead: str) -> list[str]:
-    """Return the message of a run that failed: an error, or its text alone."""
+    """Return the error message of a failed run as elements of the page."""
     if not failure:
         return []
     found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
@@ -132,7 +150,7 @@ def _trouble(failure: Any, lead: str) -> list[str]:
 
 
 def _behind(record: Record, units: Units) -> list[str]:
-    """Return the sections behind the result: stages, tools, inputs, warnings; folded: all quantities, convergence."""
+    """Return the sections below the results: stages, tools, inputs, warnings; closed: all quantities, convergence."""
     found = []
     if any(record.stages):
         found += ["<h2>Stages</h2>", _stages(record, units)]
@@ -153,7 +171,7 @@ def _behind(record: Record, units: Units) -> list[str]:
 
 
 def _warnings(record: Record, lead: str = "") -> str:
-    """Return the warnings: two lines of each, the whole text when it is opened."""
+    """Return the warnings: two lines each, the whole text after a click."""
     findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
@@ -165,12 +183,13 @@ def _warnings(record: Record, lead: str = "") -> str:
 
 
 def _noted(found: Finding) -> str:
+    """Return a finding as an element of the page."""
     return (f"<details class='note{' bad' if found.severity != 'note' else ''}'><summary><b>{found.severity}</b>:"
             f" {html.escape(found.text)}</summary></details>")
 
 
 def _made(records: list[Record]) -> list[list[str]]:
-    """Date, script and versions."""
+    """Return rows with date, script and versions."""
     try:
         version = importlib.metadata.version("formingx")
     except importlib.metadata.PackageNotFoundError:
@@ -204,7 +223,7 @@ def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
 
 
 def _answers(records: list[Record], names: list[str], parts: list, units: Units) -> str:
-    """One column to a run."""
+    """Return a table of the main numbers with one column per run."""
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
@@ -213,6 +232,7 @@ def _answers(records: list[Record], names: list[str], parts: list, units: Units)
 
 
 def _lead(record: Record, units: Units) -> str:
+    """Return a sentence on the run."""
     counts = record.counts
     how = f"{len(record.kinds) - 1} states after the start"
     if counts:
@@ -229,7 +249,7 @@ def _lead(record: Record, units: Units) -> str:
 
 
 def _key_numbers(record: Record, units: Units) -> str:
-    """Return the last state and the limit points, measure by measure; the thinnest place."""
+    """Return a table of the last state and the limit points, and the thinnest place."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
@@ -242,13 +262,13 @@ def _key_numbers(record: Record, units: Units) -> str:
 
 
 def _control_columns(record: Record) -> list[list[str]]:
-    """Columns of the controlled quantity, and of forces, of one kind each."""
+    """Return groups of columns of one kind: the control, and forces."""
     kinds = [[c for c in record.measures if c.endswith(end)] for end in ("pressure", "travel", "displacement", "force")]
     return [columns for columns in kinds if columns]
 
 
 def _stages(record: Record, units: Units) -> str:
-    """Every stage: its states and iterations, where it ended, the largest forces on tools in it, the remaining gap."""
+    """Return a table of the stages: states, iterations, end, largest tool forces, remaining gap."""
     columns = [c for kind in _control_columns(record) for c in kind if not c.endswith("force")]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
@@ -267,7 +287,7 @@ def _stages(record: Record, units: Units) -> str:
 
 
 def _tools(record: Record, units: Units) -> str:
-    """Every contact, and where its tool is in the last state."""
+    """Return a table of the contacts, with the position of each tool in the last state."""
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
         force = record.forces.get(name)
@@ -288,8 +308,7 @@ def _tools(record: Record, units: Units) -> str:
 
 
 def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
-    """Return the picture that `draw` makes as a file, or None where there is nothing to draw, or nothing to draw it
-    with."""
+    """Return the picture that `draw` makes, or None if there is nothing to draw or a library is missing."""
     with TemporaryDirectory() as folder:
         file = FilePath(folder) / "picture.png"
         try:
@@ -300,11 +319,13 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
 
 
 def _convergence(record: Record) -> Any:
+    """Return a figure of the convergence of the Newton iterations."""
     states = [SimpleNamespace(history=[SimpleNamespace(correction=row[1]) for row in h]) for h in record.histories]
     return plots.convergence(SimpleNamespace(states=states)).figure
 
 
 def _iterations(record: Record) -> str:
+    """Return a table of the iterations."""
     rows = []
     for k in record.frames:
         kind, history = record.kinds[k], record.histories[k]
@@ -315,6 +336,7 @@ def _iterations(record: Record) -> str:
 
 
 def _states(record: Record, units: Units) -> str:
+    """Return a table of all states."""
     rows = [[str(k), record.kinds[k], *(page.number(v[k]) for v in record.measures.values())] for k in record.frames]
     return page.table(["state", "kind", *map(units.label, record.measures)], rows)
 

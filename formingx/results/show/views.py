@@ -1,4 +1,4 @@
-"""Three-dimensional pictures with pyvista, drawn without a screen."""
+"""Three-dimensional pictures drawn with pyvista, without a screen."""
 
 import contextlib
 import io
@@ -16,12 +16,12 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """Draw the sheet revolved about the axis by three quarters, coloured by thickness ratio, as a PNG (rank 0 draws).
+    """Draw the sheet revolved about the axis by three quarters as a PNG, coloured by thickness ratio (rank 0 draws).
 
-    A sheet that is more than twice as high as wide (a parison) is cut along the middle.
+    A sheet that is more than twice as high as wide, such as a parison, is cut along the middle.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb to draw on.
+        InputError: there is neither a screen nor Xvfb.
     """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
@@ -31,12 +31,12 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
-    """Draw a sheet in plane strain as a long part, coloured by thickness ratio, as a PNG (rank 0 draws).
+    """Draw a sheet in plane strain as a long part as a PNG, coloured by thickness ratio (rank 0 draws).
 
-    A half sheet, which begins at R = 0, is drawn whole; it is half as long again as it is wide.
+    A half sheet, which begins at R = 0, is completed by its mirror image. The part is 1.5 times as long as wide.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb to draw on.
+        InputError: there is neither a screen nor Xvfb.
     """
     low, high = _bounds(profile)
     if abs(low[0]) < 1e-6 * (high[0] - low[0]):
@@ -48,24 +48,26 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return two corners (r, z) of a box around the sheet."""
     points = np.vstack([profile.bottom, profile.top])
     return points.min(0), points.max(0)
 
 
 def _mirrored(profile: Any) -> Any:
-    """Return a half sheet and its mirror image as one."""
+    """Return a half sheet together with its mirror image."""
     def whole(points):
         return np.vstack([points[:0:-1] * (-1, 1), points])
     return type(profile)(*(whole(p) for p in (profile.rest_bottom, profile.rest_top, profile.bottom, profile.top)))
 
 
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any) -> None:
-    """Draw the section swept through `stations`; place(points (n, 2), station) gives its x, y, z there, each (n,)."""
+    """Draw the section swept through `stations`, with the positions place(points (n, 2), station) -> x, y, z."""
     file = files.named("view3d", file, ".png")
     files.on_root(comm, lambda: _draw(profile, stations, place, camera, file))
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
+    """Draw the swept section on this rank."""
     import pyvista
 
     def swept(line, values):
@@ -95,7 +97,15 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """Yield a plotter to add meshes to, 1000 by `height`; when the block ends, its picture is written as PNG."""
+    """Write a PNG picture of the meshes that the block adds to the plotter.
+
+    Args:
+        file: the picture.
+        height: its height; the width is 1000 pixels.
+
+    Yields:
+        The pyvista plotter.
+    """
     import pyvista
     picture = io.BytesIO()
     with screen():
@@ -111,8 +121,11 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 
 def shading(values: np.ndarray) -> dict[str, Any]:
-    """Return the arguments of `add_mesh` for the array "ratio" of a surface: colours of all its values, a bar,
-    light."""
+    """Return the arguments of pyvista's `add_mesh` for colours by the array "ratio": limits, colour bar, light.
+
+    Args:
+        values: the array, shape (n,).
+    """
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
@@ -121,7 +134,13 @@ def shading(values: np.ndarray) -> dict[str, Any]:
 
 
 def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
-    """Look from `camera` so that points, shape (n, 3), fill the window beside the colour bar, by zoom and a shift."""
+    """Place the camera so that all points fill the window beside the colour bar.
+
+    Args:
+        plotter: the pyvista plotter.
+        camera: direction of view.
+        points: shape (n, 3), length.
+    """
     plotter.camera_position = [tuple(camera), (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
     camera, (width, height) = plotter.camera, plotter.window_size
@@ -137,9 +156,12 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """Provide a display in the block: the present one, or an Xvfb that ends with the block.
+    """Provide a display within a block: the present one, or an Xvfb that ends with the block.
 
-    Debian's VTK aborts without one.
+    Debian's VTK aborts without a display.
+
+    Raises:
+        InputError: there is neither a screen nor Xvfb.
     """
     if os.environ.get("DISPLAY"):
         yield

@@ -1,0 +1,253 @@
+"""Files of a checkpoint folder as plain data, read and checked without a scene (layout: `checkpoint`)."""
+
+import json
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path as FilePath
+from typing import Any
+
+from mpi4py import MPI
+
+from ...errors import InputError, place
+from ...findings import SEVERITIES, Finding
+from ...solve.state import State
+from .arrays import unpack
+from .description import differences
+from .progress import progress
+
+FORMAT = 5                 # format of the files
+FIELDS = ("x", "direction")
+ARRAYS = "arrays.bin"
+END = "end.json"
+
+
+def begun(folder: Any) -> bool:
+    """Return True if a checkpoint holds a state.
+
+    It is False while a run may still begin to write: the folder is missing, empty, or without a state.
+
+    Raises:
+        InputError: the folder holds other files.
+    """
+    folder = place("checkpoint", folder)
+    if not folder.exists() or folder.is_dir() and all(entry.suffix == ".part" for entry in folder.iterdir()):
+        return False
+    read_json(folder / "scene.json")
+    return bool(complete_states(folder))
+
+
+def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
+    """Return the last states of a checkpoint; a run may be writing to it.
+
+    Args:
+        folder: the checkpoint.
+        count: number of states to read.
+
+    Returns:
+        Number of states in the checkpoint, the data of the last `count` of them, and the seconds since the last one was
+        written.
+
+    Raises:
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    """
+    folder = place("checkpoint", folder)
+    _check_format(folder, read_json(folder / "scene.json"))
+    n = len(complete_states(folder))
+    if not n:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    age = max(time.time() - (folder / state_name(n - 1) / "state.json").stat().st_mtime, 0.0)
+    return n, [read_data(folder, k, checksums=False) for k in range(max(n - count, 0), n)], age
+
+
+def ended(folder: Any) -> dict[str, Any] | None:
+    """Return how a run ended, from its checkpoint.
+
+    Returns:
+        {"failure": error message or "", "findings": [Finding]}. None if the run has not ended, or if the file is
+        missing as in older checkpoints.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    file = place("checkpoint", folder) / END
+    if not file.exists():
+        return None
+    found = read_json(file)
+    rows = found.get("findings")
+    if not (isinstance(found.get("failure"), str) and isinstance(rows, list) and all(
+            isinstance(row, list) and list(map(type, row)) == [str] * 4 and row[0] in SEVERITIES for row in rows)):
+        raise InputError(f"checkpoint: {str(file)!r} is damaged: it does not say how the run ended")
+    return {"failure": found["failure"], "findings": [Finding(*entry) for entry in rows]}
+
+
+def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the data of a checkpoint without its scene.
+
+    Returns:
+        The data of scene.json with the end of the run ("ended"), and the data of each state.
+
+    Raises:
+        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    """
+    folder = place("checkpoint", folder)
+    about = read_json(folder / "scene.json")
+    _check_format(folder, about)
+    states = read_states(folder, len(complete_states(folder)), MPI.COMM_WORLD)
+    if not states:
+        raise InputError(f"checkpoint {str(folder)!r} holds no state")
+    return about | {"ended": ended(folder)}, states
+
+
+def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
+    """Return the data of the first `count` states; shows a progress bar on rank 0 of `comm`; not collective."""
+    found = []
+    with progress(comm, f"{folder}: {count} states") as done:
+        for k in range(count):
+            found.append(read_data(folder, k))
+            done((k + 1) / count)
+    return found
+
+
+def _check_format(folder: FilePath, about: dict) -> None:
+    """Check the format of a checkpoint.
+
+    Raises:
+        InputError: this version cannot read the format.
+    """
+    if about.get("formingx") != FORMAT:
+        raise InputError(f"checkpoint {str(folder)!r} has the format {about.get('formingx')!r}; this version of"
+                         f" formingx reads {FORMAT}")
+
+
+def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
+    """Check that a checkpoint belongs to a scene.
+
+    Args:
+        folder: the checkpoint.
+        about: data of its scene.json.
+        scene: description of the scene (`description.describe`).
+
+    Raises:
+        InputError: its format is unknown, it is damaged, or it belongs to another scene.
+    """
+    _check_format(folder, about)
+    if not isinstance(about.get("scene"), dict):
+        raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json does not say what the scene is")
+    found = list(differences(about["scene"], json.loads(json.dumps(scene))))
+    if found:
+        shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
+        more = f"; and {len(found) - 4} more" if len(found) > 4 else ""
+        raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{more}")
+
+
+def state_name(number: int) -> str:
+    """Return the name of the folder of a state, such as "0012"."""
+    return f"{number:04d}"
+
+
+def complete_states(folder: FilePath) -> list[FilePath]:
+    """Return the folders of the complete states, in order.
+
+    Raises:
+        InputError: a state is missing.
+    """
+    names = (entry for entry in folder.iterdir() if entry.name.isascii() and entry.name.isdigit())
+    found = sorted(names, key=lambda entry: int(entry.name))
+    for k, entry in enumerate(found):
+        if int(entry.name) != k:
+            raise InputError(f"checkpoint {str(folder)!r} is damaged: state {k} is missing")
+    return found
+
+
+def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
+    """Return the data of a state, with its arrays.
+
+    Args:
+        folder: the checkpoint.
+        number: number of the state.
+        checksums: False to skip the check of the checksums.
+
+    Raises:
+        InputError: a file is missing, or differs from the one that was written.
+    """
+    state_folder = folder / state_name(number)
+    data = read_json(state_folder / "state.json")
+    try:
+        content = (state_folder / ARRAYS).read_bytes()
+        missing = [f.name for f in fields(State) if f.name not in (*FIELDS, "memory") and f.name not in data]
+        whole = not missing and data.get("number") == number and (
+            not checksums or crc_sums(data, content) == data.get("checksums"))
+        found = unpack(data, content) if whole else data
+    except (OSError, ValueError, TypeError):
+        whole, found = False, data
+    if not whole:
+        raise InputError(f"checkpoint {str(state_folder)!r} is damaged: its files are not those that were written"
+                         f" (load's state= picks an earlier one)")
+    return found
+
+
+def read_json(file: FilePath) -> Any:
+    """Return a dictionary from a JSON file of a checkpoint.
+
+    Raises:
+        InputError: the file is missing, damaged, or holds no dictionary.
+    """
+    try:
+        with open(file, encoding="utf-8") as stream:
+            found = json.load(stream)
+        if not isinstance(found, dict):
+            raise ValueError("it holds no table")
+        return found
+    except FileNotFoundError:
+        raise InputError(f"checkpoint: {_instead(file)}") from None
+    except NotADirectoryError:
+        raise InputError(f"checkpoint: {str(file.parent)!r} is not a folder") from None
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
+
+
+def _instead(file: FilePath) -> str:
+    """Return a text on the files found in place of a missing one."""
+    folder = file.parent
+    if file.name != "scene.json":
+        return f"{str(file)!r} is not there"
+    if not folder.exists():
+        return f"there is no folder {str(folder)!r}"
+    if not any(folder.iterdir()):
+        return f"the folder {str(folder)!r} is empty"
+    if (folder / "study.json").exists():
+        return (f"{str(folder)!r} is the folder of a study: it keeps numbers of runs, not their states; the same"
+                f" fx.study(..., folder=...) reads them, and its report() shows them")
+    inside = sorted(entry.parent.name for entry in folder.glob("*/scene.json"))
+    return f"{str(folder)!r} holds no run" + (f", but folders that do: {', '.join(inside[:5])}"
+                                              f"{', ...' * (len(inside) > 5)}" if inside else "")
+
+
+def crc_sums(data: dict, content: bytes) -> dict[str, int]:
+    """Return {file: CRC-32} of the files of a state.
+
+    Args:
+        data: the data of state.json.
+        content: the bytes of the arrays.
+    """
+    rest = {key: value for key, value in data.items() if key != "checksums"}
+    return {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode()), ARRAYS: zlib.crc32(content)}
+
+
+def named_os_errors(action: Callable[[], Any], folder: FilePath, what: str) -> Any:
+    """Return the result of an action, and complete the message of its OSError.
+
+    Args:
+        action: function without arguments.
+        folder: the checkpoint, for the message.
+        what: failed task, for the message.
+
+    Raises:
+        OSError: the error of the action, with the folder and the task in its message.
+    """
+    try:
+        return action()
+    except OSError as error:
+        raise OSError(error.errno, f"checkpoint {str(folder)!r}: {what}: {error.strerror}") from None
