@@ -125,8 +125,7 @@ class Path(States):
         """Draw an animation of the forming: the section of the sheet and the loading curve (rank 0 writes).
 
         The frames are evenly spaced over the process (`formingx.results.show.record.progress`). Between states the body
-        follows
-        the cubic path through them. The last frame is shown for one second more.
+        follows the cubic path through them. The last frame is shown for one second more.
 
         Args:
             file: its name ends in .gif or .mp4.
@@ -139,8 +138,7 @@ class Path(States):
 
         Raises:
             InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. A number is not
-                allowed, or
-                the mesh is not a sheet.
+                allowed, or the mesh is not a sheet.
         """
         from .show import animation
         animation.animate(self, file, frames, seconds, units or NONE)
@@ -212,8 +210,7 @@ class Path(States):
 
         Returns:
             A `Wall`, from the axis to the rim. In three dimensions a `WallInSpace`, triangle by triangle. Both have
-            `to_csv`
-            and `to_excel`.
+            `to_csv` and `to_excel`.
         """
         return self._reader.wall(state or self.last)
 
@@ -226,12 +223,10 @@ class Path(States):
         Args:
             state: default the last.
             density: density of the material, g/cm3, for the weight in grams. It refers to the reference configuration,
-                under
-                `ThermalExpansion` to the temperature of zero thermal strain. Give `units`, too: lengths without a unit
-                count as cm.
+                under `ThermalExpansion` to the temperature of zero thermal strain. Give `units`, too: lengths without a
+                unit count as cm.
             trim: radius at which the part is cut off, or ("height", h), length. The cut lies at the last place from the
-                axis
-                where the middle line passes it. In three dimensions a z coordinate beyond which the part lies.
+                axis where the middle line passes it. In three dimensions a z coordinate beyond which the part lies.
             heights: heights at which the wall is given, too (`Wall.height`), length.
             units: units of the script.
 
@@ -311,21 +306,17 @@ class Path(States):
 
         The images of a modelled half or quarter and their tools are included. The entries are:
 
-        Work of each load (under the name of its column; "pressure_on_bottom" if its value is fixed), of each driven
-        support
-        (its name, or "support") and of each moving tool.
+        Work of each load, each driven support and each moving tool, under the name of its column. The work of a fixed
+        load is "pressure_on_bottom" or similar; a support without a name is "support".
 
         "change": work of forces left unbalanced at the beginning of a stage, which fade over the stage. "new_meshes":
-        energy
-        added by remeshing. "heat": energy added by changes of temperature.
+        energy added by remeshing. "heat": energy added by changes of temperature.
 
         "strain_energy" above its first value, "dissipated_energy" in materials, "friction", "jumps" (lost in
-        snap-through),
-        and "bonds" to adhesive tools, above their first value.
+        snap-through), and "bonds" to adhesive tools, above their first value.
 
         "unbalanced": error of the integrals and of the run. Above 0.5 % of the largest entry a warning is logged and
-        added
-        to the `findings`.
+        added to the `findings`.
 
         Returns:
             {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
@@ -343,8 +334,7 @@ class Path(States):
         """Write the part as shell elements with the wall as thickness, for CalculiX (rank 0 writes).
 
         The elements are S8R, at the axis S6, on the middle surface. The sets are ALL, WALL and RIM. The file contains
-        no
-        material.
+        no material.
 
         Args:
             file: its name ends in .inp.

@@ -41,8 +41,7 @@ class Reader(Protocol):
 
         Returns:
             Points, shape (n, 3), length; corners of the triangles, shape (m, 3); wall over original thickness at the
-            points,
-            shape (n,).
+            points, shape (n,).
         """
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,

@@ -109,8 +109,8 @@ class States:
         """Pairs of successive states between which a bifurcation lies.
 
         There the determinant of the tangent changes its sign without a limit point. This finds only axisymmetric modes
-        (n = 0)
-        and only an odd number of them; `Path.stability` finds all. The list is empty for materials with history.
+        (n = 0) and only an odd number of them; `Path.stability` finds all. The list is empty for materials with
+        history.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
@@ -179,8 +179,7 @@ class States:
         """Return the first state of the path that meets a target.
 
         The state is solved for, not interpolated. The path does not change. A target slightly beyond the last state,
-        such as
-        a value rounded to six digits, is accepted.
+        such as a value rounded to six digits, is accepted.
 
         Args:
             target: for example `pressure(0.4)`.
@@ -288,8 +287,7 @@ class States:
         """Return columns along a smooth path through the states, for drawing.
 
         Quantities that depend on displacements and control alone follow the cubic path between two states. Other
-        columns, such
-        as forces and energies, follow a monotone cubic in arc length through their values.
+        columns, such as forces and energies, follow a monotone cubic in arc length through their values.
 
         Args:
             columns: names of columns.

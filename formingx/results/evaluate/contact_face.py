@@ -147,8 +147,7 @@ def tool_forces(path: Any) -> dict[str, np.ndarray]:
     """Return the force of the body on each tool in all states.
 
     The force on a moving tool is taken along its travel, positive if it resists the travel. The force on a fixed tool
-    is
-    taken along Z, positive if the body pushes the tool up.
+    is taken along Z, positive if the body pushes the tool up.
 
     Returns:
         {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.

@@ -2,8 +2,8 @@
 
 The patch of a cell consists of the cells of the same layer that share a corner with it. So nothing is averaged over an
 interface. A cubic in (R, Z) is fitted to the values on the patch by least squares. This is similar to the patches
-around nodes of Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 33 (1992) 1331 (doi:10.1002/nme.1620330702). A patch
-per cell needs no special rule at boundaries.
+around nodes of Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 33 (1992) 1331 (doi:10.1002/nme.1620330702). A patch per
+cell needs no special rule at boundaries.
 """
 
 from __future__ import annotations

@@ -167,8 +167,7 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each node of a face the opposite point, where its normal meets the other face, shape (n, 2).
 
     The ends of both faces belong together. A normal beside an oblique rim may miss the other face: then its nearest end
-    is
-    taken.
+    is taken.
     """
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)

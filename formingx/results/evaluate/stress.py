@@ -115,16 +115,13 @@ class StressField:
         """Estimate the error of the stresses at the quadrature points, per cell and in total; collective.
 
         The error is the difference between the computed stress and the stress from the fitted F and S (see the module).
-        The
-        integrals are sums over the quadrature points. For a smooth solution the estimate tends to the true error on
-        refined
-        meshes. At a loaded sharp corner it does not decrease.
+        The integrals are sums over the quadrature points. For a smooth solution the estimate tends to the true error on
+        refined meshes. At a loaded sharp corner it does not decrease.
 
         Args:
             layer: name of a layer; default all.
             exact: exact Cauchy stress, shape (n, 3, 3), as a function of reference positions, shape (n, 2). With it,
-                the
-                true error is returned.
+                the true error is returned.
 
         Returns:
             The errors of the cells.
@@ -147,8 +144,7 @@ class StressField:
         Args:
             layer: name of a layer; default all.
             radii: two reference radii. Only cells with their middle between them are examined, for example without a
-                clamped
-                rim and its stress peak.
+                clamped rim and its stress peak.
 
         Raises:
             InputError: the layer is unknown, or no cell lies between the radii.

@@ -31,8 +31,7 @@ class Limits:
         warns: relative change of a tool force by penetration from which a run warns.
         ends: relative change of a tool force by penetration from which a state is inadmissible.
         stiffest: largest ratio of this change to the fraction of the energy stored in penetration, as for a body
-            pressed
-            flat.
+            pressed flat.
         small: half of a difference quotient, over the arc length.
         felt: penetration over the thickness below which a state is always admissible, as at a first touch.
         thinnest: largest pole stretch; it is 1e150 for a negative wall.
@@ -229,8 +228,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     """Return the relative change of the force F on a moving tool by penetration; collective.
 
     With the energy E of penetration, the tool advances by 2 E/F into the body. The change of force is this distance
-    times
-    dF/dtravel. It is 0 for a fixed tool.
+    times dF/dtravel. It is 0 for a fixed tool.
 
     Args:
         images: number of images of the modelled body in the whole part, to which `strain_energy` belongs.

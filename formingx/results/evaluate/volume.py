@@ -43,8 +43,7 @@ def away_from_clamps(path: Any) -> float | None:
     """Return the root mean square of J - 1 in the last state away from clamped faces; collective.
 
     The effect of the singular corners of a clamped face decays over its length, the wall of a sheet (Saint-Venant).
-    Points
-    nearer than `_NEAR` times this length are left out.
+    Points nearer than `_NEAR` times this length are left out.
 
     Returns:
         The error, or None without clamped faces.

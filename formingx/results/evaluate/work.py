@@ -248,9 +248,7 @@ class Ledger:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the owned unknowns of a contact face, shape (n, 2); of closed points alone if contacts share the
-        face.
-        """
+        """Return the owned unknowns of a contact face, shape (n, 2); only of closed points if contacts share it."""
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]

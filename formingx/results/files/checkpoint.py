@@ -215,7 +215,11 @@ def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Prob
 
 
 def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
-    """Return the problem on the next mesh of a remeshed run."""
+    """Return the problem on the next mesh of a remeshed run.
+
+    Raises:
+        InputError: the extension `remeshing` is not installed.
+    """
     if not _mesh_loaders:
         raise InputError("load: the checkpoint is of a remeshed run: the extension 'remeshing' of formingx is not"
                          " installed")
@@ -279,7 +283,11 @@ def _plain_state(state: State) -> dict[str, Any]:
 
 
 def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
-    """Return the history variables from their stored data."""
+    """Return the history variables from their stored data.
+
+    Raises:
+        InputError: their number differs from the scene.
+    """
     if len(memory) != len(problem.histories):
         raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"
                          " belongs to another scene")

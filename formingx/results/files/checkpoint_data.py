@@ -197,15 +197,15 @@ def read_json(file: FilePath) -> Any:
     try:
         with open(file, encoding="utf-8") as stream:
             found = json.load(stream)
-        if not isinstance(found, dict):
-            raise ValueError("it holds no table")
-        return found
     except FileNotFoundError:
         raise InputError(f"checkpoint: {_instead(file)}") from None
     except NotADirectoryError:
         raise InputError(f"checkpoint: {str(file.parent)!r} is not a folder") from None
     except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
+    if not isinstance(found, dict):
+        raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: it holds no table")
+    return found
 
 
 def _instead(file: FilePath) -> str:

@@ -96,9 +96,7 @@ def _label(record: Record, units: Units, key: str) -> str:
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
-    """Return the outlines of the tools of a section, with a shell on their solid side, and their travel in every
-    frame.
-    """
+    """Return outlines of the tools of a section, with a shell on their solid side, and their travel in every frame."""
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []

@@ -48,8 +48,7 @@ class Record:
         tooling: the `Tooling` of the scene.
         travels: for each state the travels of the tools (`Tooling.travels`), length.
         forces: {tool: force of the body on it, shape (n,)}, positive if it resists the travel. The force on a fixed
-            tool is
-            its Z component.
+            tool is its Z component.
         fields: for each drawn state {name: values at the nodes of the profile, shape (m,)}. A record from a checkpoint
             has the temperature only.
         layers: layers of the wall in the last state, as in `Wall`.
@@ -310,8 +309,8 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    It follows the process time if the time advances. Otherwise it is the mean of two measures: the path length of the
-    control over its range, and the path length of the sheet's motion over its total.
+    It follows the process time if the time advances. Otherwise it is the mean of two parts. One is the path length of
+    the control over its range, the other the path length of the sheet's motion over its total.
 
     Args:
         measures: {column: values, shape (n,)}.

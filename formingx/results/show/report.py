@@ -1,8 +1,8 @@
 """Report on one or several runs: one HTML file that needs no network.
 
-It shows first the part, then the process as animated drawings, then inputs and warnings, and last the numerical
-details in closed sections. It is made from paths or from checkpoints alone. The file contains plotly.js and the data
-in compressed form.
+It shows first the part, then the process as animated drawings, then inputs and warnings, and last the numerical details
+in closed sections. It is made from paths or from checkpoints alone. The file contains plotly.js and the data in
+compressed form.
 """
 
 import datetime
@@ -47,8 +47,7 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
 
     Raises:
         InputError: there is no run, or the number of names differs. The name of the file has another ending, a folder
-            is
-            no checkpoint, or plotly is not installed.
+            is no checkpoint, or plotly is not installed.
         OSError: the file cannot be written.
 
     >>> fx.report([path], "report.html", "A disc inflated", units=fx.Units(length="mm", stress="MPa")).name
@@ -86,7 +85,11 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
 
 
 def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:
-    """Return the part of a section in numbers, or None."""
+    """Return the part of a section in numbers, or None without a sheet.
+
+    Raises:
+        InputError: a density or a trim is given without a sheet.
+    """
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
