@@ -52,6 +52,12 @@ def formed_in_cup(mu, size):
                      loads=loads, contacts=[fx.Contact("bottom", CUP, mu, **name)])]
 
 
+@pytest.fixture(scope="module")
+def rough_ball():
+    """Path of a ball of mu = 0.3, pushed to a travel of 0.9."""
+    return fx.trace(pushed(0.3), until=fx.travel(0.9), progress=False)
+
+
 @pytest.mark.parametrize("tool", TOOLS.values(), ids=TOOLS)
 def test_distances_have_their_derivatives(tool):
     """Beside the planes and edges where they have none; on the axis and on planes of symmetry they have."""
@@ -125,12 +131,11 @@ def test_capstan(mu):
     assert path.counts.iterations < 450
 
 
-def test_force_of_a_rough_ball():
+def test_force_of_a_rough_ball(rough_ball):
     """Within 1.5 % of an axisymmetric solid; two counts of nodes to a step agree within 1 %."""
     exact = fx.trace(pushed_solid(0.3), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
     forces = []
-    for nodes in (1, 3):
-        path = fx.trace(pushed(0.3, nodes_per_step=nodes), until=fx.travel(0.9), progress=False)
+    for path in (rough_ball, fx.trace(pushed(0.3, nodes_per_step=3), until=fx.travel(0.9), progress=False)):
         forces.append(path.last.measures["tool_force"])
         assert path.counts.iterations < 450 and path.last.measures["penetration"] < 1e-4 * THICKNESS
     assert forces[0] == pytest.approx(exact, rel=0.015) and forces[1] == pytest.approx(forces[0], rel=0.01)
@@ -146,9 +151,9 @@ def test_more_friction_takes_more_force():
     assert most == pytest.approx(stick, rel=0.03)
 
 
-def test_work_of_the_plug_is_strain_energy_and_friction():
+def test_work_of_the_plug_is_strain_energy_and_friction(rough_ball):
     """Friction dissipates mu N times the way that points slide over the ball, in the trapezoidal rule."""
-    path = fx.trace(pushed(0.3), until=fx.travel(0.9), progress=False)
+    path = rough_ball
     travel, force, energy = (path[name] for name in ("travel", "tool_force", "strain_energy"))
     work, lost, before = np.trapezoid(force, travel), 0.0, None
     for state in path.states:
@@ -186,9 +191,11 @@ if path.problem.comm.rank == 0:
 def test_a_run_goes_on_from_a_checkpoint(tmp_path):
     """A run with sliding points continues as if it had not been interrupted."""
     whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), intermediate=[fx.travel(0.4)], progress=False)
-    fx.trace(pushed(0.3, 0.2), until=fx.travel(0.4), progress=False).save(tmp_path)
-    scene = pushed(0.3, 0.2)
-    path = fx.trace(scene, until=fx.travel(0.6), progress=False, start=fx.load(tmp_path, scene))
+    whole.save(tmp_path)
+    scene, k = pushed(0.3, 0.2), int(np.flatnonzero(np.isclose(whole["travel"], 0.4, rtol=1e-12))[0])
+    begun = fx.load(tmp_path, scene, state=k)
+    assert begun.last.measures["travel"] == pytest.approx(0.4)
+    path = fx.trace(scene, until=fx.travel(0.6), progress=False, start=begun)
     assert path.last.measures["tool_force"] == pytest.approx(whole.last.measures["tool_force"], rel=1e-8)
 
 
@@ -214,10 +221,10 @@ def test_walls_of_a_rough_cup():
 
 
 def test_plug_tray_quick(tmp_path):
-    """Numbers are of the whole tray: as much as the sheet weighs; the half model stands near the quarter."""
+    """Numbers are of the whole tray: as much as the sheet weighs; those of the half are within 0.5 %."""
     found = summary("plug_tray", tmp_path, "--quick")
     quarter, ratio = found["quarter_16"], found["half_over_quarter"]
     sheet = 1e-3 * 1.05 * 1.5 * (160 * 100 - (4 - np.pi) * 20**2)
     assert quarter["weight_g"] == pytest.approx(sheet, rel=0.01)
-    assert ratio["weight_g"] == pytest.approx(1.0, rel=1e-6) and ratio["plug_force_N"] == pytest.approx(1.0, abs=0.2)
+    assert ratio["weight_g"] == pytest.approx(1.0, rel=1e-6) and max(abs(v - 1) for v in ratio.values()) < 5e-3
     assert quarter["touching"] > 0.95 and 0.5 < quarter["least_wall_mm"] < 0.9

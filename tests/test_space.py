@@ -104,6 +104,26 @@ def trough(size=0.15, **more):
                     contacts=[fx.Contact("bottom", tool, name="mould", **more)])
 
 
+def test_a_reflected_mesh_is_symmetric():
+    """The whole has each node and triangle of the quarter four times, joined at the cuts; a new size keeps that."""
+    outline = fx.mesh.rectangle(3.0, 2.0, corner=0.5, part="quarter")
+    part = fx.mesh.sheet(outline, size=0.3)
+    for size in (0.3, lambda x, y: 0.3 + 0.1 * x):
+        part = part.of_size(size)
+        whole = fx.mesh.sheet(outline, size=0.3, reflected=["y0", "x0"]).of_size(size)
+        assert set(whole.boundaries) == {"rim", "bottom", "top"} and len(whole.facets_of("rim")) == 4 * len(
+            part.facets_of("rim"))
+        (X, cells), (x, few) = ((mesh.domain.geometry.x[:, :2], mesh.domain.geometry.dofmap) for mesh in (whole, part))
+        assert len(cells) == 4 * len(few)
+        places = {tuple(row) for row in np.round(X, 9).tolist()}
+        assert len(places) == len(X)
+        for sign in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+            assert {tuple(row) for row in (np.round(x, 9) * sign + 0.0).tolist()} <= places
+        area, quarter = (np.abs(np.linalg.det(np.dstack([x[c], np.ones((*c.shape, 1))]))).sum()
+                         for x, c in ((X, cells), (x, few)))
+        assert area == pytest.approx(4 * quarter, rel=1e-9)
+
+
 def test_triangles_as_a_pilot_run_asks_for():
     """Small in the fillet and where the wall thins fast: as near to the law as triangles that are small all over."""
     path = fx.trace(trough(), until=fx.pressure(1.2), adapt_mesh={"error": 0.1}, progress=False)
@@ -449,6 +469,11 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, 0), (0, 1)], 0.1), r"the corner \(1, 0\) is there twice"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), 0.3, names=["a"]), "1 names for 4 edges"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), 0.3, layers=["a", "a"]), "layers.*each another"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), 0.3, reflected=["x0"]), "reflected: boundary 'x0' is not known"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0, part="half"), 0.3, reflected=["x0", "x0"]), "known: 'rim'"),
+    (lambda: fx.mesh.sheet(fx.mesh.circle(1.0, part="half"), 0.3, reflected=["rim"]), "'rim' is not straight"),
+    (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, -1), (2, -1), (2, 1), (0, 1)], 0.3, names=[*"abcdef"],
+                           reflected=["a"]), "'a': the sheet meets its line at other places"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: x), r"size at \(-.*: must be greater than 0"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x: x), "the function fails: TypeError"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: 1e-5 + x * x), "more than 500000 triangles"),

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.extensions.space.sheet import Sheet
 from formingx.io.stl import volume
-from formingx.mesh.grid import Grid, gathered, to_mesh
 from formingx.results.files import checkpoint_data
 from formingx.results.show import record
 
@@ -18,26 +16,10 @@ PART = "weight", "volume", "area", "draw_ratio", "min_wall", "uniformity"
 COLUMNS = ("enclosed_volume", "strain_energy", "mould_force", "contact_area", "reference_contact_area", "penetration")
 
 
-def mirrored(sheet, axis, names):
-    """A sheet and its mirror image across x = 0 or y = 0; names: of the boundaries that are left."""
-    grid = gathered(sheet)
-    X = np.pad(grid.points, ((0, 0), (0, 1)))
-    on_plane, image = np.abs(X[:, axis]) < 1e-9, np.arange(len(X))
-    image[~on_plane] = len(X) + np.arange((~on_plane).sum())
-    points = np.vstack([X, X[~on_plane] * np.where(np.arange(3) == axis, -1.0, 1.0)])
-    cells = np.vstack([grid.layers["sheet"], image[grid.layers["sheet"]][:, ::-1]])
-    edges = {name: np.vstack([grid.boundaries[name], image[grid.boundaries[name]]]) for name in names}
-    plain = to_mesh(lambda: Grid(points, np.arange(1, len(points) + 1), {"sheet": cells}, edges), sheet.comm, "sheet")
-    return Sheet(**{**vars(plain), "boundaries": plain.boundaries | {"bottom": (), "top": ()}})
-
-
 def inflated(part):
     """A sheet of 160 x 100 mm blown into a box: each part of the same triangles."""
-    sheet = fx.mesh.sheet(fx.mesh.rectangle(160.0, 100.0, part="quarter"), size=20)
-    if part != "quarter":
-        sheet = mirrored(sheet, 1, ["rim", "x0"])
-    if part == "whole":
-        sheet = mirrored(sheet, 0, ["rim"])
+    images = {"quarter": [], "half": ["y0"], "whole": ["y0", "x0"]}[part]
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(160.0, 100.0, part="quarter"), size=20, reflected=images)
     box = fx.tools.box(half=(78.0, 48.0), depth=20.0, corner=12.0, fillet=5.0)
     scene = fx.Scene(mesh=sheet, thickness=1.0, materials=fx.NeoHookean(c10=C10), model=fx.Membrane(wrinkles=0.01),
                      supports=[fx.SimplySupported("rim"), *HELD[part]], loads=[fx.Pressure("top")],

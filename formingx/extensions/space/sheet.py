@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -110,7 +111,7 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
-          layers: Sequence[str] = ("sheet",), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
+          layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
     """Return a flat sheet within an outline, of triangles of a size, by gmsh.
 
     Args:
@@ -118,14 +119,22 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
         size: of the triangles' edges, length; or a function of (x, y).
         names: of the polygon's edges, from the first corner on; default "rim".
         layers: their names; `Scene(thickness=...)` says how thick they are.
+        reflected: names of straight boundaries, at each of which the mesh and its mirror image are joined. So the mesh
+            of a quarter with ["y0"] becomes a symmetric mesh of the half.
 
     Raises:
         InputError: an outline that is none or crosses itself, a size that is not above 0, more than 500,000 triangles.
+            Also a reflected boundary that is not straight, or that the sheet crosses.
 
-    >>> print(fx.mesh.sheet(fx.mesh.rectangle(300, 200, corner=20, part="quarter"), size=40))
+    >>> quarter = fx.mesh.rectangle(300, 200, corner=20, part="quarter")
+    >>> print(fx.mesh.sheet(quarter, size=40))
     35 triangles, x from 0 to 150, y from 0 to 100
     layers: sheet
     boundaries: rim, x0, y0, bottom, top
+    >>> print(fx.mesh.sheet(quarter, size=40, reflected=["y0"]))
+    70 triangles, x from 0 to 150, y from -100 to 100
+    layers: sheet
+    boundaries: rim, x0, bottom, top
     """
     edges = several("sheet: outline", outline, "corners (x, y), or what fx.mesh.rectangle gives")
     if not all(isinstance(edge, Edge) for edge in edges):
@@ -144,16 +153,19 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     x = _chords(edges)
     asked = _Size(size)
     areas, sizes = asked.over(x)
-    if np.sum(areas / (0.4 * sizes**2)) > _MOST:
+    lines = several("sheet: reflected", reflected, "names")
+    for k, name in enumerate(lines):
+        known("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
+    if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > _MOST:
         raise InputError(f"sheet: size = {size!r}: would make more than {_MOST} triangles of the sheet, whose area is"
                          f" {areas.sum():.4g}")
     words = several("sheet: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
-    plain = to_mesh(lambda: _grid(edges, asked), comm, "sheet")
+    plain = to_mesh(lambda: reduce(_reflected, lines, _grid(edges, asked)), comm, "sheet")
     return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
                     "boundaries": plain.boundaries | {"bottom": (), "top": ()},
-                    "of_size": lambda size: sheet(edges, size, layers=words, comm=comm)})
+                    "of_size": lambda size: sheet(edges, size, layers=words, reflected=lines, comm=comm)})
 
 
 def _chords(edges: list[Edge]) -> np.ndarray:
@@ -261,3 +273,25 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
         if not len(cells):
             raise InputError("sheet: the outline holds no triangle: must be closed, and not cross itself")
         return Grid(X, np.arange(1, len(X) + 1), {"sheet": counter_clockwise(X, cells)}, boundaries)
+
+
+def _reflected(grid: Grid, name: str) -> Grid:
+    """Return the triangles and their mirror image about a straight boundary, joined there."""
+    X, (sheet,) = grid.points, grid.layers.values()
+    line = np.unique(grid.boundaries[name])
+    middle, size = X[line].mean(0), 1e-9 * float(np.ptp(X, axis=0).max())
+    way = X[line][np.argmax(np.linalg.norm(X[line] - middle, axis=1))] - middle
+    normal = np.array([-way[1], way[0], 0.0]) / np.linalg.norm(way)
+    d = (X - middle) @ normal
+    if np.abs(d[line]).max() > size:
+        raise InputError(f"sheet: reflected: boundary {name!r} is not straight: must be one line")
+    if d.min() < -size < size < d.max() or np.count_nonzero(np.abs(d) < size) > len(line):
+        raise InputError(f"sheet: reflected: boundary {name!r}: the sheet meets its line at other places too: must meet"
+                         f" it at this boundary alone")
+    off = np.setdiff1d(np.arange(len(X)), line)
+    image = np.arange(len(X))
+    image[off] = len(X) + np.arange(len(off))
+    points = np.vstack([X, X[off] - 2 * d[off, None] * normal])
+    cells = counter_clockwise(points, np.vstack([sheet, image[sheet]]))
+    boundaries = {other: np.vstack([ends, image[ends]]) for other, ends in grid.boundaries.items() if other != name}
+    return Grid(points, np.arange(1, len(points) + 1), {"sheet": cells}, boundaries)
