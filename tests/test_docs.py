@@ -8,7 +8,7 @@ import shutil
 from contextlib import nullcontext
 
 import pytest
-from conftest import ROOT, run
+from conftest import ROOT, drawn, run
 from printed import assert_shows
 
 import formingx.exact
@@ -28,6 +28,14 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     for block, shown in re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page.read_text(), re.S):
         exec(compile(block, page.name, "exec"), names)
         assert_shows(shown, capsys.readouterr().out)
+    for name in re.findall(r"\]\(pictures/(\w+\.png)\)", page.read_text()):
+        assert drawn(tmp_path / name) and (page.parent / "pictures" / name).is_file(), f"docs/run_page.py stores {name}"
+
+
+def test_pictures_of_pages_are_all_shown():
+    for folder in DOCS.glob("*/pictures"):
+        pages = "".join(page.read_text() for page in folder.parent.glob("*.md"))
+        assert {*re.findall(r"pictures/(\w+\.png)", pages)} == {file.name for file in folder.iterdir()}
 
 
 @pytest.mark.parametrize("shown, printed, same", [
