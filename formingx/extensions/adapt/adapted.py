@@ -100,10 +100,11 @@ def of_columns(mesh: Mesh) -> Columns:
     if columns is None:
         raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in space, by sheet")
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
-    off = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
-              for k, name in enumerate(columns.faces))
-    if off > 1e-9 * np.ptp(nodes, axis=0).max():
-        raise InputError(f"adapted: nodes of the mesh were moved by {off:.3g} since it was made: make it at its place")
+    moved = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
+                for k, name in enumerate(columns.faces))
+    if moved > 1e-9 * np.ptp(nodes, axis=0).max():
+        raise InputError(f"adapted: nodes of the mesh were moved by {moved:.3g} since it was made: make it at its"
+                         f" place")
     return columns
 
 

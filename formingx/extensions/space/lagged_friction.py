@@ -83,15 +83,15 @@ class LaggedFriction(LaggedStick):
     def pressure_ahead(self, old: Touch) -> np.ndarray:
         """Return the pressure N_0 that limits friction in the step ahead, shape (n,), stress."""
         if self._ahead is None or self._ahead[0] is not old:
-            now, by = np.maximum(old.distance, 0.0), old.arrival - old.position
-            depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, by) if by.any() else now
+            now, change = np.maximum(old.distance, 0.0), old.arrival - old.position
+            depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, change) if change.any() else now
             self._ahead = old, self.k * np.clip(depth, _LEAST * now, _MOST * now)
         return self._ahead[1]
 
     def at_pressure(self, old: Touch, pressure: np.ndarray) -> np.ndarray:
         """Return `Touch.arrival`, shape (n, 3), for which `pressure_ahead` returns a pressure, shape (n,), stress."""
-        by = pressure / self.k - np.maximum(old.distance, 0.0)
-        return np.asarray(old.position + by[:, None] * self.tool.near(old.position).normal)
+        change = pressure / self.k - np.maximum(old.distance, 0.0)
+        return np.asarray(old.position + change[:, None] * self.tool.near(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:

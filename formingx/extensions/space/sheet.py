@@ -288,10 +288,10 @@ def _reflected(grid: Grid, name: str) -> Grid:
     if d.min() < -size < size < d.max() or np.count_nonzero(np.abs(d) < size) > len(line):
         raise InputError(f"sheet: reflected: boundary {name!r}: the sheet meets its line at other places too: must meet"
                          f" it at this boundary alone")
-    off = np.setdiff1d(np.arange(len(X)), line)
+    outside = np.setdiff1d(np.arange(len(X)), line)
     image = np.arange(len(X))
-    image[off] = len(X) + np.arange(len(off))
-    points = np.vstack([X, X[off] - 2 * d[off, None] * normal])
+    image[outside] = len(X) + np.arange(len(outside))
+    points = np.vstack([X, X[outside] - 2 * d[outside, None] * normal])
     cells = counter_clockwise(points, np.vstack([sheet, image[sheet]]))
     boundaries = {other: np.vstack([ends, image[ends]]) for other, ends in grid.boundaries.items() if other != name}
     return Grid(points, np.arange(1, len(points) + 1), {"sheet": cells}, boundaries)

@@ -70,24 +70,24 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     normal, n = np.zeros_like(wall.now), len(wall.now)
     each = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     np.add.at(normal, wall.triangles.ravel(), np.repeat(each, 3, axis=0))
-    for plane, there in zip(planes.planes, on):
-        normal[there, plane.axis] = 0.0
+    for plane, mask in zip(planes.planes, on):
+        normal[mask, plane.axis] = 0.0
     normal *= wall.at_nodes[:, None] / 2 / np.linalg.norm(normal, axis=1, keepdims=True)
     ends = np.concatenate([wall.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     _, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    rim = ends[(times[which.ravel()] == 1) & ~np.any([there[ends].all(1) for there in on] or [False], axis=0)]
+    rim = ends[(times[which.ravel()] == 1) & ~np.any([mask[ends].all(1) for mask in on] or [False], axis=0)]
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
                            np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
     triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])
     points, ratio = np.vstack([wall.now - normal, wall.now + normal]), np.tile(wall.to_nodes(wall.ratio), 2)
-    kept = [np.tile(there, 2) for there in on]
+    kept = [np.tile(mask, 2) for mask in on]
     for k, plane in enumerate(planes.planes):                # the image, which shares the nodes in the plane
         image, away = np.arange(len(points)), ~kept[k]
         image[away] = len(points) + np.arange(away.sum())
         unit = np.eye(3)[plane.axis]
         points = np.vstack([points, points[away] * (1 - 2 * unit) + 2 * plane.position * unit])
         triangles = np.vstack([triangles, image[triangles][:, ::-1]])
-        ratio, kept = np.append(ratio, ratio[away]), [np.append(there, there[away]) for there in kept]
+        ratio, kept = np.append(ratio, ratio[away]), [np.append(mask, mask[away]) for mask in kept]
     return points, triangles, ratio
 
 

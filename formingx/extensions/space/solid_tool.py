@@ -164,9 +164,9 @@ class Swept(SolidTool):
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2
             line = np.column_stack([np.full(2, r), ends])
             return line if self.along == "y" else line[:, ::-1]
-        off = r - (min(self.half) if self.kind == "box" else 0.0)
-        radius = max(self.corner + off, 0.0)
-        middle = np.array(self.half) + (off if self.kind == "box" else 0.0) - radius
+        offset = r - (min(self.half) if self.kind == "box" else 0.0)
+        radius = max(self.corner + offset, 0.0)
+        middle = np.array(self.half) + (offset if self.kind == "box" else 0.0) - radius
         middle = middle if self.kind == "box" else np.zeros(2)
         found = [np.column_stack([sx * middle[0] + radius * np.cos(turn + q),
                                   sy * middle[1] + radius * np.sin(turn + q)])
@@ -175,8 +175,8 @@ class Swept(SolidTool):
         return np.vstack([ring, ring[:1]])
 
     def __repr__(self) -> str:
-        more = f", half={self.half}, corner={self.corner:g}" if self.kind == "box" else ""
-        return f"{self.kind}({self.profile!r}{more})"
+        options = f", half={self.half}, corner={self.corner:g}" if self.kind == "box" else ""
+        return f"{self.kind}({self.profile!r}{options})"
 
 
 class Triangulated(SolidTool):

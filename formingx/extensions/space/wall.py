@@ -132,10 +132,10 @@ class WallInSpace(Sheet):
             ends.setdefault(b, []).append(a)
         found, length = [], 0.0
         while ends:
-            here: Any = next((e for e, others in ends.items() if len(others) == 1), next(iter(ends)))
+            edge: Any = next((e for e, others in ends.items() if len(others) == 1), next(iter(ends)))
             before = None
-            while here is not None:
-                i, j = here
+            while edge is not None:
+                i, j = edge
                 s = d[i] / (d[i] - d[j])
                 x, h = (v[i] + s * (v[j] - v[i]) for v in (self.now, self.at_nodes))
                 step = np.inf if before is None else float(np.linalg.norm(x - before))
@@ -143,8 +143,8 @@ class WallInSpace(Sheet):
                     length += 0.0 if before is None else step
                     found.append([length, *x, h])
                     before = x
-                after = ends.pop(here)
-                here = next((e for e in after if e in ends), None)
+                after = ends.pop(edge)
+                edge = next((e for e in after if e in ends), None)
         return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
 
     def printed(self, size: float) -> list[np.ndarray]:
