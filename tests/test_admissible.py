@@ -33,10 +33,6 @@ def displaced(problem, u):
     return Admissible(forms)
 
 
-def curve(X):
-    return 0.3 * X[0] * X[1] + 0.02 * X[0] ** 2, 0.1 * X[0] - 0.05 * X[1] ** 2 + 0.01 * X[0] ** 2
-
-
 @pytest.mark.parametrize("space", ["P1", "P1dg"])
 def test_values_are_those_of_the_deformation_gradient(space):
     """On curved elements, with bubbles that are not 0, at every point: those of UFL."""

@@ -336,8 +336,3 @@ def test_report(tmp_path):
     assert "data:image/png" in answer.best.report(tmp_path / "run.html").read_text()
     axes = answer.best.sensitivities("wall").plot()
     assert [label.get_text() for label in axes.get_yticklabels()] == answer.best.parameters.names
-
-
-def test_names_that_build_does_not_take_are_told_at_once():
-    with pytest.raises(fx.InputError, match=r"'x': build\(h, mu=0.1\) cannot be called with these: missing a"):
-        fx.Design(lambda h, mu=0.1: None, {"x": (1.0, 0.5, 2.0)})

@@ -71,11 +71,6 @@ def test_quantities_of_polymers(length, stress):
     assert before_run(sheet(loads=[fx.Gravity(1.05e-9, 9810.0)])) == []
 
 
-def test_a_density_is_in_grams():
-    with pytest.raises(fx.InputError, match="density = 1050.* g/cm3"):
-        fx.Units("mm", "MPa").mass(1000.0, 1050.0)
-
-
 @pytest.mark.parametrize("load, pressure, away", [
     ("bottom", 0.01, False), ("bottom", -0.01, True), ("top", 0.01, True), ("top", -0.01, False)])
 def test_a_pressure_that_points_away_from_its_mould(load, pressure, away, caplog):

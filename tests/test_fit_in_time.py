@@ -100,25 +100,6 @@ def test_result_is_admissible():
     assert found.material.equilibrium.parameters["c10"] >= 0
 
 
-@pytest.mark.parametrize("material, data, words", [
-    (fx.Viscoelastic, {"uniaxial": (L, L)}, "needs the time"),
-    (fx.Viscoelastic, [(L, L)], "number 1 is .*must be a TimedTest"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0])], "stress has the shape"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 0], [1, 2], [0, 1])], "no test lasts any time"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 0])], "no stress is given"),
-    (fx.Viscoelastic, [fx.TimedTest("uniaxial", [0, 1], [1, 2], [0, 1])], "2 points cannot fix the 3 constants"),
-    (fx.Viscoelastic, [fx.TimedTest("shear", [0, 1], [1, 2], [0, 1])], "'shear' is not known"),
-])
-def test_bad_input(material, data, words):
-    with pytest.raises(fx.InputError, match=words):
-        fx.fit(material, data)
-
-
-def test_rate_must_be_positive():
-    with pytest.raises(fx.InputError, match="rate = 0"):
-        fx.TimedTest.constant_rate("uniaxial", 0, L, L)
-
-
 @pytest.mark.parametrize("first", [0.05, 3.0])
 def test_a_stretch_that_is_held_was_put_on_at_time_0(first):
     """Rows of a relaxation test that begin later: fitted as if the step were there, G(0) was 12 % too low."""
@@ -171,21 +152,3 @@ def test_one_mode_leaves_the_share_of_the_invariants_open():
     l = np.exp(np.linspace(0.2, 2.0, 10))
     test = fx.TimedTest.constant_rate("uniaxial", 0.2, l, melt.constant_rate("uniaxial", 0.2, l))
     assert "alpha" in fx.fit(melt, [test]).undetermined
-
-
-@pytest.mark.parametrize("arguments, words", [
-    ((fx.KBKZ, []), "give a card with a spectrum and a damping"),
-    ((fx.KBKZ([(1.0, 1.0)]), []), "give a card with a spectrum and a damping"),
-], ids=lambda x: str(x)[:30])
-def test_a_melt_without_damping_cannot_be_fitted(arguments, words):
-    with pytest.raises(fx.InputError, match=words):
-        fx.fit(*arguments)
-
-
-@pytest.mark.parametrize("arguments, words", [
-    (([1.0, 2.0], [1.0], [1.0, 2.0]), "must be \\(n,\\)"),
-    (([1.0, -2.0], [1.0, 1.0], [1.0, 2.0]), "must be above 0"),
-])
-def test_bad_moduli(arguments, words):
-    with pytest.raises(fx.InputError, match=words):
-        fx.fit_spectrum(*arguments)

@@ -116,24 +116,6 @@ def small():
     return fx.mesh.disc(radius=5e-3, thickness=D, elements=(1, 1))
 
 
-@pytest.mark.parametrize("make, words", [
-    (lambda: fx.ThermalProperties(conductivity=-0.17, density=1, heat_capacity=1), "conductivity = -0.17"),
-    (lambda: fx.ThermalProperties(conductivity=1, density=0, heat_capacity=1), "density = 0"),
-    (lambda: fx.Convection("top", h=-1, air=20), "h = -1"),
-    (lambda: fx.Radiation("top", emissivity=1.2, heater=400), "emissivity = 1.2: must be from 0 to 1"),
-    (lambda: fx.Radiation("top", emissivity=fx.table({0: 0.5, 1: 1.1}), heater=400), "emissivity = 1.1"),
-    (lambda: fx.Radiation("top", emissivity=0.9, heater=400, view_factor=-0.1), "view_factor = -0.1"),
-    (lambda: fx.Absorption("top", flux=8000, coefficient=0), "coefficient = 0"),
-    (lambda: fx.ContactWithTool("top", conductance=-5, tool=20), "conductance = -5"),
-    (lambda: fx.ContactWithTool("top", conductance=5, tool="cold"), "tool = 'cold'"),
-    (lambda: fx.ConductingTool(thickness=0.02, conductivity=-1, heat_capacity=1, back=30), "conductivity = -1"),
-    (lambda: fx.ConductingTool(thickness=0.02, conductivity=1, heat_capacity=1, back=30, finest=0.1), "finest = 0.1"),
-])
-def test_laws_that_are_refused(make, words):
-    with pytest.raises(fx.InputError, match=words):
-        make()
-
-
 @pytest.mark.parametrize("changes, words", [
     ({"boundaries": [fx.Convection("side", h=1, air=20)]}, "boundary 'side' is not known; known: 'axis'"),
     ({"boundaries": [fx.Convection("top", h=1, air=-300)]}, "air = -300.0: must be at least -273.15"),

@@ -79,24 +79,6 @@ def test_tables_of_the_page(tmp_path):
     assert len(rows) == 4 * 4 + 6 + 7 and [line for line in rows if line not in page] == []
 
 
-@pytest.mark.parametrize("make, words", [
-    (lambda: fx.KBKZ([]), "at least one"),
-    (lambda: fx.KBKZ([(1.0, 0)]), "tau_1 = 0: must be greater than 0"),
-    (lambda: fx.KBKZ([(1.0,)]), "number 1 is"),
-    (lambda: fx.KBKZ(SPECTRUM, damping=3.0), "must be PSM"),
-    (lambda: fx.PSM(alpha=0, beta=0.1), "alpha = 0: must be greater than 0"),
-    (lambda: fx.PSM(alpha=1, beta=2), "beta = 2: must be from 0 to 1"),
-    (lambda: fx.Wagner(alpha=-1, beta=1), "alpha = -1: must be from 0 to 1"),
-    (lambda: fx.KBKZ(SPECTRUM).stress("shear", [1, 2], times=[0, 1]), "'shear' is not known"),
-    (lambda: fx.KBKZ(SPECTRUM).stress("uniaxial", [1, 2], times=[1, 0]), "times must not fall"),
-    (lambda: fx.KBKZ(SPECTRUM).stress("uniaxial", [1, -2]), "stretch = -2"),
-    (lambda: fx.KBKZ(SPECTRUM).constant_rate("uniaxial", 0, [2.0]), "rate = 0"),
-])
-def test_bad_input(make, words):
-    with pytest.raises(fx.InputError, match=words):
-        make()
-
-
 def test_soskey_and_winter_with_the_power_2_is_psm():
     I1, I2 = np.array([3.0, 5.0, 40.0]), np.array([3.0, 4.0, 12.0])
     for found, expected in zip(fx.SoskeyWinter(alpha=0.3, a=0.125, b=2.0).derivatives(I1, I2),

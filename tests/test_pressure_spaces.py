@@ -128,11 +128,6 @@ def test_arc_length_does_not_know_the_space():
     assert problem.forms.displacement_element.dim == 6 + bubble.dim
 
 
-def test_unknown_space():
-    with pytest.raises(fx.InputError, match="'P2' is not known; known: 'P0', 'P1', 'P1dg'"):
-        fx.MixedPressure(space="P2")
-
-
 SCRIPT = """
 import json
 import formingx as fx

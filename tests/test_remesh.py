@@ -121,14 +121,6 @@ def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
     assert first == failed[0] + 1 and path.last.measures["travel"] == pytest.approx(0.55)
 
 
-@pytest.mark.parametrize("options, message", [
-    ({"size": -1.0}, "Remesh: size = -1"), ({"size": 1.0, "corner": 2.0}, "corner = 2"),
-    ({"size": 1.0, "volume_ratio": (1.1, 1.5)}, "volume_ratio")])
-def test_wrong_sizes(options, message):
-    with pytest.raises(fx.InputError, match=message):
-        fx.Remesh(**options)
-
-
 def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
     """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
     import gmsh

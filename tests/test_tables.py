@@ -47,19 +47,6 @@ def test_table_as_an_expression_is_the_same_curve_and_its_slope():
     assert np.ptp(slope) < 1e-12 and value == pytest.approx(2.0 + slope[0] * (x - 130), rel=1e-12)
 
 
-def test_what_a_table_refuses():
-    curve = table(MODULUS)
-    with pytest.raises(fx.InputError, match="x = 129: must be from 130 to 170"):
-        curve([140.0, 129.0])
-    with pytest.raises(fx.InputError, match="temperature = 171"):
-        curve.check(171.0, "temperature")
-    with pytest.raises(fx.InputError, match="x = nan"):
-        curve(np.nan)
-    for points in ({1: 2}, [(1, 2), (2, 3)], {}, {1: 2, 2: np.inf}, {1: 2, "a": 3}):
-        with pytest.raises(fx.InputError, match="table"):
-            table(points)
-
-
 def test_wlf():
     shift = WLF(17.44, 51.6, 100.0)                          # the "universal" constants, at the glass temperature
     assert shift(100.0) == pytest.approx(1.0, rel=1e-14) and shift(shift.limits[0]) == pytest.approx(1e30, rel=1e-9)

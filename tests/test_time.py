@@ -264,9 +264,6 @@ def test_flow_ends_where_it_is_told():
 
 @pytest.mark.quick
 @pytest.mark.parametrize("make, words", [
-    (lambda: fx.Viscoelastic(RUBBER, branches=[]), "at least one"),
-    (lambda: fx.Viscoelastic(RUBBER, branches=[(0.5, 0.0)]), "tau_1 = 0.0: must be greater than 0"),
-    (lambda: fx.Viscoelastic(RUBBER, branches=[(-0.5, 1.0)]), "mu_1 = -0.5: must be greater than 0"),
     (lambda: Stage("a", control="air", until=fx.pressure(1), speed=0), "speed = 0: must be greater than 0"),
     (lambda: Stage("a", duration=0), "duration = 0: must be greater than 0"),
     (lambda: Stage("a", speed=1.0), "of what"),

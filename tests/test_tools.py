@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.tools.shapes import Arc, Line
 
 tools = fx.tools
 SHAPES = {
@@ -207,47 +206,6 @@ def test_gmsh_models(tmp_path, kind):
                                atol=1e-12)
     with pytest.raises(fx.InputError, match="curve 5 is neither a straight line nor a circular arc"):
         tools.read(file, [5])
-
-
-@pytest.mark.parametrize("build, message", [
-    (lambda: tools.cup(radius=1, depth=0.5, fillet=0.6), "too large for its corner"),
-    (lambda: tools.Tool([(0, 0), (2, 0), (2, 1), (1, -1)]), "crosses itself"),
-    (lambda: tools.Tool([(0, 0)]), "at least 2"),
-    (lambda: tools.Tool([(0, 0), (0, 0), (1, 0)]), "are the same"),
-    (lambda: tools.Tool([(0, 0), (1, 0), (1, 1)], fillets=[0, -1, 0]), "must not be negative"),
-    (lambda: tools.Tool([(1, 0), (2, 0), (2, 1)], fillets=[0.1, 0, 0]), "no corner to round"),
-    (lambda: tools.Tool([(0, 0), (1, 1)], fillets=0.1), "fillets = 0.1: the profile has no corner to round"),
-    (lambda: tools.Tool([(0, 0), (1, 0), (2, 0)], fillets=0.1), "fillets = 0.1: the profile has no corner to round"),
-    (lambda: tools.Tool([(0, 0), (1, 1)], fillets=-0.1), "fillets = -0.1: must not be negative"),
-    (lambda: tools.Tool([(0, 0), (1, 0)], fillets=[0.1, 0]), "point 0 = 0.1: the profile runs straight on"),
-    (lambda: tools.Tool([(0, 0), (1, 0), (2, 0), (2, 1)], fillets=[0, 0.1, 0.2, 0]), "point 1 = 0.1: .* straight on"),
-    (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.ones(2)), Line(np.zeros(2), np.ones(2))]),
-     "follow one another"),
-    (lambda: tools.Tool.of_pieces([]), "at least one piece"),
-    (lambda: tools.Tool.of_pieces(["line"]), "piece 0 = 'line': must be a Line or an Arc"),
-    (lambda: tools.Tool.of_pieces(3), "must be a list of Line"),
-    (lambda: tools.Tool.of_pieces([Line(np.zeros(2), np.array([np.nan, 1]))]), "piece 0: an end.*nan.*finite"),
-    (lambda: tools.Tool.of_pieces([Line(np.ones(2), np.ones(2))]), "has no length"),
-    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 0.0, 0.0, 1.0)]), "piece 0: radius = 0.0.*greater than 0"),
-    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), -1, 0.0, 1.0)]), "piece 0: radius = -1.*greater than 0"),
-    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, 0.0, 0.0)]), "sweep = 0.0"),
-    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, 0.0, 7.0)]), "at most a full turn"),
-    (lambda: tools.Tool.of_pieces([Arc(np.zeros(2), 1.0, np.inf, 1.0)]), "start = inf"),
-    (lambda: tools.Tool([(0, 0), (2, 0), (1, 0)]), "doubles back"),
-    (lambda: tools.Tool([(0, 0), (2, 0), (2, 1), (0.5, 1), (0.5, 0), (1.5, 0)]), "crosses itself|doubles back"),
-    (lambda: tools.Tool([(0, 0), (2, 0), (2, 1), (3, 1), (3, 0), (1, 0)]), "crosses itself|doubles back"),
-    (lambda: tools.Tool([(0, 0), ("1.0", 0)]), "'1.0': must be a number"),
-    (lambda: tools.plane("1.0"), "z = '1.0': must be a number"),
-    (lambda: tools.Tool(np.array(1.0)), "must be a list of points"),
-    (lambda: tools.cup(radius=1, depth=5, draft=20), "leaves no floor"),
-    (lambda: tools.cone(half_angle=90), "below 90"),
-    (lambda: tools.cone(half_angle=5e-324), "at least 0.01"),
-    (lambda: tools.clamp_ring(radius=1, width=1, fillet=0.2, height=0.3), "fillet"),
-    (lambda: tools.bottle(radius=1, height=1, neck=2, shoulder=1, neck_height=1), "below radius"),
-])
-def test_bad_profiles(build, message):
-    with pytest.raises(fx.InputError, match=message):
-        build()
 
 
 def test_bounds():

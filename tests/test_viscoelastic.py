@@ -25,10 +25,6 @@ def matrix(v):
     return np.array([[v[0], v[2], 0], [v[2], v[1], 0], [0, 0, v[3]]])
 
 
-def vector(A):
-    return np.array([A[0, 0], A[1, 1], A[0, 1], A[2, 2]])
-
-
 def isochoric(F):
     return np.linalg.det(F) ** (-2 / 3) * F.T @ F
 
@@ -386,27 +382,3 @@ def test_plot():
     axes = Viscoelastic(RUBBER, P0).plot(rates=(0.1, 10), unit="MPa")
     at_once, fast, slow, relaxed = (line.get_ydata()[-1] for line in axes.get_lines())
     assert at_once > fast > slow > relaxed and axes.get_ylabel() == "nominal stress (MPa)"
-
-
-@pytest.mark.parametrize("make, words", [
-    (lambda: Viscoelastic(RUBBER, []), "branches = .*must be at least one"),
-    (lambda: Viscoelastic(RUBBER, [(0.5, 0.0)]), "tau_1 = 0.0: must be greater than 0"),
-    (lambda: Viscoelastic(RUBBER, [(0.5, 1.0), (-1, 1)]), "mu_2 = -1.0: must be greater than 0"),
-    (lambda: Viscoelastic(RUBBER, [(0.5, 1.0, 2.0)]), "number 1 is .0.5, 1.0, 2.0.: must be .mu, tau."),
-    (lambda: Viscoelastic(RUBBER, 3), "must be a list of .mu, tau."),
-    (lambda: Viscoelastic("rubber", P0), "must be a material, or None"),
-    (lambda: Viscoelastic(Viscoelastic(RUBBER, P0), P0), "must not relax itself"),
-    (lambda: Viscoelastic(RUBBER, P0, order=3), "order 3 is not known"),
-    (lambda: Viscoelastic(RUBBER, P0, shift=3.0), "tau_1: shift = 3.0: must be WLF"),
-    (lambda: Viscoelastic(fx.Hyperelastic(lambda I1, I2, mu_1: mu_1 * (I1 - 3), mu_1=1.0), P0), "a constant 'mu_1'"),
-    (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, 2], times=[0]), "a time for each"),
-    (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, 2], times=[1, 0]), "times must not fall"),
-    (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, -2], times=[0, 1]), "point 1.*greater than 0"),
-    (lambda: Viscoelastic(RUBBER, P0).stress("uniaxial", [1, 2], times=[0, 1], between="time"), "'time' is not known"),
-    (lambda: Viscoelastic(RUBBER, P0).relaxation("uniaxial", 2, [-1]), "must not be negative"),
-    (lambda: Viscoelastic(RUBBER, P0).constant_rate("uniaxial", 0, [2]), "rate = 0: must be greater than 0"),
-    (lambda: Viscoelastic(RUBBER, P0).constant_rate("uniaxial", 1, [0.5, 2]), "all above or all below 1"),
-])
-def test_bad_input(make, words):
-    with pytest.raises(fx.InputError, match=words):
-        make()

@@ -101,12 +101,6 @@ def test_what_is_refused(friction, temperature, words):
         pushed(friction, temperature, travel=0.01)
 
 
-def test_a_tool_that_never_lets_go_has_no_such_friction():
-    tool = fx.tools.male(radius=0.4, height=1.0, base=-1.0, fillet=0.15)
-    with pytest.raises(fx.InputError, match="no Coulomb friction"):
-        fx.Contact("top", tool, RISING, separates=False)
-
-
 def test_a_melt_that_is_chilled_below_the_pole_of_its_shift_does_not_relax(caplog):
     """The WLF shift of docs/my_polymer.md is infinite at 90 C: below 103.7 C, where it is 1e30, it stays so."""
     shift = fx.WLF(8.9, 60.0, 150.0)
