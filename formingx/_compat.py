@@ -5,28 +5,30 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx
+import ffcx
 import ufl
 from dolfinx import fem, jit, la
 from dolfinx.fem import petsc as fem_petsc
-from ffcx.naming import compute_signature
 from mpi4py import MPI
 from ufl.classes import Label
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
+from . import _jit
+
 if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
     raise ImportError(f"formingx needs DOLFINx >= 0.9, this is {dolfinx.__version__}; './fx CMD' provides one")
 
-# The compiler waits for another process that compiles the same form; its own limit of 10 s is short for that.
+# DOLFINx's own compilation waits for another process with the same form; its limit of 10 s is short for that.
 JIT_OPTIONS = {"timeout": 120}
 
 _compiled: dict[str, Any] = {}
-"""Compiled forms and expressions of this process, by their signatures."""
+"""Compiled forms and expressions of this process, by their keys."""
 
 
 def compile_form(form: Any) -> Any:
     """Return a compiled form."""
-    return _looked_up_once(lambda: fem.form(form, jit_options=JIT_OPTIONS))
+    return _compiled_here(lambda: fem.form(form, jit_options=JIT_OPTIONS))
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
@@ -36,7 +38,7 @@ def compile_expression(expression: Any, points: Any) -> Any:
     would be compiled for every problem again.
     """
     numbered = map_expr_dag(_Numbered(), expression)
-    return _looked_up_once(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
+    return _compiled_here(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
 
 
 class _Numbered(MultiFunction):
@@ -50,16 +52,18 @@ class _Numbered(MultiFunction):
         return self._labels.setdefault(label, Label(len(self._labels)))
 
 
-def _looked_up_once(compiled: Any) -> Any:
-    """`compiled()`; what is asked for again is not looked for. The compiler lists a folder to find a form: so there are
-    16 of them."""
+def _compiled_here(compiled: Any) -> Any:
+    """Return `compiled()`, whose form or expression is compiled by `_jit`, once in a process."""
     compiler = jit.ffcx_jit
 
-    def once(comm: Any, what: Any, jit_options: dict[str, Any], **more: Any) -> Any:
-        key = compute_signature([what], "")
+    def once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any]) -> Any:
+        options, form_options = jit.get_options(jit_options), ffcx.get_options(form_compiler_options)
+        key = _jit.key(item, options, form_options)
         if not comm.allreduce(key in _compiled, op=MPI.LAND):    # ranks compile together, or none does
-            folder = jit.get_options(jit_options)["cache_dir"] / key[0]
-            _compiled[key] = compiler(comm, what, jit_options={**jit_options, "cache_dir": folder}, **more)
+            if _jit.supported(options):
+                _compiled.update(_jit.compile_together(comm, {key: item}, options, form_options))
+            else:
+                _compiled[key] = compiler(comm, item, form_compiler_options, jit_options)
         return _compiled[key]
     jit.ffcx_jit = once
     try:

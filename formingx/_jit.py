@@ -1,0 +1,203 @@
+"""Compilation of forms: FFCx writes C, one call of the compiler makes a shared library, which needs no Python.
+
+DOLFINx makes an extension module of Python for each form, by distutils, at three times the processor time; its machine
+code is the same. A library appears in the cache whole, under its final name: a build that is interrupted leaves nothing
+that another process waits for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import fcntl
+import functools
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sysconfig
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cffi
+import ffcx
+import ffcx.compiler
+import numpy as np
+import ufl
+from ffcx.codegeneration import get_include_path
+from ffcx.codegeneration import jit as ffcx_jit
+from ffcx.naming import compute_signature, expression_name, form_name
+
+
+def supported(jit_options: dict[str, Any]) -> bool:
+    """Return True if forms can be compiled here.
+
+    FFCx must have the interface of 0.9, a compiler must be there, and no option may ask for the build by distutils.
+    """
+    return (ffcx.__version__.startswith("0.9.") and _compiler() is not None
+            and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
+
+
+def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) -> str:
+    """Return the name of a form or of (an expression, its points), by all that its machine code depends on."""
+    return "form_" + compute_signature([item], f"{sorted(form_options.items())}{_command(jit_options)}{_program()}")
+
+
+def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
+                     ) -> dict[str, tuple[Any, Any, tuple]]:
+    """Compile forms and expressions (collective): one call of the compiler on rank 0 makes all that are not in the cache.
+
+    Args:
+        items: forms or (expression, points), by their `key`.
+        jit_options: options of the C compiler and of the cache; form_options: of FFCx.
+
+    Returns:
+        For each item the object of FFCx, a module with its `ffi`, and an empty (declaration, implementation).
+
+    Raises:
+        RuntimeError: the compiler failed, on all ranks.
+    """
+    folder, found, failure = Path(jit_options["cache_dir"]) / "formingx", {}, None
+    if comm.rank == 0:
+        try:
+            found = _opened(items, folder, form_options, jit_options)
+        except RuntimeError as error:
+            failure = str(error)
+    failure = comm.bcast(failure)
+    if failure is not None:
+        raise RuntimeError(failure)
+    if comm.rank != 0:                                  # another machine may not see the folder of rank 0
+        found = _opened(items, folder, form_options, jit_options)
+    return found
+
+
+def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
+            ) -> dict[str, Any]:
+    """Return the compiled objects by their keys; those without a library that can be loaded are built first."""
+    ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
+    found = {name: _loaded(ffi, name, item, folder) for name, item in items.items()}
+    if not all(found.values()):
+        folder = _writable(folder)
+        with _locked(folder, next(name for name, one in found.items() if not one)):
+            found = {name: one or _loaded(ffi, name, items[name], folder) for name, one in found.items()}
+            missing = {name: items[name] for name, one in found.items() if not one}
+            if missing:
+                _build(missing, folder, jit_options, form_options)
+        found |= {name: _loaded(ffi, name, item, folder) for name, item in missing.items()}
+        if not all(found.values()):
+            raise RuntimeError(f"forms have been compiled in {folder}, and cannot be loaded from there: is the folder on a"
+                               f" file system that forbids programs (noexec)? XDG_CACHE_HOME names another")
+    return found
+
+
+def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
+    """Return (object, module, code) of a library, or None if there is none, or none that can be loaded."""
+    kind, symbol = (("ufcx_form", form_name(item, 0, name)) if isinstance(item, ufl.Form) else
+                    ("ufcx_expression", expression_name(item, name)))
+    try:
+        library = ctypes.CDLL(str(folder / f"{name}.so"))
+        address = ctypes.addressof(ctypes.c_char.in_dll(library, symbol))
+    except (OSError, ValueError):
+        return None
+    return ffi.cast(f"{kind} *", address)[0], SimpleNamespace(ffi=ffi, library=library), (None, None)
+
+
+@functools.cache
+def _declarations(scalar: str) -> cffi.FFI:
+    """Return FFCx's structures; functions of complex numbers, which are never called from Python, take `void *`."""
+    text = (ffcx_jit.UFC_HEADER_DECL.format(scalar) + ffcx_jit.UFC_INTEGRAL_DECL + ffcx_jit.UFC_FORM_DECL
+            + ffcx_jit.UFC_EXPRESSION_DECL)
+    ffi = cffi.FFI()
+    ffi.cdef(re.sub(r"\b(float|double) _Complex\b", "void", text))
+    return ffi
+
+
+def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
+    """Make one library that holds all items, under the name of each."""
+    code = "\n".join(ffcx.compiler.compile_ufl_objects([item], prefix=name, options=form_options)[1]
+                     for name, item in items.items())
+    files = [folder / f"{name}.so" for name in items]
+    made, other = (folder / f"unfinished_{os.urandom(8).hex()}.so" for _ in range(2))
+    try:
+        compile_c([*_command(jit_options), "-o", str(made)], code)
+        for file in files[1:]:
+            try:
+                os.link(made, other)
+            except OSError:                                                    # a file system without links
+                shutil.copyfile(made, other)
+            os.replace(other, file)
+        os.replace(made, files[0])
+    finally:
+        made.unlink(missing_ok=True)
+        other.unlink(missing_ok=True)
+
+
+def compile_c(command: list[str], code: str) -> None:
+    """Run the compiler on C code.
+
+    Raises:
+        RuntimeError: it failed.
+    """
+    done = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"the C compiler failed, with status {done.returncode}: {shlex.join(command)}\n"
+                           f"{done.stderr[-2000:]}")
+
+
+def _command(jit_options: dict[str, Any]) -> list[str]:
+    """Return the call that compiles C of the standard input to a library, but for the library's name."""
+    flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), *shlex.split(os.environ.get("CFLAGS", "")),
+             "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
+    libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]
+    return [*(_compiler() or ()), *(flag for flag in flags if not flag.startswith("-W")), f"-I{get_include_path()}",
+            "-shared", "-x", "c", "-", *(f"-l{library}" for library in libraries)]
+
+
+@functools.cache
+def _compiler() -> tuple[str, ...] | None:
+    """Return the command of the C compiler as a tuple of words, or None if there is none."""
+    for command in (os.environ.get("CC"), sysconfig.get_config_var("CC"), "cc", "gcc", "clang"):
+        words = shlex.split(command or "")
+        if words and shutil.which(words[0]):
+            return tuple(words)
+    return None
+
+
+@functools.cache
+def _program() -> str:
+    """Return path, size and date of the compiler: another one makes another machine code."""
+    program = Path(shutil.which((_compiler() or ("cc",))[0]) or "").resolve()
+    status = program.stat()
+    return f"{program} {status.st_size} {status.st_mtime_ns}"
+
+
+def _writable(folder: Path) -> Path:
+    """Return a folder for libraries: the cache, or one of this process alone if the cache cannot be written to."""
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder if os.access(folder, os.W_OK) else Path(_own_folder().name)
+
+
+@functools.cache
+def _own_folder() -> tempfile.TemporaryDirectory:
+    return tempfile.TemporaryDirectory(prefix="formingx_")
+
+
+@contextlib.contextmanager
+def _locked(folder: Path, name: str) -> Iterator[None]:
+    """Let processes build a form one after the other: the second finds the library of the first.
+
+    The lock ends with its process. A file system without locks does without.
+    """
+    file = folder / f"{name}.lock"
+    with open(file, "w") as lock:
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            file.unlink(missing_ok=True)

@@ -1,0 +1,162 @@
+"""Forms are compiled by one call of the compiler; the libraries outlive interruptions and depend on the compiler."""
+
+import fcntl
+import shutil
+import threading
+
+import numpy as np
+import pytest
+import ufl
+from conftest import run_script
+from dolfinx import fem
+from mpi4py import MPI
+
+import formingx as fx
+from formingx import _compat, _jit
+
+
+@pytest.fixture
+def calls(tmp_path, monkeypatch):
+    """Calls of the compiler from now on; nothing has been compiled."""
+    made, compile_c = [], _jit.compile_c
+    monkeypatch.setattr(_jit, "compile_c", lambda command, code: made.append(code) or compile_c(command, code))
+    monkeypatch.setattr(_compat, "_compiled", {})
+    monkeypatch.setitem(_compat.JIT_OPTIONS, "cache_dir", tmp_path / "cache")
+    return made
+
+
+@pytest.fixture(scope="module")
+def domain():
+    return fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1), comm=MPI.COMM_SELF).domain
+
+
+def area(domain, power=0):
+    """The integral of r**power, 1 / (power + 1), compiled."""
+    return fem.assemble_scalar(_compat.compile_form(ufl.SpatialCoordinate(domain)[0] ** power * ufl.dx(domain)))
+
+
+def kept(folder):
+    return sorted(file.name for file in (folder / "cache" / "formingx").iterdir())
+
+
+def forget():
+    _compat._compiled.clear()
+
+
+def test_matrices_are_those_of_dolfinx(domain):
+    """To the last bit, of a tangent with powers and logarithms; an expression too."""
+    space = fem.functionspace(domain, ("Lagrange", 2, (2,)))
+    w, v = fem.Function(space), ufl.TestFunction(space)
+    w.interpolate(lambda x: 0.1 * np.sin(x[:2] + 1.0))
+    F = ufl.Identity(2) + ufl.grad(w)
+    energy = (ufl.tr(F.T * F) ** 1.3 - 2 * ufl.ln(ufl.det(F))) * ufl.SpatialCoordinate(domain)[0] * ufl.dx(domain)
+    tangent = ufl.derivative(ufl.derivative(energy, w, v), w, ufl.TrialFunction(space))
+    ours, theirs = _compat.compile_form(tangent), fem.form(tangent, jit_options=_compat.JIT_OPTIONS)
+    assert ours.module.library and not hasattr(theirs.module, "library")
+    assert np.array_equal(*(fem.assemble_matrix(form).data for form in (ours, theirs)))
+    points = np.array([[0.2, 0.3], [0.6, 0.1]])
+    both = (_compat.compile_expression(F, points), fem.Expression(F, points, jit_options=_compat.JIT_OPTIONS))
+    assert np.array_equal(*(one.eval(domain, np.arange(2, dtype=np.int32)) for one in both))
+
+
+def test_a_form_is_compiled_once(calls, tmp_path, domain):
+    for _ in range(2):
+        assert [area(domain), area(domain)] == pytest.approx([1.0, 1.0])
+        forget()
+    assert len(calls) == 1 and len(kept(tmp_path)) == 1
+
+
+def test_an_interruption_leaves_nothing_that_counts(calls, tmp_path, monkeypatch, domain):
+    """Neither a compiler that is stopped, nor a file that was written in part."""
+    def interrupted(command, code):
+        raise KeyboardInterrupt
+    with monkeypatch.context() as patch:
+        patch.setattr(_jit, "compile_c", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            area(domain)
+    assert kept(tmp_path) == []
+    area(domain)
+    (name,) = kept(tmp_path)
+    part = tmp_path / "other" / "formingx" / name             # elsewhere: a process loads a file only once
+    part.parent.mkdir(parents=True)
+    part.write_bytes((tmp_path / "cache" / "formingx" / name).read_bytes()[:100])
+    part.with_suffix(".lock").touch()
+    monkeypatch.setitem(_compat.JIT_OPTIONS, "cache_dir", tmp_path / "other")
+    forget()
+    assert area(domain) == pytest.approx(1.0)
+    assert len(calls) == 2 and list(part.parent.iterdir()) == [part]
+
+
+def test_a_cache_that_cannot_be_written_to(calls, tmp_path, monkeypatch, domain):
+    """Its libraries are used; others go to a folder of the process."""
+    area(domain)
+    before = kept(tmp_path)
+    forget()
+    monkeypatch.setattr(_jit.os, "access", lambda *_: False)
+    assert (area(domain), area(domain, 1)) == pytest.approx((1.0, 0.5))
+    forget()
+    assert area(domain, 1) == pytest.approx(0.5)
+    assert kept(tmp_path) == before and len(calls) == 2
+
+
+def test_flags_and_compilers_have_libraries_of_their_own(calls, tmp_path, monkeypatch, domain):
+    area(domain)
+    forget()
+    monkeypatch.setenv("CFLAGS", "-DNOTHING")
+    area(domain)
+    forget()
+    monkeypatch.setattr(_jit, "_program", lambda: "another compiler")
+    area(domain)
+    assert len(calls) == len(kept(tmp_path)) == 3
+
+
+def test_a_process_waits_for_another_with_the_same_form(calls, tmp_path, monkeypatch, domain):
+    area(domain)
+    (name,) = kept(tmp_path)
+    library = tmp_path / "other" / "formingx" / name
+    library.parent.mkdir(parents=True)
+    monkeypatch.setitem(_compat.JIT_OPTIONS, "cache_dir", tmp_path / "other")
+    forget()
+    with open(library.with_suffix(".lock"), "w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        waiting = threading.Thread(target=area, args=(domain,))
+        waiting.start()
+        waiting.join(0.2)
+        assert waiting.is_alive()
+        shutil.copyfile(tmp_path / "cache" / "formingx" / name, library)
+    waiting.join(60)
+    assert not waiting.is_alive() and len(calls) == 1
+
+
+def test_an_error_of_the_compiler_is_told(calls, tmp_path, monkeypatch, domain):
+    with monkeypatch.context() as patch:
+        patch.setenv("CFLAGS", "--no-such-flag")
+        with pytest.raises(RuntimeError, match=r"(?s)C compiler failed.*no-such-flag"):
+            area(domain)
+    assert area(domain) == pytest.approx(1.0) and len(kept(tmp_path)) == 1
+
+
+RANKS = """
+import tempfile
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+import formingx as fx
+from formingx import _compat, _jit
+comm, calls, compile_c, compiled = MPI.COMM_WORLD, [], _jit.compile_c, _compat._compiled
+_jit.compile_c = lambda command, code: calls.append(code) or compile_c(command, code)
+with tempfile.TemporaryDirectory() as folder:
+    _compat._compiled, _compat.JIT_OPTIONS["cache_dir"] = {}, comm.bcast(folder)
+    try:
+        domain = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 1)).domain
+        form = _compat.compile_form(ufl.SpatialCoordinate(domain)[0] * ufl.dx(domain))
+        print(comm.rank, len(calls), round(comm.allreduce(fem.assemble_scalar(form)), 12))
+    finally:
+        _jit.compile_c, _compat._compiled = compile_c, compiled
+        del _compat.JIT_OPTIONS["cache_dir"]
+    comm.Barrier()
+"""
+
+
+def test_one_rank_compiles():
+    assert sorted(run_script(RANKS, ranks=2).splitlines()) == ["0 1 0.5", "1 0 0.5"]
