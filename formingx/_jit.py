@@ -49,7 +49,7 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
-    """Compile forms and expressions (collective): one call of the compiler on rank 0 makes all that are not in the cache.
+    """Compile forms and expressions (collective): rank 0 builds all that the cache lacks by one call of the compiler.
 
     Args:
         items: forms or (expression, points), by their `key`.
@@ -89,8 +89,8 @@ def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], j
                 _build(missing, folder, jit_options, form_options)
         found |= {name: _loaded(ffi, name, item, folder) for name, item in missing.items()}
         if not all(found.values()):
-            raise RuntimeError(f"forms have been compiled in {folder}, and cannot be loaded from there: is the folder on a"
-                               f" file system that forbids programs (noexec)? XDG_CACHE_HOME names another")
+            raise RuntimeError(f"the compiled forms in {folder} cannot be loaded: if its file system forbids programs"
+                               " (noexec), set XDG_CACHE_HOME to another folder")
     return found
 
 

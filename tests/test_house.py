@@ -5,8 +5,8 @@ import ast
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
-ROOMS = ["errors", "ranks", "findings", "_jit", "_compat", "units", "io", "figures", "values", "mesh", "tools", "physics",
-         "materials", "scene", "forms", "contact", "problem", "measures", "solve", "results"]
+ROOMS = ["errors", "ranks", "findings", "_jit", "_compat", "units", "io", "figures", "values", "mesh", "tools",
+         "physics", "materials", "scene", "forms", "contact", "problem", "measures", "solve", "results"]
 # a room that is not listed is above them all
 EXTENSIONS = {"contact_events", "heat", "space", "stability", "design", "remeshing", "kbkz", "fits", "release",
               "compare", "study", "adapt"}
