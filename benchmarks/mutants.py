@@ -108,7 +108,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("solve/snap_through.py", "if self._goes_back(self._old, state) or was_passed(", "if False and was_passed(",
      "bottle"),
     ("solve/branches.py", "sense = -1 if curve.progress(last, state) < 0 else 1", "sense = 1", "stability"),
-    ("results/evaluate/verdict.py", "sunk: float = 0.15", "sunk: float = 0.45", "verdict"),
+    ("results/evaluate/admissibility.py", "penetration: float = 0.15", "penetration: float = 0.45", "verdict"),
     ("forms/material_terms.py", "(self._time_step / 2 if self._in_middle else 0)", "(0 if self._in_middle else 0)",
      "temperature"),
     ("extensions/contact_events/event_sequence.py", "share = np.linalg.lstsq(ahead, right, rcond=1e-10)[0]",

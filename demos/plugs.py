@@ -140,8 +140,8 @@ def shape_numbers(path, state, plug_radius, thickness) -> dict:
     """Stretches at the pole, least and largest wall of what lay under the plug at rest, hoop stretch outside it."""
     shape = path.profile(state)
     flat = shape.wall_ratio[shape.reference_radius <= plug_radius]
-    outside = shape.rest_top[:, 0] > plug_radius
-    hoop = shape.top[outside, 0] / shape.rest_top[outside, 0]
+    outside = shape.reference_top[:, 0] > plug_radius
+    hoop = shape.top[outside, 0] / shape.reference_top[outside, 0]
     return {
         "stretches_at_pole": pole_stretches(path, state, thickness),
         "flat_top_thickness_ratio": [float(flat.min()), float(flat.max())],

@@ -120,7 +120,7 @@ def test_filling_of_a_cup(formed):
 def test_contact_presses_as_the_air_does(formed):
     """On the flat floor the sheet passes on the pressure, at the axis too; none where there is a gap, no friction."""
     table = formed.contact()
-    flat = table.rest[:, 0] < 2.8
+    flat = table.reference_points[:, 0] < 2.8
     assert flat.sum() > 5 and table.pressure[flat] == pytest.approx(np.full(flat.sum(), 8.0), rel=5e-4)
     assert np.all(table.pressure[table.gap > 1e-3] == 0) and not table.friction.any()
 
@@ -138,8 +138,8 @@ def test_a_smooth_plate_presses_alike_everywhere(points):
     """sigma = 2 c10 (1/l - l^2), from the axis on."""
     path, l = compressed("none", points), 0.8
     table, exact = path.contact(), 2 * (1 / l - l**2)
-    assert table.pressure == pytest.approx(np.full(len(table.rest), exact), rel=2e-4)
-    assert table.points[:, 0] == pytest.approx(table.rest[:, 0] / np.sqrt(l), rel=1e-4, abs=1e-12)
+    assert table.pressure == pytest.approx(np.full(len(table.reference_points), exact), rel=2e-4)
+    assert table.points[:, 0] == pytest.approx(table.reference_points[:, 0] / np.sqrt(l), rel=1e-4, abs=1e-12)
     assert path["tool_force"][-1] == pytest.approx(exact * np.pi / l, rel=1e-4)
 
 

@@ -53,9 +53,9 @@ def test_table_is_that_of_contact_at_nodes():
         shown = Fields(path).of(path.last)["contact_pressure"]
         assert shown.max() == pytest.approx(tables[-1].pressure.max(), rel=1e-12) and np.mean(shown == 0) > 0.4
     nodes, gauss = tables
-    flat = gauss.rest[:, 0] < 5
+    flat = gauss.reference_points[:, 0] < 5
     assert flat.sum() > 25 and gauss.pressure[flat] == pytest.approx(np.full(flat.sum(), 8.0), rel=2e-3)
-    height = np.interp(gauss.rest[:, 0], nodes.rest[:, 0], nodes.points[:, 1])
+    height = np.interp(gauss.reference_points[:, 0], nodes.reference_points[:, 0], nodes.points[:, 1])
     assert height == pytest.approx(gauss.points[:, 1], abs=1e-2)
 
 

@@ -489,7 +489,9 @@ def test_report_of_a_warm_process(tmp_path, capsys):
         assert "lambda" not in text and ("volume of the part" in text) == (name == "one")
         chart = next(chart for chart in data["charts"] if chart["title"] == "Temperature over time")
         last = [trace["y"][-1] for trace in chart["traces"]]
-        T = path.temperature(np.vstack([path.profile().rest_bottom, path.profile().rest_top])).reshape(2, -1).mean(0)
+        profile = path.profile()
+        faces = np.vstack([profile.reference_bottom, profile.reference_top])
+        T = path.temperature(faces).reshape(2, -1).mean(0)
         assert last == pytest.approx([T.max(), T.mean(), T.min()], rel=1e-3) and T.min() < 95
         assert "temperature, C" in data["runs"][0]["sheet"]["fields"]
         assert next(chart for chart in data["charts"] if chart["title"] == "Force over time")["y"] == "force, N"

@@ -148,8 +148,9 @@ def test_books_that_are_off_are_said(caplog, monkeypatch):
     path = fx.trace(scene, until=fx.pole_height(2.0), progress=False)
     path.work()
     assert path.findings() == [] and caplog.text == ""
-    whole = ledger.Ledger._by_loads
-    monkeypatch.setattr(ledger.Ledger, "_by_loads", lambda *given: {k: 1.02 * v for k, v in whole(*given).items()})
+    whole = ledger.EnergyBalance._load_work
+    monkeypatch.setattr(ledger.EnergyBalance, "_load_work",
+                        lambda *given: {k: 1.02 * v for k, v in whole(*given).items()})
     for _ in range(2):
         path.work()
         said, = path.findings()

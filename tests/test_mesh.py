@@ -221,7 +221,7 @@ def test_opposite_points_of_a_wall():
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
     profile = fx.trace(scene, until=fx.pressure(1e-3), progress=False).profile()
     assert profile.original_thickness == pytest.approx(0.3, rel=1e-6)
-    np.testing.assert_allclose(profile.rest_top, mesh.line_of("outer"), atol=2e-4)
+    np.testing.assert_allclose(profile.reference_top, mesh.line_of("outer"), atol=2e-4)
     assert profile.reference_length[-1] == pytest.approx(4.0 + np.pi / 2 * 1.15, rel=1e-3)
 
 

@@ -208,7 +208,7 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     made = [s.kind for s in path.states].index("remesh")
     before, after = path.states[made - 1:made + 1]
     a, b = path.profile(before), path.profile(after)
-    assert np.array_equal(a.rest_top, b.rest_top) and np.array_equal(a.rest_bottom, b.rest_bottom)
+    assert np.array_equal(a.reference_top, b.reference_top) and np.array_equal(a.reference_bottom, b.reference_bottom)
     assert np.abs(a.top - b.top).max() < 0.01 and np.abs(a.bottom - b.bottom).max() < 0.01
     for name in ("u", "pole_height", "pole_stretch"):
         assert after.measures[name] == pytest.approx(before.measures[name], rel=0.01)

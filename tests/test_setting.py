@@ -127,7 +127,7 @@ def test_a_strip_of_two_layers_warps_as_timoshenko_says(heights, moduli):
                                 for name, a in zip(("lower", "upper"), expansions)},
                      supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)])
     profile = stand(scene).profile()
-    middle = profile.rest_bottom[:, 0] < length / 2
+    middle = profile.reference_bottom[:, 0] < length / 2
     r, z = profile.bottom[middle].T
     curvature = 2 * np.polyfit(r**2, z, 1)[0]
     m, n = heights[0] / heights[1], moduli[0] / moduli[1]

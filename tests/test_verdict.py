@@ -6,7 +6,7 @@ import pytest
 
 import formingx as fx
 from formingx import tools
-from formingx.results.evaluate.verdict import Verdict
+from formingx.results.evaluate.admissibility import AdmissibilityCheck
 
 
 def block(height=1.0, friction="none", elements=(6, 6), **contact):
@@ -107,7 +107,7 @@ def test_a_pole_that_is_thinner_than_nothing_is_no_state():
 
 def test_a_good_state_has_no_verdict():
     path = fx.trace(block(), until=fx.travel(0.3), progress=False)
-    verdict = Verdict(path.problem)
+    verdict = AdmissibilityCheck(path.problem)
     assert [verdict.of(state) for state in path.states] == [""] * len(path)
 
 

@@ -112,7 +112,7 @@ def test_a_melt_that_is_chilled_below_the_pole_of_its_shift_does_not_relax(caplo
                      heat=cooling, supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
     stage = fx.Stage("blow", control=scene.loads[0], until=fx.pressure(1e-3), duration=1.0)
     path = fx.Process(scene).run([stage], progress=False, accuracy="draft")
-    assert path.temperature(path.profile().rest_top).max() < 90
+    assert path.temperature(path.profile().reference_top).max() < 90
     known = "where the material does not relax any more"
     assert sum(known in found.text for found in path.findings()) == 1 == caplog.text.count(known)
     assert melt.constants()["tau_1"].clamped([20.0, 150.0]) == pytest.approx([1e28, 1e-2], rel=1e-9)
@@ -122,7 +122,7 @@ def test_a_face_that_leaves_the_table_while_it_cools_has_the_friction_of_its_end
     """It is said before the run, once, with the temperature of the air."""
     cooling = fx.Cooling(SHEET, [fx.Convection("top", h=1e5, air=20.0)], unit="C", tolerance=1.0)
     path = pushed(fx.table({140.0: 0.1, 150.0: 0.4}), 150.0, cooling)[1]
-    assert path.temperature(path.profile().rest_top).min() < 130
+    assert path.temperature(path.profile().reference_top).min() < 130
     known = "is known down to 140 degrees, and the tools and the air may bring it to 20: below 140 it is taken as"
     assert sum(known in found.text for found in path.findings()) == 1 == caplog.text.count(known)
     mu = path.problem.contacts[0].law.mu

@@ -44,9 +44,9 @@ class KeyNumbers:
 
     def _length(self, value: float) -> str:
         """Return a length as text with its unit."""
-        return self._said(value, self.units.length or "")
+        return self._with_unit(value, self.units.length or "")
 
-    def _said(self, value: float, unit: str) -> str:
+    def _with_unit(self, value: float, unit: str) -> str:
         """Return a value as text with five digits and its unit."""
         return f"{value:{'.5g' if abs(value) < 1e5 else '.0f'}} {unit}".rstrip()
 
@@ -83,20 +83,21 @@ class PartNumbers(KeyNumbers):
         """Label of the weight in `rows`."""
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
-    def _rows(self, where: str, more: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Return the rows common to all parts.
 
         Args:
             where: place of the minimum wall, as text.
-            more: further rows of this kind of part.
+            further: further rows of this kind of part.
         """
         rows = [("given for", self.basis)] if self.basis else []
-        rows += [(self.weight_label, self._said(self.weight, self.units.weight))] if self.weight is not None else []
+        if self.weight is not None:
+            rows += [(self.weight_label, self._with_unit(self.weight, self.units.weight))]
         rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),
                  ("mean wall", self._length(self.mean_wall)),
                  ("uniformity (minimum over mean wall)", f"{self.uniformity:.4g}"),
                  ("coefficient of variation of the wall", f"{self.variation:.4g}"),
                  ("areal draw ratio", f"{self.draw_ratio:.4g}"),
-                 ("volume", self._said(self.volume, self.units.volume)),
-                 ("area of the middle surface", self._said(self.area, self.units.area)), *more]
+                 ("volume", self._with_unit(self.volume, self.units.volume)),
+                 ("area of the middle surface", self._with_unit(self.area, self.units.area)), *further]
         return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])

@@ -20,12 +20,12 @@ from ..solve.path_following import Run
 from ..solve.record import Counts, Record, Segment
 from ..solve.state import State
 from ..solve.stepping import StepControl
+from .evaluate.admissibility import AdmissibilityCheck
 from .evaluate.profile import Profiles
 from .evaluate.stress import Stresses
-from .evaluate.verdict import Verdict
 
 _WRITTEN = 5e-6
-"""Largest difference of a number from the same one written with six digits, over the number."""
+"""Largest relative error of a number written with six digits."""
 
 
 class _View:
@@ -34,7 +34,7 @@ class _View:
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
         self.columns |= standard_columns.own(problem, columns, self.columns)
-        self.profiles, self.stresses, self.verdict = Profiles(problem), Stresses(problem), Verdict(problem)
+        self.profiles, self.stresses, self.verdict = Profiles(problem), Stresses(problem), AdmissibilityCheck(problem)
 
 
 class States:
@@ -54,7 +54,7 @@ class States:
                  views: dict[int, _View] | None = None):
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views = {} if views is None else views         # by id(problem)
-        self._view(record.segments[-1])                      # so that nothing is compiled on the way
+        self._view(record.segments[-1])                      # compiles the forms before the run
         record.on_state.append(self._measure)
         record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)
 
@@ -164,16 +164,16 @@ class States:
                 raise InputError(f"Path.state: stage {stage!r}: the run has no stages; its states by number are"
                                  f" Path.states[k]")
             known("Path.state: stage", stage, stages)
-        there = [state for state in self.states if stage in (None, state.stage)]
+        candidates = [state for state in self.states if stage in (None, state.stage)]
         if time is None:
-            return there[-1]
+            return candidates[-1]
         time = finite("Path.state: time", time)
-        first, last = there[0].time, there[-1].time
+        first, last = candidates[0].time, candidates[-1].time
         if not first <= time <= last:
             raise InputError(f"Path.state: time = {time:g}: {f'stage {stage!r}' if stage else 'the run'} goes from"
                              f" {first:g} to {last:g}")
-        exact = next((state for state in there if state.time == time), None)
-        return exact or self.at(process_time(time), after=there[0])
+        exact = next((state for state in candidates if state.time == time), None)
+        return exact or self.at(process_time(time), after=candidates[0])
 
     def at(self, target: Target, after: State | None = None) -> State:
         """Return the first state of the path that meets a target.
@@ -228,7 +228,7 @@ class States:
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
         """Return the state between two successive ones that meets a target, starting from the first."""
-        if segment.problem.has_history:                      # states between depend on the way to them
+        if segment.problem.has_history:                      # states between them depend on the history
             found = self._run_to(segment, left, right, target, bound)
         else:
             found = segment.curve.find(left, right, bound, target)
@@ -308,16 +308,18 @@ class States:
         """Return rows of columns between the states of one stage, from behind the first to the last."""
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns
-        at = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
-                                               for a, b in zip(states, states[1:])])])
+        arc_lengths = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
+                                                        for a, b in zip(states, states[1:])])])
         smooth = {c: known_columns[c] for c in columns if c in known_columns and known_columns[c].smooth}
-        through = {c: PchipInterpolator(at, [s.measures[c] for s in states]) for c in columns if c not in smooth}
+        interpolants = {c: PchipInterpolator(arc_lengths, [s.measures[c] for s in states])
+                        for c in columns if c not in smooth}
         rows = []
         with segment.problem.state_context(states[0]):
             for k, (a, b) in enumerate(zip(states, states[1:])):
                 for fraction in np.arange(1, points) / points:
-                    there, s = segment.curve.interpolate(a, b, fraction), at[k] + fraction * (at[k + 1] - at[k])
-                    rows.append([segment.curve.value(smooth[c], *there) if c in smooth else float(through[c](s))
+                    point = segment.curve.interpolate(a, b, fraction)
+                    s = arc_lengths[k] + fraction * (arc_lengths[k + 1] - arc_lengths[k])
+                    rows.append([segment.curve.value(smooth[c], *point) if c in smooth else float(interpolants[c](s))
                                  for c in columns])
                 rows.append([b.measures[c] for c in columns])
         return rows
@@ -356,12 +358,12 @@ class States:
         time.
         """
         before, state = states[-2:]
-        if not before.time < state.time:                     # as where a mesh is made again
+        if not before.time < state.time:                     # as after remeshing
             return 0.0
         column, time = self._view(segment).columns["dissipated_power"], (before.time + state.time) / 2
         if state.setting["rate"][-1]:
             x, control = segment.curve.interpolate(before, state, 0.5)
-        else:                                                # a flow, whose tangents are at a fixed time
+        else:                                                # a flow: its tangents hold at a fixed time
             past = [*predictor.before(states[:-1], time, predictor.CUBIC - 1), state]
             weights = predictor.weights(past, time)
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
@@ -402,7 +404,7 @@ class States:
         return type(self)(record, self._timed, self._own, self._views)
 
     @property
-    def admissibility(self) -> Verdict:
+    def admissibility(self) -> AdmissibilityCheck:
         """Admissibility check of the states of the last segment."""
         return self._view(self.segments[-1]).verdict
 

@@ -227,7 +227,7 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
     """Return (the mesh up to the line of nodes next to where it is trimmed, radius there now)."""
     kept = float(strips_within(wall, trim).sum())                                 # edges have two parts
     last = int(np.clip(round(kept / 2), 1, (len(wall.r) - 1) // 2))
-    middle = (wall.profile.rest_bottom + wall.profile.rest_top)[::2] / 2
+    middle = (wall.profile.reference_bottom + wall.profile.reference_top)[::2] / 2
     return part_along(mesh, middle, last), float(wall.r[2 * last])
 
 

@@ -79,7 +79,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
     if isinstance(scene.model, Membrane):
         return HoopResultants(*Tension(problem).hoop(state), problem.comm)
     profile = path.profile(state)
-    (names, between), bottom, top = between_layers(scene.mesh, profile), profile.rest_bottom, profile.rest_top
+    (names, between), bottom, top = between_layers(scene.mesh, profile), profile.reference_bottom, profile.reference_top
     lines = np.array([bottom, *between, top])[:, 1::2]                       # keep off the corners of the rim
     gauss, weights = np.polynomial.legendre.leggauss(_THROUGH)
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])

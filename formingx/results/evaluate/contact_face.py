@@ -20,7 +20,7 @@ class ContactTable(Sheet):
     """Contact quantities at the n contact points (nodes or Gauss points) of a face, ordered by reference radius.
 
     Attributes:
-        rest: reference positions (R, Z), shape (n, 2), length.
+        reference_points: reference positions (R, Z), shape (n, 2), length.
         points: deformed positions (r, z), shape (n, 2), length.
         gap: distance from the tool, negative inside it, shape (n,), length.
         pressure: contact pressure per deformed area, shape (n,), stress.
@@ -29,7 +29,7 @@ class ContactTable(Sheet):
         comm: MPI communicator of the run.
     """
 
-    rest: np.ndarray
+    reference_points: np.ndarray
     points: np.ndarray
     gap: np.ndarray
     pressure: np.ndarray
@@ -39,7 +39,8 @@ class ContactTable(Sheet):
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the files: {name: values, shape (n,)}."""
-        return {"reference_radius": self.rest[:, 0], "reference_height": self.rest[:, 1], "r": self.points[:, 0],
+        R, Z = self.reference_points.T
+        return {"reference_radius": R, "reference_height": Z, "r": self.points[:, 0],
                 "z": self.points[:, 1], "gap": self.gap, "contact_pressure": self.pressure,
                 "friction_stress": self.friction}
 
@@ -52,7 +53,7 @@ class ContactFace:
         contact: the `FaceContact`.
 
     Attributes:
-        rest: reference positions of the n contact points, ordered by R, then Z, shape (n, 2), length.
+        reference_points: reference positions of the n contact points, ordered by R, then Z, shape (n, 2), length.
         nodes: reference positions of the nodes of the face, edge by edge, shape (m, 2), length.
         nearest: number of the contact point nearest to each node, shape (m,).
     """
@@ -61,12 +62,12 @@ class ContactFace:
         from scipy.spatial import cKDTree
         self._path, self._contact = path, contact
         self._at_nodes = contact.contact.points == "nodes"
-        self.rest, _ = self._gathered(contact.points)
-        self.nodes = self._edge_points().reshape(-1, self.rest.shape[1])
-        self.nearest = cKDTree(self.rest).query(self.nodes)[1]
+        self.reference_points, _ = self._gathered(contact.points)
+        self.nodes = self._edge_points().reshape(-1, self.reference_points.shape[1])
+        self.nearest = cKDTree(self.reference_points).query(self.nodes)[1]
         if self._at_nodes:
-            self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # a ghost is there twice
-            self._rest_tangents = _tangents(self.rest[self._edges])
+            self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # ghost edges occur twice
+            self._reference_tangents = _tangents(self.reference_points[self._edges])
 
     def of(self, state: Any) -> ContactTable:
         """Return the contact quantities in a state; without pressure if the tool is inactive."""
@@ -75,7 +76,7 @@ class ContactFace:
             fields = problem.x.array_r.copy()
             moved = contact.points + path.problem.forms.length * contact.displacement(fields)
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
-            traction = np.zeros_like(self.rest)
+            traction = np.zeros_like(self.reference_points)
             if contact in path.problem.present:
                 _, traction = resultants.traction(contact, fields, state.control)
         _, values = self._gathered(moved, gap)
@@ -85,7 +86,7 @@ class ContactFace:
         else:
             _, ratio = self._gathered(contact.rule.area_ratio(fields))
         pressure, friction = (traction / ratio).T
-        return ContactTable(self.rest, points, gap, pressure, friction, path.problem.comm)
+        return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
         """Return deformed over reference area at the nodes, the mean of the adjacent edges.
@@ -96,8 +97,8 @@ class ContactFace:
         Returns:
             The area ratios, shape (n,).
         """
-        n, rest, now = len(points), self.rest[self._edges], points[self._edges]
-        ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._rest_tangents, axis=-1)
+        n, rest, now = len(points), self.reference_points[self._edges], points[self._edges]
+        ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._reference_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:
             axis = rest[..., 0] < 1e-9 * self._path.problem.forms.length
             ratio = ratio * np.where(axis, ratio, now[..., 0] / np.where(axis, 1.0, rest[..., 0]))

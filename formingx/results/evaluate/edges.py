@@ -10,7 +10,7 @@ from ...findings import Finding
 from ...ranks import gathered
 
 _TURN = 40.0
-"""Degrees by which a tool may turn from one contact point to the next before a run warns: see tests/test_edges.py."""
+"""Angle between tool normals at neighbouring contact points above which a run warns, degrees (tests/test_edges.py)."""
 
 
 class Edge(NamedTuple):
@@ -50,13 +50,14 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             normal = contact.contact.tool.nearest(x).normal
             rows = gathered(problem.comm, np.column_stack([contact.points, contact.rule.lengths, x, normal, slides]))
             X, length, x, normal, slides = np.split(rows[np.lexsort((rows[:, 1], rows[:, 0]))], [2, 3, 5, 7], axis=1)
-            by, turned = np.diff(x, axis=0), np.diff(normal, axis=0)
-            near = np.hypot(*np.diff(X, axis=0).T) < 1.5 * (length[1:] + length[:-1])[:, 0]
-            either = np.maximum(slides[1:], slides[:-1])[:, 0] > 0
-            convex = (turned * by).sum(1) < 0
-            turn = 2 * np.degrees(np.arcsin(np.minimum(np.hypot(*turned.T) / 2, 1.0))) * (near & either & convex)
+            steps, normal_change = np.diff(x, axis=0), np.diff(normal, axis=0)
+            adjacent = np.hypot(*np.diff(X, axis=0).T) < 1.5 * (length[1:] + length[:-1])[:, 0]
+            sliding = np.maximum(slides[1:], slides[:-1])[:, 0] > 0
+            convex = (normal_change * steps).sum(1) < 0
+            turn = 2 * np.degrees(np.arcsin(np.minimum(np.hypot(*normal_change.T) / 2, 1.0)))
+            turn *= adjacent & sliding & convex
             for k in np.argsort(turn)[-1:]:
-                r, z = x[k] + by[k] / 2 + contact.travelled(state.control)
+                r, z = x[k] + steps[k] / 2 + contact.travelled(state.control)
                 found.append(Edge(float(turn[k]), contact.contact.name or contact.contact.on, (float(r), float(z))))
     return max((edge for edge in found if edge.turn > 0), default=None)
 

@@ -66,7 +66,7 @@ class Part(PartNumbers):
         along, rest = self.min_wall_reference
         where = (f"height {self._length(self.min_wall_height)}, r = {self._length(self.min_wall_at[0])}, from {along} ="
                  f" {self._length(rest)}")
-        return self._rows(where, [("capacity", self._said(self.capacity, self.units.volume)), *(
+        return self._rows(where, [("capacity", self._with_unit(self.capacity, self.units.volume)), *(
             (f"wall at height {self._length(h)}", self._length(w)) for h, w in self.walls.items())])
 
 
@@ -91,15 +91,15 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     units = units if axisymmetric else units.per_depth()
     strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
     middle = _surface(fine(profile.middle), axisymmetric)
-    rest = _surface(fine((profile.rest_bottom + profile.rest_top) / 2), axisymmetric)
-    at_rest = _strips(fine(profile.rest_bottom), fine(profile.rest_top), axisymmetric)
+    rest = _surface(fine((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
+    at_rest = _strips(fine(profile.reference_bottom), fine(profile.reference_top), axisymmetric)
     inside = strips_within(wall, trim)
     volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, rest, at_rest))
     kept = [float((v * inside).sum()) for v in (volume, area, *before)]
     reached = np.append(inside > 0, False) | np.append(False, inside == 1)
     reached[0] = True
     k = int(np.argmin(np.where(reached, wall.wall, np.inf)))
-    along = int(np.argmax(np.ptp(profile.rest_bottom, axis=0)))
+    along = int(np.argmax(np.ptp(profile.reference_bottom, axis=0)))
     mean = kept[0] / kept[1]
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
     average = (of_strip * area * inside).sum() / kept[1]
@@ -109,7 +109,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     return Part(images * kept[0], images * kept[1], kept[1] / kept[2], mean, float(wall.wall[k]),
                 float(wall.reference_radius[k]),
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
-                ("RZ"[along], float(profile.rest_bottom[k, along])), float(wall.wall[k] / mean),
+                ("RZ"[along], float(profile.reference_bottom[k, along])), float(wall.wall[k] / mean),
                 float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
                 images * _content(wall, inside, axisymmetric), basis, units)
 

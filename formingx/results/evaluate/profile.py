@@ -21,8 +21,8 @@ class Profile:
     For the wall of a parison or a sphere, the bottom is the inner face and the top the outer face.
 
     Attributes:
-        rest_bottom: reference positions (R, Z) on the bottom face, shape (n, 2), length.
-        rest_top: reference positions (R, Z) opposite them on the top face, shape (n, 2), length.
+        reference_bottom: reference positions (R, Z) on the bottom face, shape (n, 2), length.
+        reference_top: reference positions (R, Z) opposite them on the top face, shape (n, 2), length.
         bottom: deformed positions (r, z) of the bottom points, shape (n, 2), length.
         top: deformed positions (r, z) of the top points, shape (n, 2), length.
 
@@ -31,25 +31,25 @@ class Profile:
     [0.059, 0.218]
     """
 
-    rest_bottom: np.ndarray
-    rest_top: np.ndarray
+    reference_bottom: np.ndarray
+    reference_top: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
 
     @property
     def reference_radius(self) -> np.ndarray:
         """Reference radius R on the bottom face, shape (n,), length."""
-        return self.rest_bottom[:, 0]
+        return self.reference_bottom[:, 0]
 
     @property
     def reference_length(self) -> np.ndarray:
         """Arc length of the reference middle line from the axis, shape (n,), length; R for a flat sheet."""
-        return _length_along((self.rest_bottom + self.rest_top) / 2)
+        return _length_along((self.reference_bottom + self.reference_top) / 2)
 
     @property
     def original_thickness(self) -> np.ndarray:
         """Reference distance between the two points, shape (n,), length."""
-        return np.hypot(*(self.rest_top - self.rest_bottom).T)
+        return np.hypot(*(self.reference_top - self.reference_bottom).T)
 
     @property
     def thickness(self) -> np.ndarray:

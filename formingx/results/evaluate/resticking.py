@@ -13,10 +13,10 @@ from ...findings import Finding
 from ...ranks import gathered
 
 _WALL = 3e-3
-"""Change of the wall, over the wall, that steps may cause without a finding."""
+"""Relative change of the wall by the step lengths above which there is a finding."""
 
 _LARGE = 0.1
-"""Change of the wall from which the finding gives no size, since neighbours move, too."""
+"""Relative change of the wall from which the finding gives no number, because neighbouring points move, too."""
 
 
 class Resticking(NamedTuple):

@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...findings import Finding
 
 _WALL = 0.05
-"""Change of the wall in one jump, over the wall, above which walls behind it are uncertain."""
+"""Relative change of the wall in one jump above which later walls are uncertain."""
 
 
 class Snap(NamedTuple):

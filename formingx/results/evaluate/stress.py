@@ -200,8 +200,8 @@ class Stresses:
         """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
-            forms, there = self.problem.forms, self.problem.followed(points)
-            before = points.copy(), locate(forms.domain, there, forms.length, self.cells[layer], f"layer {layer!r}")
+            forms, positions = self.problem.forms, self.problem.followed(points)
+            before = points.copy(), locate(forms.domain, positions, forms.length, self.cells[layer], f"layer {layer!r}")
             self._located[layer] = before
         return before[1]
 
@@ -289,7 +289,7 @@ class Stresses:
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
         if number not in self._raw:
             parts = self._parts(*forms.bodies[number])
-            metadata = parts[-1][1]                       # where the volume is kept
+            metadata = parts[-1][1]                       # rule of the volume term
             if "quadrature_points" in metadata:
                 points, weights = metadata["quadrature_points"], metadata["quadrature_weights"]
             else:
@@ -320,7 +320,7 @@ class Stresses:
     def _prepare(self) -> None:
         """Create spaces, forms and the mass matrix of the projection."""
         problem, forms, mesh = self.problem, self.problem.forms, self.problem.scene.mesh
-        bodies, domain = forms.bodies, forms.domain            # a membrane has none, and says so
+        bodies, domain = forms.bodies, forms.domain            # raises an error for a membrane
         self.cells = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
         self.element = basix.ufl.element("Lagrange", domain.basix_cell(), 1)
         self.space = fem.functionspace(domain, basix.ufl.element("Lagrange", domain.basix_cell(), 1,

@@ -77,8 +77,8 @@ class StressPeak(NamedTuple):
             error: largest error in each cell, shape (n,), stress.
         """
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
-        there = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
-        return cls(float(sigma[top]), at[top], float(error[there].max()), float(sigma[worst]), at[worst],
+        same_corner = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
+        return cls(float(sigma[top]), at[top], float(error[same_corner].max()), float(sigma[worst]), at[worst],
                    float(error[worst]))
 
     @property

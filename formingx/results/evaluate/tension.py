@@ -18,7 +18,7 @@ from ...physics.models import Membrane
 from ...ranks import gathered
 
 _COMPRESSED = 1e-3
-"""Compressive resultant over shear modulus times thickness above which a membrane has no state."""
+"""Compressive resultant over shear modulus times thickness above which the state of a membrane is invalid."""
 
 
 class Resultant(NamedTuple):

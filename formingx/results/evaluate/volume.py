@@ -10,11 +10,10 @@ from ...findings import Finding
 from ...physics.supports import Clamped
 
 BOUND = 5e-3
-"""Root mean square of J - 1 above which a report warns, and above four times which a run does: elements have
-other volumes, though the mass is kept."""
+"""Root mean square of J - 1 above which a report warns; a run warns above four times this value."""
 
 _NEAR = 2.0
-"""Lengths of a clamped face from it, within which its singular corner is felt."""
+"""Distance from a clamped face, over its length, within which the singular corner affects J."""
 
 _FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""

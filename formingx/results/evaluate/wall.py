@@ -113,9 +113,9 @@ class Walls:
             if self._lines is None:
                 names, between = between_layers(path.problem.scene.mesh, profile)
                 self._lines = names, probe(path.problem, between.reshape(-1, between.shape[-1]))
-            names, there = self._lines
+            names, material_lines = self._lines
             with path.problem.state_context(state) as problem:
-                deformed = there.points + there.displacement(problem.x)
+                deformed = material_lines.points + material_lines.displacement(problem.x)
             lines = [profile.bottom, *deformed.reshape(len(names) - 1, -1, deformed.shape[-1]), profile.top]
             lengths = np.array([np.hypot(*(b - a).T) for a, b in zip(lines, lines[1:])])
             shares = dict(zip(names, lengths / lengths.sum(0), strict=True))
@@ -137,10 +137,10 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
         InputError: the layers do not lie above each other.
     """
     if len(mesh.layers) == 1:
-        return list(mesh.layers), np.zeros((0, *profile.rest_bottom.shape))
+        return list(mesh.layers), np.zeros((0, *profile.reference_bottom.shape))
     edges = _interfaces(mesh)
-    across = profile.rest_top - profile.rest_bottom
-    found = {pair: _crossing(profile.rest_bottom, across, lines) for pair, lines in edges.items()}
+    across = profile.reference_top - profile.reference_bottom
+    found = {pair: _crossing(profile.reference_bottom, across, lines) for pair, lines in edges.items()}
     missing = [pair for pair, part in found.items() if not np.all(np.isfinite(part))]
     if missing or len(found) != len(mesh.layers) - 1:
         raise InputError(f"wall: the layers {', '.join(map(repr, mesh.layers))} do not lie one upon another from the"
@@ -151,7 +151,7 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
     names = [first]
     for pair in order:
         names.append(next(name for name in pair if name != names[-1]))
-    return names, np.array([profile.rest_bottom + found[pair][:, None] * across for pair in order])
+    return names, np.array([profile.reference_bottom + found[pair][:, None] * across for pair in order])
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
@@ -187,8 +187,8 @@ def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.n
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (from_start[..., 0] * along[:, 1] - from_start[..., 1] * along[:, 0]) / det
         t = (from_start[..., 0] * across[:, None, 1] - from_start[..., 1] * across[:, None, 0]) / det
-    near = 1e-6
-    s = np.where((t >= -near) & (t <= 1 + near) & (s >= -near) & (s <= 1 + near), s, np.inf).min(1)
+    tolerance = 1e-6
+    s = np.where((t >= -tolerance) & (t <= 1 + tolerance) & (s >= -tolerance) & (s <= 1 + tolerance), s, np.inf).min(1)
     return np.where(np.isfinite(s), s, np.nan)
 
 
@@ -196,4 +196,4 @@ def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
     """Return the mean reference distance of a layer's nodes from the bottom face, to order two layers."""
     cells = mesh.cells.find(mesh.layers[layer])
     points = gathered(mesh.comm, of_cells(mesh.domain, cells))
-    return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.rest_bottom).mean())
+    return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.reference_bottom).mean())

@@ -27,12 +27,12 @@ from ...solve.newton import Failure
 
 _LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
-_FOOT = 0.06           # of half the width of the ramp: points nearer to its outer edge count as at the edge
-_SMALL = 1e-5          # of the arc length of a state: half of a difference quotient
-_CLOSED = 2e-4         # of the largest energy: allowed imbalance of a step
-_PROMISED = 5e-3       # of the largest part of a balance: allowed imbalance of a run
-_HALVINGS = 6          # of a step, at most
-_PARTS = 0.5, 0.35, 0.65   # of a step at which it is halved
+_RAMP_EDGE = 0.06           # distance from the outer edge of the contact ramp, over its half width, that counts as 0
+_SMALL = 1e-5          # half of a difference quotient, over the arc length of a state
+_STEP_IMBALANCE = 2e-4         # allowed imbalance of a step over the largest energy
+_RUN_IMBALANCE = 5e-3       # allowed imbalance of a run over the largest entry
+_HALVINGS = 6          # largest number of halvings of a step
+_SPLITS = 0.5, 0.35, 0.65   # positions in a step at which it is split
 
 
 class _Line(NamedTuple):
@@ -53,16 +53,16 @@ class _Line(NamedTuple):
         return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
 
 
-def _through(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
+def _interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
     """Return the polynomial from a to b with the given slopes at its ends: cubic, parabola or straight line."""
-    by = b - a
+    change = b - a
     if start is None and end is None:
-        return _Line((a, by))
+        return _Line((a, change))
     if end is None:
-        return _Line((a, start, by - start))
+        return _Line((a, start, change - start))
     if start is None:
-        return _Line((a, 2 * by - end, end - by))
-    return _Line((a, start, 3 * by - 2 * start - end, start + end - 2 * by))
+        return _Line((a, 2 * change - end, end - change))
+    return _Line((a, start, 3 * change - 2 * start - end, start + end - 2 * change))
 
 
 def _integral(f: _Line, y: _Line) -> float:
@@ -77,16 +77,16 @@ class _Reaction(NamedTuple):
         force: force along the travel.
         slope: derivative of the force by arc length.
         travel: travel, length.
-        by_arc: derivative of the travel by arc length.
+        travel_slope: derivative of the travel by arc length.
     """
 
     force: float
     slope: float
     travel: float
-    by_arc: float
+    travel_slope: float
 
 
-class Ledger:
+class EnergyBalance:
     """Energy balance of the states of one problem, for the whole part.
 
     Args:
@@ -98,7 +98,7 @@ class Ledger:
         problem, scene = segment.problem, segment.problem.scene
         forms = problem.forms
         self._energy = forms.stress * forms.volume
-        self._loads = [(_called(scene, load), forms.compile(work))
+        self._loads = [(_entry_name(scene, load), forms.compile(work))
                        for load, work in zip(scene.loads, forms.load_works, strict=True)]
         self._driven = [(i, item) for i, item in enumerate(scene.items)
                         if any(item is d for d in scene.drivable) and item not in scene.loads]
@@ -108,23 +108,24 @@ class Ledger:
     def rows(self) -> dict[str, np.ndarray]:
         """Return {entry: energy added from the previous state to each state, shape (states,)}."""
         pairs = list(zip(self._states, self._states[1:]))
-        found = [self._between(a, b) for a, b in pairs]
+        found = [self._step_energies(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
         rows: list[dict[str, float]] = [{}]
-        rows += [row if abs(_left(row, a, b)) <= _CLOSED * scale else self._halved(a, b, row, _CLOSED * scale)
+        limit = _STEP_IMBALANCE * scale
+        rows += [row if abs(_imbalance(row, a, b)) <= limit else self._refined(a, b, row, limit)
                  for (a, b), row in zip(pairs, found)]
         names = dict.fromkeys(name for row in rows for name in row)
         return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
 
-    def _halved(self, a: Any, b: Any, whole: dict[str, float], small: float,
+    def _refined(self, a: Any, b: Any, whole: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
         """Return the energies of a step, computed through states between its ends; `whole` is the first estimate."""
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return whole
-        halves = [(start, end, self._between(start, end)) for start, end in ((a, middle), (middle, b))]
+        halves = [(start, end, self._step_energies(start, end)) for start, end in ((a, middle), (middle, b))]
         if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(whole))) > small:
-            halves = [(start, end, self._halved(start, end, row, small, times - 1)) for start, end, row in halves]
+            halves = [(start, end, self._refined(start, end, row, small, times - 1)) for start, end, row in halves]
         (*_, found), (*_, rest) = halves
         return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
 
@@ -134,14 +135,14 @@ class Ledger:
         if not h:
             return None
         line = [replace(s, direction=(b.x - a.x) / h, slope=(b.control - a.control) / h) for s in (a, b)]
-        for part, (start, end) in itertools.product(_PARTS, [line] if self._flows(a, b) else [(a, b), line]):
+        for part, (start, end) in itertools.product(_SPLITS, [line] if self._flows(a, b) else [(a, b), line]):
             with problem.state_context(a):
                 if self._flows(a, b):
                     problem.clock = a.time + part * (b.time - a.time)
                 problem.limit.prepare(Way(a.x, a.control, start.direction, start.slope, part * h))
                 try:
                     found = curve.inside(start, end, part)
-                except Failure:                             # where contact does not settle, it may elsewhere
+                except Failure:                             # the contact iteration may converge elsewhere
                     continue
                 finally:
                     curve.spent()
@@ -155,44 +156,44 @@ class Ledger:
         """Return True for a step in which the process time is independent of the control."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
-    def _between(self, a: Any, b: Any) -> dict[str, float]:
+    def _step_energies(self, a: Any, b: Any) -> dict[str, float]:
         """Return the energies added in a step."""
         images = self._problem.scene.symmetry_factor
-        found = {name: images * value for name, value in self._of_body(a, b).items()}
+        found = {name: images * value for name, value in self._body_energies(a, b).items()}
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
-    def _of_body(self, a: Any, b: Any) -> dict[str, float]:
+    def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
         """Return the energies added in a step to the body as modelled, without losses of jumps."""
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
         if self._problem.scene.heat is not None:
-            found["heat"] = self._warmed(a, b)
+            found["heat"] = self._heat(a, b)
         if any(c.law.pulls for c in self._problem.contacts):
             found["bonds"] = self._bonds(b) - self._bonds(a)
-        if a.setting != b.setting:                          # the same body, seen under another setting
+        if a.setting != b.setting:                          # a new stage: the body does not move
             if self._problem.forms.elastic_supports:
                 found["change"] = self._energy_at(b) - self._energy_at(a)
             if "bonds" in found:                            # an inactive tool releases its bonds
                 found["change"] = found.get("change", 0.0) + found["bonds"]
             return found
-        straight = b.kind == "jump" or self._flows(a, b)    # no tangents of the way
+        straight = b.kind == "jump" or self._flows(a, b)    # the path has no tangents
         h = self._curve.distance(a, b)
-        # no tangent where a tool touches the body from the start, as its force has a kink there
-        start = None if straight or a.kind == "start" and self._kinked(a) else h
+        # a tool that touches the body from the start has a kink in its force: no tangent
+        start = None if straight or a.kind == "start" and self._at_ramp_edge(a) else h
         end = None if straight else h
-        x = _through(a.x, b.x, start and h * a.direction, end and h * b.direction)
-        control = _through(a.control, b.control, start and h * a.slope, end and h * b.slope)
-        found |= self._by_loads(a, x, control)
+        x = _interpolate(a.x, b.x, start and h * a.direction, end and h * b.direction)
+        control = _interpolate(a.control, b.control, start and h * a.slope, end and h * b.slope)
+        found |= self._load_work(a, x, control)
         after = self._reactions(b)
-        end = None if end is None or after and self._kinked(b) else h
+        end = None if end is None or after and self._at_ramp_edge(b) else h
         for name, before in self._reactions(a).items():
             (f, df, y, dy), (g, dg, z, dz) = before, after[name]
-            force = _through(f, g, start and h * df, end and h * dg)
-            found[name] = _integral(force, _through(y, z, start and h * dy, end and h * dz))
+            force = _interpolate(f, g, start and h * df, end and h * dg)
+            found[name] = _integral(force, _interpolate(y, z, start and h * dy, end and h * dz))
         return found
 
-    def _by_loads(self, a: Any, x: _Line, control: _Line) -> dict[str, float]:
+    def _load_work(self, a: Any, x: _Line, control: _Line) -> dict[str, float]:
         """Return the work of loads, and of fading unbalanced forces, along a line from a state."""
         problem = self._problem
         names = [name for name, _ in self._loads]
@@ -200,22 +201,22 @@ class Ledger:
         with problem.state_context(a):
             n, fading = problem.n_owned, problem.fading_forces
             for s, w in zip(*_GAUSS):
-                by = x.slope(s)[:n]
+                rate = x.slope(s)[:n]
                 problem.look_at(x.at(s), control.at(s))
                 for name, form in self._loads:
-                    found[name] += w * self._sum(problem.assemble(form) * by)
+                    found[name] += w * self._sum(problem.assemble(form) * rate)
                 if fading is not None:
-                    left = (1 - control.at(s)) * self._energy * fading
-                    found["change"] = found.get("change", 0.0) + w * self._sum(left * by)
+                    unbalanced = (1 - control.at(s)) * self._energy * fading
+                    found["change"] = found.get("change", 0.0) + w * self._sum(unbalanced * rate)
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
         """Return the reactions of driven supports and tools in a state; cached."""
         if id(state) not in self._ends:
-            self._ends[id(state)] = state, self._found(state) if self._driven else {}
+            self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]
 
-    def _found(self, state: Any) -> dict[str, _Reaction]:
+    def _compute_reactions(self, state: Any) -> dict[str, _Reaction]:
         """Return the reactions of driven supports and tools in a state."""
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
@@ -227,7 +228,7 @@ class Ledger:
                              for sign in (1, -1))
             change = scale * (ahead - behind)[:n] / (2 * e)
             free = change.copy()
-            free[at.held] = 0                               # what supports do
+            free[at.held] = 0                               # constrained unknowns
             for i, item in self._driven:
                 setting = at.setting
                 travel = forms.length * setting.amplitude(i, state.control)
@@ -244,7 +245,7 @@ class Ledger:
                 else:
                     force = -at.reaction(i, at.x, state.control)
                     slope = self._sum(change[at.driven_unknowns(i)])
-                found[_called(scene, item)] = _Reaction(force, slope, travel, by_arc)
+                found[_entry_name(scene, item)] = _Reaction(force, slope, travel, by_arc)
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
@@ -255,12 +256,12 @@ class Ledger:
         dofs = np.unique(dofs.reshape(-1, problem.scene.kinematics.components), axis=0)
         return dofs[dofs[:, 0] < problem.n_owned]
 
-    def _kinked(self, state: Any) -> bool:
+    def _at_ramp_edge(self, state: Any) -> bool:
         """Return True if a contact point lies at the gap at which the tool begins to resist."""
-        with self._problem.state_context(state) as at:
-            x, control = state.x[: at.n_owned], state.control
-            return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _FOOT)
-                              for c in at.present]) > 0
+        with self._problem.state_context(state) as problem:
+            x, control = state.x[: problem.n_owned], state.control
+            return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _RAMP_EDGE)
+                              for c in problem.present]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy dissipated by friction: mean traction times inelastic slip of the closed points."""
@@ -273,16 +274,16 @@ class Ledger:
                 before[c] = c.positions(a.x[: problem.n_owned], a.control), c.touch, _friction_of(c, a, problem)
         with problem.state_context(b):
             for c, (x, touch, T) in before.items():
-                slid = _slid(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
+                slid = _slip_of(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
                 lost += self._sum(c.rule.area * (T + _friction_of(c, b, problem)) / 2 * slid)
         return lost
 
-    def _warmed(self, a: Any, b: Any) -> float:
+    def _heat(self, a: Any, b: Any) -> float:
         """Return the stored energy added by a change of temperature at constant displacement (trapezoidal rule)."""
         cold, warm = a.memory[-1], b.memory[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
-            still = temperature._replace(before=None)                         # it does not continue from there
+            still = temperature._replace(before=None)                         # no previous temperature
             return self._energy_at(replace(state, memory=[*state.memory[:-1], still]))
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
@@ -306,10 +307,10 @@ def _gains(row: dict[str, float]) -> list[float]:
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
-def _left(row: dict[str, float], a: Any, b: Any) -> float:
+def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
     """Return the unbalanced energy of a row between two states."""
-    by = [b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in ("strain_energy", "dissipated_energy")]
-    return sum(_gains(row)) - sum(by)
+    stored = [b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in ("strain_energy", "dissipated_energy")]
+    return sum(_gains(row)) - sum(stored)
 
 
 def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
@@ -317,18 +318,19 @@ def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
 
-def _slid(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
+def _slip_of(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
     """Return the slip of points that moved straight from x to `end`, shape (n, 2), while they touched, shape (n,)."""
-    near, foot = law.nearest(end), -law.theta
-    touched, touches = touch.distance > foot, near.distance > foot
-    way = near.distance - touch.distance
-    crosses = np.clip(np.divide(foot - touch.distance, way, out=np.zeros(len(way)), where=way != 0), 0.0, 1.0)
+    nearest, outer_edge = law.nearest(end), -law.theta
+    touched, touches = touch.distance > outer_edge, nearest.distance > outer_edge
+    approach = nearest.distance - touch.distance
+    crosses = np.divide(outer_edge - touch.distance, approach, out=np.zeros(len(approach)), where=approach != 0)
+    crosses = np.clip(crosses, 0.0, 1.0)
     share = np.where(touched, np.where(touches, 1.0, crosses), np.where(touches, 1 - crosses, 0.0))
     motion = share[:, None] * (end - x)
-    return touch.slip + np.sign(np.einsum("ni,ni->n", near.tangent, motion)) * np.hypot(*motion.T)
+    return touch.slip + np.sign(np.einsum("ni,ni->n", nearest.tangent, motion)) * np.hypot(*motion.T)
 
 
-def _called(scene: Any, item: Any) -> str:
+def _entry_name(scene: Any, item: Any) -> str:
     """Return the name of an item in the energy balance."""
     if item in scene.contacts:
         return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(item)]
@@ -351,15 +353,15 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return a finding on an energy balance that does not close within `_PROMISED` of its largest entry."""
+    """Return a finding on an energy balance that does not close within `_RUN_IMBALANCE` of its largest entry."""
     size = max(float(np.abs(values).max()) for values in balanced.values())
-    off = np.abs(balanced["unbalanced"])
-    k = int(np.argmax(off))
-    if off[k] <= _PROMISED * size:
+    unbalanced = np.abs(balanced["unbalanced"])
+    k = int(np.argmax(unbalanced))
+    if unbalanced[k] <= _RUN_IMBALANCE * size:
         return []
-    return [Finding("warning", "energy", f"The energy balance is off by {100 * off[k] / size:.2g} % of the largest"
-                    f" part, up to state {k} ({100 * _PROMISED:g} % is usual): the states are too few for the work"
-                    f" between them, contact is too soft, or the run is off. Use shorter steps,"
+    return [Finding("warning", "energy", f"The energy balance is off by {100 * unbalanced[k] / size:.2g} % of the"
+                    f" largest part, up to state {k} ({100 * _RUN_IMBALANCE:g} % is usual): the states are too few for"
+                    f" the work between them, contact is too soft, or the run is off. Use shorter steps,"
                     f" StepControl(largest=...), and see path.work().")]
 
 
@@ -371,7 +373,7 @@ def balance(path: Any) -> dict[str, np.ndarray]:
     """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: what it stores is no function of its state")
-    ledgers = [Ledger(segment).rows() for segment in path.segments]
+    ledgers = [EnergyBalance(segment).rows() for segment in path.segments]
     names = dict.fromkeys(name for rows in ledgers for name in rows)
     empty = [np.zeros(len(segment.states)) for segment in path.segments]
     found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(ledgers, empty)]))

@@ -18,10 +18,10 @@ def pack(data: Any) -> tuple[Any, bytes]:
         little-endian.
     """
     found: list[bytes] = []
-    at = 0
+    end = 0
 
     def plain(entry):
-        nonlocal at
+        nonlocal end
         if isinstance(entry, dict):
             return {key: plain(value) for key, value in entry.items()}
         if isinstance(entry, list | tuple):
@@ -30,8 +30,8 @@ def pack(data: Any) -> tuple[Any, bytes]:
             return entry
         kind = {"f": "<f8", "i": "<i8", "u": "<i8", "b": "|b1"}[entry.dtype.kind]
         found.append(entry.astype(kind).tobytes())
-        here, at = at, at + len(found[-1])
-        return {_KEY: [here, kind, list(entry.shape)]}
+        offset, end = end, end + len(found[-1])
+        return {_KEY: [offset, kind, list(entry.shape)]}
     return plain(data), b"".join(found)
 
 

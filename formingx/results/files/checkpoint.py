@@ -67,7 +67,7 @@ class Checkpoint:
 
     def __init__(self, folder: Any, path: Any):
         self.folder, self._path, self._comm = place("checkpoint", folder), path, path.problem.comm
-        self._there = self._begin()                         # states in the folder
+        self._n_written = self._begin()                         # states in the folder
 
     def write(self) -> None:
         """Write the states of the path that the folder does not contain yet; collective.
@@ -75,12 +75,12 @@ class Checkpoint:
         Raises:
             OSError: a state cannot be written, or the disk is full. All earlier states are kept.
         """
-        path, first = self._path, self._there
+        path, first = self._path, self._n_written
         with progress(self._comm, f"{self.folder}: {len(path) - first} states") as done:
             for number in range(first, len(path)):
                 self._write_state(number, path.states[number])
-                self._there = number + 1
-                done((self._there - first) / (len(path) - first))
+                self._n_written = number + 1
+                done((self._n_written - first) / (len(path) - first))
 
     def end(self, failure: str, findings: Sequence[Finding]) -> None:
         """Write how the run ended.
@@ -109,16 +109,16 @@ class Checkpoint:
                 return 0
             kept = read_json(folder / "scene.json")
             check_scene(folder, kept, scene)
-            there = complete_states(folder)
-            held = [read_data(folder, k, checksums=False) for k in range(len(there))]
-            settled = max((k + 1 for k, data in enumerate(held) if data["stepping"]), default=len(held))
-            whole = held[:max(settled, len(path))]          # later states belong to an unfinished step
+            folders = complete_states(folder)
+            stored = [read_data(folder, k, checksums=False) for k in range(len(folders))]
+            settled = max((k + 1 for k, data in enumerate(stored) if data["stepping"]), default=len(stored))
+            whole = stored[:max(settled, len(path))]        # later states belong to an unfinished step
             if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
                                              for h, s in zip(whole, path.states)):
-                raise InputError(f"checkpoint {str(folder)!r} holds {len(held)} states of another run: go on from it"
+                raise InputError(f"checkpoint {str(folder)!r} holds {len(stored)} states of another run: go on from it"
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
-            for left in there[len(whole):]:
-                shutil.rmtree(left)
+            for unfinished in folders[len(whole):]:
+                shutil.rmtree(unfinished)
             return len(whole)
         return files.on_root(problem.comm, lambda: named_os_errors(begin, folder, "cannot be begun"))
 
@@ -155,7 +155,7 @@ class Checkpoint:
                 if not final.exists():
                     raise
                 raise FileExistsError(errno.EEXIST, "another run wrote it: each needs a folder of its own") from error
-            (self.folder / END).unlink(missing_ok=True)    # it goes on
+            (self.folder / END).unlink(missing_ok=True)    # the run continues
 
         def act():
             what = f"state {number} could not be written"
@@ -180,12 +180,12 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
 
     def look():
         check_scene(folder, read_json(folder / "scene.json"), about)
-        there = complete_states(folder)
-        if not there:
+        folders = complete_states(folder)
+        if not folders:
             raise InputError(f"checkpoint {str(folder)!r} holds no state")
-        if state is not None and not (isinstance(state, int) and 0 <= state < len(there)):
-            raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(there) - 1}")
-        found = read_states(folder, len(there) if state is None else state + 1, problem.comm)
+        if state is not None and not (isinstance(state, int) and 0 <= state < len(folders)):
+            raise InputError(f"load: state = {state!r}: the checkpoint holds states 0 to {len(folders) - 1}")
+        found = read_states(folder, len(folders) if state is None else state + 1, problem.comm)
         settled = [k for k, data in enumerate(found) if data["stepping"]]
         return found[:settled[-1] + 1] if state is None and settled else found
     found = files.on_root(problem.comm, look)
@@ -239,7 +239,7 @@ def _read_state(data: dict, problem: Any) -> State:
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
     met, setting = data.pop("met"), data["setting"]
-    data["setting"] = setting and asdict(Setting(**setting))             # older files do without some of it
+    data["setting"] = setting and asdict(Setting(**setting))             # fills in missing entries
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),
@@ -276,8 +276,8 @@ def _tail(space: Any, own: np.ndarray) -> list[float]:
 
 def _plain_state(state: State) -> dict[str, Any]:
     """Return the data of a state that JSON can hold without conversion."""
-    left = (*FIELDS, "memory", "met", "history")
-    data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in left}
+    excluded = (*FIELDS, "memory", "met", "history")
+    data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in excluded}
     return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
                    "history": [list(i) for i in state.history]}
 

@@ -17,7 +17,7 @@ from .arrays import unpack
 from .description import differences
 from .progress import progress
 
-FORMAT = 5                 # format of the files
+FORMAT = 6                 # format of the files
 FIELDS = ("x", "direction")
 ARRAYS = "arrays.bin"
 END = "end.json"
@@ -138,8 +138,8 @@ def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
     found = list(differences(about["scene"], json.loads(json.dumps(scene))))
     if found:
         shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
-        more = f"; and {len(found) - 4} more" if len(found) > 4 else ""
-        raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{more}")
+        further = f"; and {len(found) - 4} more" if len(found) > 4 else ""
+        raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{further}")
 
 
 def state_name(number: int) -> str:

@@ -97,7 +97,7 @@ class Fields:
         if profile is not None:
             if self._between is None:  # a point stays on its line across the sheet
                 points = self.points.reshape(-1, self.points.shape[-1])
-                self._between = _across(points, profile.rest_bottom, profile.rest_top)
+                self._between = _across(points, profile.reference_bottom, profile.reference_top)
             k, part = self._between
             for name, values in (("thickness", profile.thickness), ("thickness_ratio", profile.thickness_ratio)):
                 found[name] = (1 - part) * values[k] + part * values[k + 1]
@@ -118,8 +118,8 @@ class Fields:
                 face = ContactFace(self._path, contact)
                 away, at = cKDTree(face.nodes).query(self.points.reshape(-1, self.points.shape[-1]))
                 self._faces[k] = face, face.nearest[at], away < 1e-9 * self._problem.forms.length
-            face, at, there = self._faces[k]
-            pressure += np.where(there, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
+            face, at, on_face = self._faces[k]
+            pressure += np.where(on_face, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
         return pressure
 
 

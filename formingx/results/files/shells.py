@@ -35,10 +35,10 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     pole = line[0, 0] < 1e-9 * np.ptp(line)
     if pole:
         number[:, 0] = number[0, 0]
-    here, half, there = (np.roll(number, -k, axis=0)[::2] for k in range(3))
+    start, middle, end = (np.roll(number, -k, axis=0)[::2] for k in range(3))
     a, b = slice(0, -1, 2), slice(2, None, 2)
-    quads = np.stack([here[:, a], here[:, b], there[:, b], there[:, a], here[:, 1::2], half[:, b], there[:, 1::2],
-                      half[:, a]], axis=-1)
+    quads = np.stack([start[:, a], start[:, b], end[:, b], end[:, a], start[:, 1::2], middle[:, b], end[:, 1::2],
+                      middle[:, a]], axis=-1)
     tips = quads[:, 0][:, [0, 1, 2, 4, 5, 6]] if pole else np.zeros((0, 6), dtype=int)
     quads = quads[:, int(pole):].reshape(-1, 8)
     used, new = np.unique(np.concatenate([tips.ravel(), quads.ravel()]), return_inverse=True)

@@ -40,8 +40,8 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
     number = np.arange(len(points) * n).reshape(len(points), n)
     if axisymmetric:
         number[:, on_axis] = number[0, on_axis]              # one point, for any angle
-    here, there = (number, np.roll(number, -1, axis=0)) if axisymmetric else (number[:1], number[1:])
-    a, b, c, d = here, np.roll(here, -1, axis=1), np.roll(there, -1, axis=1), there
+    start, end = (number, np.roll(number, -1, axis=0)) if axisymmetric else (number[:1], number[1:])
+    a, b, c, d = start, np.roll(start, -1, axis=1), np.roll(end, -1, axis=1), end
     triangles = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, c), (a, c, d))])
     if not axisymmetric:
         triangles = np.concatenate([triangles, *_ends(number)])

@@ -12,12 +12,12 @@ from ...findings import Finding, alarming
 from . import checkpoint_data
 
 _RECENT = 20
-"""Number of the last steps from which the pace is taken."""
+"""Number of last steps that define the pace."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
 _STILL = 1e-3
-"""Relative change of all of `_MOVES` over the last steps below which the body stands still."""
+"""Relative change of the quantities `_MOVES` over the last steps below which the body counts as not moving."""
 _MET = 1e-9
-"""Distance from a target, over it, at which it is met."""
+"""Relative distance from a target at which it counts as met."""
 
 
 @dataclass(frozen=True)

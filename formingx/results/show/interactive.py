@@ -13,9 +13,9 @@ from ...units import Units
 from .record import Record, words
 
 DIGITS = 5
-"""Significant digits of what is drawn."""
+"""Significant digits of drawn numbers."""
 STATIONS = 101
-"""At most this number of places along a sheet are drawn."""
+"""Largest number of drawn places along a sheet."""
 
 
 @functools.cache
@@ -38,16 +38,16 @@ def packed(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()
 
 
-def data(records: list[Record], names: list[str], units: Units, more: dict[str, Any] | None = None) -> str:
+def data(records: list[Record], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
     """Return all data that `report.js` draws, as JSON.
 
     Args:
         records: the runs.
         names: names of the runs.
         units: units for the labels.
-        more: further data of each run, such as the "mesh" of a sheet.
+        extra: further data of each run, such as the "mesh" of a sheet.
     """
-    runs = [_run(record, name, units) | (more or {}) for record, name in zip(records, names)]
+    runs = [_run(record, name, units) | (extra or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]
     return json.dumps({"runs": runs, "charts": charts, "length": units.length or ""}, allow_nan=False,
@@ -77,15 +77,15 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
     some = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
     profiles = [record.profiles[k] for k in record.frames]
-    for profile, more in zip(profiles, [record.fields[k] for k in record.frames]):
+    for profile, fields_of_state in zip(profiles, [record.fields[k] for k in record.frames]):
         wall = profile.wall_thickness
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
-        values |= {_label(record, units, key): v for key, v in more.items()}
+        values |= {_label(record, units, key): v for key, v in fields_of_state.items()}
         for key, v in values.items():
             fields.setdefault(key, []).append(rounded(v[some], each=True))
     last = record.profiles[-1]
-    along = int(np.argmax(np.ptp(last.rest_bottom, axis=0)))          # of a parison: Z
-    return {"from": "RZ"[along], "material": rounded(last.rest_bottom[some, along]), "fields": fields,
+    along = int(np.argmax(np.ptp(last.reference_bottom, axis=0)))          # of a parison: Z
+    return {"from": "RZ"[along], "material": rounded(last.reference_bottom[some, along]), "fields": fields,
             "bottom": [rounded(p.bottom[some].T) for p in profiles],
             "top": [rounded(p.top[some].T) for p in profiles]}
 

@@ -27,7 +27,7 @@ MASS = 1e-3
 """Relative error of the mass above which a report warns."""
 
 FRAMES = 100
-"""About this number of states are drawn."""
+"""Approximate number of drawn states."""
 
 
 @dataclass
@@ -140,7 +140,7 @@ class Record:
                                  f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer"
                                  f" mesh, keeps it."))
         found += [*self._of_volume(), *self._of_verdict()]
-        mine = {finding.about for finding in found}         # of all states, where the run looked at the last
+        mine = {finding.about for finding in found}         # on all states; `self.findings` are on the last one
         found += [finding for finding in self.findings if finding.about not in mine]
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(Finding("note", "steps", f"{self.counts['failures']} attempts at a step failed and were"
@@ -212,7 +212,7 @@ def of_path(path: Any) -> Record:
     with shown_progress(problem.comm, f"report of {n} states") as done:
         measures = {c: path[c] for c in path.columns}
         kinds, stages = [s.kind for s in states], [s.stage for s in states]
-        timed = np.ptp(measures.get("process_time", 0.0)) > 0              # where it runs, progress needs no profiles
+        timed = np.ptp(measures.get("process_time", 0.0)) > 0              # then progress needs no profiles
         drawn: Any = frames(progress(measures, [None] * n), kinds, stages) if timed else range(n)
         profiles: list[Any] = [None] * n
         try:
@@ -277,14 +277,14 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     """Return the temperature at the nodes of profiles, from the history variables in a checkpoint."""
     from scipy.spatial import cKDTree
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
-    at = None
-    for here, state in zip(found, states):
+    nearest = None
+    for values, state in zip(found, states):
         kept = next((m for m in state["memory"] if "temperature" in m and "points" in m), None)
         if kept is None or last is None:
             return found
-        if at is None:
-            at = cKDTree(kept["points"]).query(np.array([last.rest_bottom, last.rest_top]))[1]
-        here["temperature"] = np.asarray(kept["temperature"])[at].mean(0)
+        if nearest is None:
+            nearest = cKDTree(kept["points"]).query(np.array([last.reference_bottom, last.reference_top]))[1]
+        values["temperature"] = np.asarray(kept["temperature"])[nearest].mean(0)
     return found
 
 
@@ -338,23 +338,23 @@ class _Fields:
     """Stress, contact pressure and temperature at the nodes of a profile, from both faces of a sheet."""
 
     def __init__(self, path: Any, profile: Profile):
-        self._path, self._points = path, [profile.rest_bottom, profile.rest_top]
-        self._here = [path.problem.followed(points) for points in self._points]
+        self._path, self._points = path, [profile.reference_bottom, profile.reference_top]
+        self._positions = [path.problem.followed(points) for points in self._points]
         solid = path.problem.forms.domain.topology.dim == 2
         self._stressed = solid and len(path.problem.scene.mesh.layers) == 1
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
         """Return {name: values, shape (m,)} in a state; collective."""
-        path, points, here = self._path, self._points, {}
+        path, points, found = self._path, self._points, {}
         if path.problem.scene.heat is not None:
-            here["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
+            found["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
         if self._stressed:
             stress = path.stress(state).at(np.vstack(points))
-            here["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
+            found["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
         if self._faces:
-            here["contact pressure"] = sum(_nearest(face.of(state), self._here) for face in self._faces)
-        return here
+            found["contact pressure"] = sum(_nearest(face.of(state), self._positions) for face in self._faces)
+        return found
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
@@ -363,7 +363,7 @@ def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
     The face of the sheet that is nearer to the contact points is used.
     """
     from scipy.spatial import cKDTree
-    tree = cKDTree(table.rest)
+    tree = cKDTree(table.reference_points)
     away, at = zip(*(tree.query(p) for p in points))
     nearer = np.argmin([a.mean() for a in away])
     return table.pressure[at[nearer]]

@@ -57,7 +57,8 @@ def _mirrored(profile: Any) -> Any:
     """Return a half sheet together with its mirror image."""
     def whole(points):
         return np.vstack([points[:0:-1] * (-1, 1), points])
-    return type(profile)(*(whole(p) for p in (profile.rest_bottom, profile.rest_top, profile.bottom, profile.top)))
+    faces = profile.reference_bottom, profile.reference_top, profile.bottom, profile.top
+    return type(profile)(*(whole(points) for points in faces))
 
 
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any) -> None:

@@ -22,34 +22,35 @@ class Limits:
 
     Attributes:
         volume: root mean square of J - 1. (Creases at clamped rims and at corners of coarse blocks stay below 0.17.)
-        inside_out: fraction of the elements that may have a point with J <= 0.
-        fewest: number of such elements that is always allowed, because corners are singular.
-        inside: depth of the body in a tool, over the thickness and over the length of an edge. Only a depth beyond both
+        inverted_elements: fraction of the elements that may have a point with J <= 0.
+        allowed_elements: number of such elements that is always allowed, because corners are singular.
+        depth: depth of the body in a tool, over the thickness and over the length of an edge. Only a depth beyond both
             is inadmissible.
-        sunk: penetration of contact points over the local wall. Above this limit the body did not follow the tool.
-            (Williams' plug on coarse elements reaches 0.051.)
-        warns: relative change of a tool force by penetration from which a run warns.
-        ends: relative change of a tool force by penetration from which a state is inadmissible.
-        stiffest: largest ratio of this change to the fraction of the energy stored in penetration, as for a body
-            pressed flat.
-        small: half of a difference quotient, over the arc length.
-        felt: penetration over the thickness below which a state is always admissible, as at a first touch.
-        thinnest: largest pole stretch; it is 1e150 for a negative wall.
-        pulls: tensile force on a frictionless tool over the compressive forces on it.
+        penetration: penetration of contact points over the local wall. Above this limit the body did not follow the
+            tool. (Williams' plug on coarse elements reaches 0.051.)
+        warning_error: relative change of a tool force by penetration from which a run warns.
+        largest_error: relative change of a tool force by penetration from which a state is inadmissible.
+        largest_energy_ratio: bound of this change, over the fraction of the strain energy that penetration stores. It
+            applies to a body that is pressed flat.
+        difference_step: step of a central difference quotient in arc length.
+        negligible_penetration: penetration over the thickness below which a state is always admissible, as at a first
+            touch.
+        pole_stretch: largest pole stretch; it is 1e150 for a negative wall.
+        tensile_force: tensile force on a frictionless tool, over the compressive forces on it.
     """
 
     volume: float = 0.25
-    inside_out: float = 0.05
-    fewest: int = 4
-    inside: float = 0.25
-    sunk: float = 0.15
-    warns: float = 2e-3
-    ends: float = 0.05
-    stiffest: float = 3.0
-    small: float = 1e-5
-    felt: float = 1e-3
-    thinnest: float = 1e100
-    pulls: float = 1e-3
+    inverted_elements: float = 0.05
+    allowed_elements: int = 4
+    depth: float = 0.25
+    penetration: float = 0.15
+    warning_error: float = 2e-3
+    largest_error: float = 0.05
+    largest_energy_ratio: float = 3.0
+    difference_step: float = 1e-5
+    negligible_penetration: float = 1e-3
+    pole_stretch: float = 1e100
+    tensile_force: float = 1e-3
 
 
 _LIMITS = Limits()
@@ -66,7 +67,7 @@ class Depth(NamedTuple):
         name: name of the tool, or of the face that touches it.
     """
 
-    share: float
+    ratio: float
     depth: float
     place: np.ndarray
     contact: Any
@@ -79,7 +80,7 @@ class Depth(NamedTuple):
         return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({at})"
 
 
-class Verdict:
+class AdmissibilityCheck:
     """Admissibility check of the states of one problem.
 
     Args:
@@ -112,10 +113,10 @@ class Verdict:
             edges, found = self._outline.edges(), []
             for contact in self._problem.present:
                 error = _force_error(contact, state, self._images)
-                if error > _LIMITS.warns:
+                if error > _LIMITS.warning_error:
                     name = _name(contact)
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
-                                         f" about {100 * error:.2g} %: {_harder(contact, error)}."))
+                                         f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
             for cut in self._deepest(edges, state, own=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
                                      f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
@@ -128,7 +129,7 @@ class Verdict:
         for name, value in measures.items():
             if not np.isfinite(value):
                 yield f"the {name.replace('_', ' ')} is {value}"
-        if measures.get("pole_stretch", 1.0) > _LIMITS.thinnest:
+        if measures.get("pole_stretch", 1.0) > _LIMITS.pole_stretch:
             yield "the two faces cross at the pole"
         if not self._solid:
             for deep in self._deepest_points(state, _most_inside):
@@ -139,7 +140,7 @@ class Verdict:
                    f" {measures['volume_error']:.2g}")
         with self._problem.state_context(state) as problem:
             bad, cells, (R, Z) = problem.inside_out()
-            if bad > max(_LIMITS.fewest, _LIMITS.inside_out * cells):
+            if bad > max(_LIMITS.allowed_elements, _LIMITS.inverted_elements * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
                        " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"
                        f" by a pilot run (trace(adapt_mesh=True), for a sheet over an edge)")
@@ -148,16 +149,16 @@ class Verdict:
                 yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
                        f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without a Contact is there, or the"
                        f" elements are too large for the tool")
-            for sunk in self._sunk(edges, state):
-                yield (f"the body did not follow the tool of {sunk.name!r}: contact points are {sunk.depth:.4g} deep in"
-                       f" it, {100 * sunk.share * _LIMITS.sunk:.2g} % of the wall that is left there: give Contact a"
-                       f" penalty of {50 * sunk.share * sunk.contact.contact.penalty:.1g}")
+            for deep in self._excess_penetration(edges, state):
+                yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
+                       f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the wall that is left there: give"
+                       f" Contact a penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 error = _force_error(contact, state, self._images)
-                felt = resultants.penetration(contact, state.x, state.control) > _LIMITS.felt * contact.thickness
-                if error > _LIMITS.ends and felt:
+                depth = resultants.penetration(contact, state.x, state.control)
+                if error > _LIMITS.largest_error and depth > _LIMITS.negligible_penetration * contact.thickness:
                     yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
-                           f" about {100 * error:.2g} %: {_harder(contact, error)}")
+                           f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and cannot hold"
                            f" it: it is behind the tool")
@@ -172,7 +173,7 @@ class Verdict:
             if not contact.present:
                 continue
             depth = _depths(contact, points, state)
-            most = CUT * contact.thickness if own else _LIMITS.inside * np.maximum(contact.thickness, length)
+            most = CUT * contact.thickness if own else _LIMITS.depth * np.maximum(contact.thickness, length)
             share = np.where(face | (not own), depth.max(1) / most, 0.0)
             k = int(np.argmax(share))
             if share[k] > 1:
@@ -195,7 +196,7 @@ class Verdict:
                 if rows[k, 0] > 1:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, _name(contact))
 
-    def _sunk(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
+    def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield contact points whose penetration is too large compared with the local wall."""
         weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
         for contact, face in zip(self._problem.contacts, self._faces):
@@ -203,7 +204,7 @@ class Verdict:
                 continue
             depth = _depths(contact, edges[face], state).max(1)
             grown = _lengths(edges[face]) / self._rest[face] * weight(edges[face, 2].T) / weight(rest[face, 2].T)
-            share = depth * grown / (_LIMITS.sunk * contact.thickness)
+            share = depth * grown / (_LIMITS.penetration * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
@@ -220,7 +221,7 @@ def _most_inside(contact: Any) -> np.ndarray:
 
     It is infinite for lagged points that touch since this step: no force acts on them yet.
     """
-    most = _LIMITS.inside * np.maximum(contact.thickness, contact.rule.lengths)
+    most = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, most)
 
 
@@ -237,19 +238,21 @@ def _force_error(contact: Any, state: State, images: int) -> float:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)
     share = images * energy / (state.measures.get("strain_energy") or np.inf)
-    if share < 0.1 * _LIMITS.warns:
+    if share < 0.1 * _LIMITS.warning_error:
         return share
-    along = contact.contact.way / np.hypot(*contact.contact.way)
-    e = _LIMITS.small
-    states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-e, 0.0, e)]
-    less, force, more = (resultants.force(contact, *at) @ along for at in states)
-    way = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ along
-    return min(2 * energy * abs((more - less) / way) / force**2, _LIMITS.stiffest * share) if force and way else share
+    direction = contact.contact.way / np.hypot(*contact.contact.way)
+    h = _LIMITS.difference_step
+    states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-h, 0.0, h)]
+    backward, force, forward = (resultants.force(contact, *at) @ direction for at in states)
+    way = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ direction
+    if not force or not way:
+        return share
+    return min(2 * energy * abs((forward - backward) / way) / force**2, _LIMITS.largest_energy_ratio * share)
 
 
-def _harder(contact: Any, error: float) -> str:
+def _penalty_advice(contact: Any, error: float) -> str:
     """Return advice on a larger penalty, as text."""
-    return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warns * 10:.1g}"
+    return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warning_error * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
@@ -258,7 +261,7 @@ def _pulled(contact: Any, state: State) -> bool:
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
     force = resultants.force(contact, state.x, state.control) @ law.way / np.hypot(*law.way)
-    return bool(force > _LIMITS.pulls * resultants.pressing(contact, state.x, state.control))
+    return bool(force > _LIMITS.tensile_force * resultants.pressing(contact, state.x, state.control))
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:
