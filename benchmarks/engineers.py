@@ -1,16 +1,20 @@
 """What engineers' runs cost, and where the time goes: moulds, plugs, bottles, with friction, time and heat.
 
-    ./fx python3 benchmarks/engineers.py [--against CHECKOUT] [--finest] [--only pot cup] [--json FILE]
+    ./fx python3 benchmarks/engineers.py [--against CHECKOUT] [--turns 3] [--finest] [--only pot cup] [--json FILE]
 
 Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
 time while paths are followed, in all and by part (contact: laws, gap closures, local problems; tangents; LU factors;
-solves; rest), forms compiled before; what made steps shorter or fail. `--against` puts the same of another version of
-the package beside it, by that version's own copy of this script. `--finest` adds the largest difference of the walls,
-farther than a thickness from the rim, to one node a step in steps of at most `LARGEST`.
+solves; rest), forms compiled before; what made steps shorter or fail. The limit is the time of the iterations' tangents,
+LU factors and solves alone; "over" is the run over this limit. `--against` puts another version of the package beside
+it, also one that is older than this script: both run in turns, `--turns` times, and the row is the fastest. `--finest`
+adds the largest difference of the walls, farther than a thickness from the rim, to one node a step in steps of at most
+`LARGEST`.
 """
 
 import argparse
 import functools
+import importlib
+import inspect
 import json
 import os
 import subprocess
@@ -27,11 +31,39 @@ import formingx as fx
 SECONDS = 1500                                               # that a run may take
 LARGEST = 0.02                                               # dimensionless, of the finest steps
 PARTS = ("contact", "tangents", "LU", "solves", "rest")
+OLDER = {"control": "drive", "direction": "moves", "inactive": "without"}
+"""Names of arguments in versions before these."""
+CLASSES = {                                                  # (module, class) in this version and in older ones
+    "path": [("solve.path_following", "Run"), ("solve.follow", "Run")],
+    "contact": [("contact.face", "FaceContact"), ("contact.approach", "Approach"),
+                ("discrete.contact.face", "FaceContact"), ("discrete.contact.approach", "Approach"),
+                ("discrete.contact_nodes", "ContactNodes"),
+                ("extensions.contact_events.prediction", "ContactEventPrediction")],
+    "local": [("solve.local_contact", "LocalSolve"), ("solve.settle", "Settling")],
+    "problem": [("problem.problem", "Problem"), ("discrete.problem", "Problem")],
+    "solver": [("solve.linear", "DirectSolver"), ("solve.direct", "DirectSolver")]}
+
+
+def called(function, *given, **more):
+    """Call a function of the package, with the names of arguments of the version at hand."""
+    known = inspect.signature(function).parameters
+    return function(*given, **{name if name in known else OLDER.get(name, name): v for name, v in more.items()})
+
+
+def classes(what):
+    """Return those of `CLASSES` that the version at hand has."""
+    found = []
+    for module, name in CLASSES[what]:
+        try:
+            found.append(getattr(importlib.import_module(f"formingx.{module}"), name))
+        except (ImportError, AttributeError):
+            continue
+    return found
 
 
 def contact(finest, *given, **more):
     """A contact; for finest steps one that takes a node a step."""
-    return fx.Contact(*given, **more, **({"nodes_per_step": 1} if finest else {}))
+    return called(fx.Contact, *given, **more, **({"nodes_per_step": 1} if finest else {}))
 
 
 def step(finest, target=8):
@@ -45,8 +77,8 @@ def disc(radius, thickness, elements, material, contacts, **more):
 
 
 def plug_then_air(scene, travel, pressure, finest):
-    return fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(travel)),
-                                  fx.Stage("air", control="air", until=fx.pressure(pressure))],
+    return fx.Process(scene).run([called(fx.Stage, "plug", control="plug", until=fx.travel(travel)),
+                                  called(fx.Stage, "air", control="air", until=fx.pressure(pressure))],
                                  step=step(finest), progress=False)
 
 
@@ -75,9 +107,9 @@ def relaxing_pot(finest):
         contact(finest, "top", mould, "stick", name="mould"),
         contact(finest, "bottom", plug, 0.3, direction=(0, 1), name="plug")])
     return fx.Process(scene).run([
-        fx.Stage("plug", control="plug", until=fx.travel(6.0), speed=6.0), fx.Stage("hold", duration=1.0),
-        fx.Stage("vacuum", control="air", until=fx.pressure(160.0), step=step(finest)),
-        fx.Stage("in the mould", duration=5.0, inactive=["plug"])], accuracy=1e-2, progress=False,
+        called(fx.Stage, "plug", control="plug", until=fx.travel(6.0), speed=6.0), called(fx.Stage, "hold", duration=1.0),
+        called(fx.Stage, "vacuum", control="air", until=fx.pressure(160.0), step=step(finest)),
+        called(fx.Stage, "in the mould", duration=5.0, inactive=["plug"])], accuracy=1e-2, progress=False,
         step=step(True) if finest else None)
 
 
@@ -140,9 +172,9 @@ def blister(finest, target=None):
     scene = disc(5.0, 0.25, (36, 1), film, [contact(finest, "top", tools.mould, "stick", name="mould"),
                                             contact(finest, "bottom", tools.plug, 0.3, direction=(0, 1), name="plug")],
                  temperature=120.0, heat=heat)
-    return fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(3.0), speed=30.0),
-                                  fx.Stage("air", control="air", until=fx.pressure(0.3), duration=0.2),
-                                  fx.Stage("hold", duration=1.0)], accuracy="draft", progress=False,
+    return fx.Process(scene).run([called(fx.Stage, "plug", control="plug", until=fx.travel(3.0), speed=30.0),
+                                  called(fx.Stage, "air", control="air", until=fx.pressure(0.3), duration=0.2),
+                                  called(fx.Stage, "hold", duration=1.0)], accuracy="draft", progress=False,
                                  step=step(finest, target or 8) if finest or target else None)
 
 
@@ -157,6 +189,7 @@ class Clock:
 
     def __init__(self):
         self.seconds, self._on, self._last = Counter(), [], 0.0
+        self.calls = {}                                     # seconds of each call, by name
 
     def _switch(self):
         now = time.process_time()
@@ -168,39 +201,41 @@ class Clock:
         """Count calls as of a part; within: only while another part runs."""
         for name in names:
             if hasattr(owner, name):
-                setattr(owner, name, self._watched(getattr(owner, name), part, within))
+                setattr(owner, name, self._watched(getattr(owner, name), part, within, name))
 
-    def _watched(self, function, part, within):
+    def _watched(self, function, part, within, name):
+        calls = self.calls.setdefault(name, [])
+
         @functools.wraps(function)
         def timed(*given, **more):
             if within and not self._on:
                 return function(*given, **more)
             self._switch()
             self._on.append(part)
+            began = time.process_time()
             try:
                 return function(*given, **more)
             finally:
                 self._switch()
                 self._on.pop()
+                calls.append(time.process_time() - began)
         return timed
 
 
 def measured(name, finest):
     """The row of one run, in this process."""
-    from formingx.contact.approach import Approach
-    from formingx.contact.face import FaceContact
-    from formingx.problem.problem import Problem
-    from formingx.solve.linear import DirectSolver
-    from formingx.solve.local_contact import LocalSolve
-    from formingx.solve.path_following import Run
     clock = Clock()
-    clock.watch("rest", Run, "follow", within=False)
-    for owner in (FaceContact, Approach):
+    for owner in classes("path"):
+        clock.watch("rest", owner, "follow", within=False)
+    for owner in classes("contact"):
         clock.watch("contact", owner, *(n for n, f in vars(owner).items() if callable(f) and n[0] != "_"))
-    clock.watch("contact", LocalSolve, "correct")
-    clock.watch("tangents", Problem, "tangent")
-    clock.watch("LU", DirectSolver, "factorise")
-    clock.watch("solves", DirectSolver, "solve", "solve_all", "solve_transposed")
+    for owner in classes("local"):
+        clock.watch("contact", owner, "correct")
+    for owner in classes("problem"):
+        clock.watch("tangents", owner, "tangent")
+    for owner in classes("solver"):
+        clock.watch("LU", owner, "factorise")
+        clock.watch("solves", owner, "solve", "solve_all", "solve_transposed")
     ended = ""
     try:
         path = RUNS[name](finest)
@@ -211,17 +246,18 @@ def measured(name, finest):
     inside = R[-1] - profile.original_thickness[0] > R
     return {"states": counts.steps, "failures": counts.failures, "iterations": counts.iterations,
             "jumps": len(path.jumps), "seconds": sum(clock.seconds.values()),
-            "parts": {part: clock.seconds[part] for part in PARTS}, "limits": counts.limits, "ended": ended,
+            "limit": counts.iterations * (np.mean(clock.calls["tangent"]) + np.mean(clock.calls["factorise"])
+                                          + np.median(clock.calls["solve_all"])),
+            "parts": {part: clock.seconds[part] for part in PARTS}, "limits": getattr(counts, "limits", []), "ended": ended,
             "length": R[inside].tolist(), "wall": t[inside].tolist()}
 
 
-def in_child(name, finest, checkout):
+def in_child(name, finest, checkout, first=True):
     """The row of one run with the package of a checkout; one that could not be made says why."""
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "row.json"
-        script = checkout / "benchmarks" / "engineers.py"   # of that version: names of calls and modules change
-        command = [sys.executable, str(script), "--row", name, "--json", str(file), *["--finest"] * finest]
-        for _ in range(2 if not finest else 1):             # the first compiles forms
+        command = [sys.executable, __file__, "--row", name, "--json", str(file), *["--finest"] * finest]
+        for _ in range(2 if first and not finest else 1):   # the first compiles forms
             try:
                 done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(checkout)}, capture_output=True,
                                       text=True, timeout=SECONDS)
@@ -242,19 +278,25 @@ def apart(row, other):
     return float(np.abs(np.array(row["wall"]) / np.interp(row["length"], other["length"], other["wall"]) - 1).max())
 
 
+def seconds(row):
+    """Return the seconds of a row; infinite for a run that could not be made."""
+    return row.get("seconds", np.inf)
+
+
 def line(name, version, row):
     if "states" not in row:
         return f"{name:15}{version:8}{row['ended']}"
     off = row.get("to_finest")
     limits = ", ".join(f"{why} {n}" for why, n in Counter(row["limits"]).most_common(4))
     return (f"{name:15}{version:8}{row['states']:7}{row['failures']:7}{row['iterations']:7}{row['jumps']:6}"
-            f"{row['seconds']:8.2f}" + "".join(f"{100 * row['parts'][p] / row['seconds']:9.0f}" for p in PARTS)
+            f"{row['seconds']:8.2f}{row['seconds'] / row['limit']:7.1f}" + "".join(f"{100 * row['parts'][p] / row['seconds']:11.0f}" for p in PARTS)
             + (f"{off:9.1e}" if off is not None else f"{'-':>9}") + f"  {limits}  {row['ended']}")
 
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--against", type=Path, help="another checkout of the package, for the same runs")
+    options.add_argument("--turns", type=int, default=1, help="runs of each, in turns: the fastest counts")
     options.add_argument("--finest", action="store_true", help="compare walls with one node a step in finest steps")
     options.add_argument("--only", nargs="+", choices=RUNS, default=USUAL)
     options.add_argument("--json", type=Path)
@@ -265,10 +307,14 @@ def main():
         return
     versions = {"now": Path(fx.__file__).parents[1], **({"before": args.against.resolve()} if args.against else {})}
     found = {}
-    print(f"{'run':15}{'':8} states failed   iter jumps       s" + "".join(f"{p + ' %':>9}" for p in PARTS)
+    print(f"{'run':15}{'':8} states failed   iter jumps       s   over" + "".join(f"{p + ' %':>11}" for p in PARTS)
           + "   finest  limits of steps")
     for name in args.only:
         found[name] = rows = {version: in_child(name, False, checkout) for version, checkout in versions.items()}
+        for _ in range(args.turns - 1):
+            for version, checkout in versions.items():
+                if "states" in rows[version]:
+                    rows[version] = min(rows[version], in_child(name, False, checkout, first=False), key=seconds)
         if args.finest:
             rows["finest"] = in_child(name, True, versions["now"])
         for version, row in rows.items():
@@ -276,9 +322,9 @@ def main():
             print(line(name, version, row), flush=True)
     for version in versions:
         rows = [rows[version] for rows in found.values() if "states" in rows[version]]
-        states, failures, iterations, seconds = (sum(row[key] for row in rows) for key in (
+        states, failures, iterations, spent = (sum(row[key] for row in rows) for key in (
             "states", "failures", "iterations", "seconds"))
-        print(f"{'total':15}{version:8}{states:7}{failures:7}{iterations:7}{'':6}{seconds:8.2f}")
+        print(f"{'total':15}{version:8}{states:7}{failures:7}{iterations:7}{'':6}{spent:8.2f}")
     if args.json:
         args.json.write_text(json.dumps(found, indent=1))
 
