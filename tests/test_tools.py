@@ -231,3 +231,79 @@ def test_surface(name):
     assert np.abs(tool.signed_distance(points)).max() < 1e-9 * size
     assert np.abs(tool.signed_distance(points[pieces].mean(1))).max() < 0.02 * size
     np.testing.assert_array_equal(tool.bounds, [points.min(0), points.max(0)])
+
+
+class TestNearest:
+    """The compiled search for closest points where arrays of numbers go wrong first."""
+
+    corner = fx.Tool([(0, 0), (2, 0), (2, 2), (5, 2)])      # sharp: inward at (2, 0), outward at (2, 2)
+
+    def test_coincident_points(self):
+        """At joints and corners, on the profile itself, the distance is 0 and the gradient a unit vector."""
+        for tool in (self.corner, *SHAPES.values()):
+            x = np.array([end for piece in tool.pieces for end in piece.ends])
+            near = tool.nearest(x)
+            assert np.abs(near.distance).max() < 1e-12 * tool.size
+            smooth = np.abs(near.curvature) < 1e9               # on a sharp corner there is no normal
+            assert np.hypot(*near.normal[smooth].T) == pytest.approx(1.0, abs=1e-9)
+
+    def test_centre_of_an_arc(self):
+        """All points of the arc are equally near: the distance is the radius, every number finite."""
+        ball = tools.sphere(radius=1.3, z=0.2)
+        arc = next(piece for piece in ball.pieces if isinstance(piece, Arc))
+        near = ball.nearest(arc.centre)
+        assert near.distance == pytest.approx(1.3, rel=1e-14) and np.isfinite(near.normal).all()
+
+    def test_axis(self):
+        """On the axis of a sphere, above, below and far away, the normal is along the axis."""
+        z = np.array([1e-9, 2.0, 1e6, 1e150])
+        near = tools.sphere(radius=1.3).nearest(np.column_stack([0 * z, z]))
+        ball = tools.sphere(radius=1.3)
+        middle = next(piece for piece in ball.pieces if isinstance(piece, Arc)).centre[1]
+        assert near.distance == pytest.approx(1.3 - np.abs(z - middle), rel=1e-12)
+        assert np.abs(near.normal) == pytest.approx(np.tile([0.0, 1.0], (4, 1)), abs=1e-12)
+
+    def test_middle_of_a_corner(self):
+        """As near to one side as to the other: the first piece of the profile counts, the same at every call."""
+        x = np.array([[2.5, 1.0], [1.0, 1.0]])              # the second one on the bisector of the inward corner
+        near = self.corner.nearest(x)
+        assert near.distance == pytest.approx([-0.5, 1.0])
+        assert np.array_equal(near.normal, self.corner.nearest(x).normal)
+
+    def test_zero_length_and_nearly(self):
+        """A piece of length 0 is refused; one of 1e-6 of the profile changes no distance by more than its length."""
+        with pytest.raises(fx.InputError, match="no length"):
+            fx.Tool.of_pieces([Line((0, 0), (1, 0)), Line((1, 0), (1, 0)), Line((1, 0), (2, 0))])
+        cut = fx.Tool.of_pieces([Line((0, 0), (1, 0)), Line((1, 0), (1 + 2e-6, 0)), Line((1 + 2e-6, 0), (2, 0))])
+        x = np.random.default_rng(1).uniform(-3, 3, (500, 2))
+        assert np.abs(cut.signed_distance(x) - tools.plane(0.0).signed_distance(x)).max() < 1e-12
+
+    def test_not_a_number(self):
+        """A point that is not a number has no distance, and spoils no other; no points give none."""
+        for tool in (self.corner, *SHAPES.values()):
+            good = tool.nearest([[0.3, 0.4], [0.7, -0.2]])
+            for bad in ((np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan)):
+                near = tool.nearest([[0.3, 0.4], bad, [0.7, -0.2]])
+                assert np.isnan(near.distance[1])
+                assert all(np.array_equal(a[[0, 2]], b) for a, b in zip(near, good, strict=True))
+            assert [part.shape for part in tool.nearest(np.zeros((0, 2)))] == [(0,), (0, 2), (0,)]
+
+    def test_any_array(self):
+        """Integers, columns of a larger array and read-only arrays give the same as their copy."""
+        whole = np.random.default_rng(2).uniform(-3, 3, (40, 5))
+        view = whole[::2, 3:0:-2]
+        view.flags.writeable = False
+        for x in (view, np.array([[1, 2], [3, -1]]), np.asfortranarray(whole[:, :2])):
+            found = SHAPES["bottle"].nearest(x)
+            for a, b in zip(found, SHAPES["bottle"].nearest(np.array(x, dtype=float, order="C")), strict=True):
+                assert np.array_equal(a, b)
+
+
+def test_no_compiler(tmp_path, monkeypatch):
+    """A compiler that fails says so; nothing is left behind for the next run."""
+    from formingx.tools import nearest
+    monkeypatch.setattr(nearest.sysconfig, "get_config_var", lambda name: "false")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(RuntimeError, match="false cannot compile"):
+        nearest._compiled.__wrapped__()
+    assert not list((tmp_path / "fenics").glob("*"))

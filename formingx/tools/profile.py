@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError, as_points, finite, instance, non_negative, pair, positive, several
 from ..mesh.boxes import overlapping
+from .nearest import nearest
 
 _FLAT = 1e-9          # radians: a joint that turns less is smooth
 TURN = 2 * math.pi
@@ -164,20 +165,7 @@ class Tool:
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """Signed distance of points x, shape (n, 2), its gradient and its curvature."""
-        x, arcs = as_points("Tool: x", x), slice(self._lines, None)
-        R, Z = x[:, :1] - self._R, x[:, 1:] - self._Z
-        at, d = (R * way[0] + Z * way[1] for way in (self._along, self._left))
-        if self._lines < len(self._R):
-            across, up = R[:, arcs], Z[:, arcs]
-            at[:, arcs] = np.mod(self._sign[arcs] * (np.arctan2(up, across) - self._start), TURN)
-            d[:, arcs] = self._sign[arcs] * (self._radius - np.hypot(across, up))
-        beyond = (at < self._low) | (at > self._high)
-        beyond[beyond.all(axis=1)] = False                  # behind an arc with an open end: all pieces, as if longer
-        d[beyond] = np.inf
-        best, i = np.abs(d).argmin(axis=1), np.arange(len(x))
-        rel = x - self._origin[best]
-        curvature = -self._sign[best] / np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-300)      # 0 of lines
-        return Nearest(d[i, best], self._left.T[best] + curvature[:, None] * rel, curvature)
+        return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """Return the tool shifted by (r, z), lengths."""
@@ -252,11 +240,8 @@ class Tool:
         corners = [(p.ends[1], _turn(p.angles[1], q.angles[0])) for p, q in joints] + [e for e in ends if e is not None]
         arcs += [(*c, 0.0, 0.0, math.copysign(1.0, turn), 0.0, math.inf, 0.0, 0.0)
                  for c, turn in corners if abs(turn) > _FLAT]
-        self._lines, self._origin = len(rows), np.array([row[:2] for row in rows + arcs])
-        self._R, self._Z, along_R, along_Z, self._sign, self._low, self._high = np.array(
-            [row[:7] for row in rows + arcs]).T.copy()
-        self._along, self._left = np.array([along_R, along_Z]), np.array([-along_Z, along_R])
-        self._radius, self._start = np.array([row[7:] for row in arcs]).reshape(-1, 2).T
+        self._lines = len(rows)
+        self._table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
         """For both ends: (point, turn of the mirrored corner) on R = 0, else None: the profile goes on."""

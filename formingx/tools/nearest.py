@@ -1,0 +1,112 @@
+"""Closest points of a profile of lines and arcs, in C: compiled once, into the folder of compiled forms.
+
+Contact looks at its tools thousands of times in a run, each time at a few points: an array operation on each would cost
+more than the arithmetic.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import subprocess
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_HEADER = "void nearest(long, const double *, long, long, const double *, double *, double *, double *);"
+
+_SOURCE = r"""
+#include <math.h>
+
+enum {R, Z, ALONG_R, ALONG_Z, SIGN, LOW, HIGH, RADIUS, START, COLUMNS};
+static const double turn = 6.283185307179586;
+
+/* the piece closest to (r, z): the first of equal ones; beyond: every piece counts as if it were longer */
+static long closest(double r, double z, long pieces, long lines, const double *table, int beyond, double *distance)
+{
+    long best = -1;
+    for (long k = 0; k < pieces; k++) {
+        const double *p = table + k * COLUMNS, u = r - p[R], v = z - p[Z];
+        double d, at;
+        if (k < lines) {
+            at = u * p[ALONG_R] + v * p[ALONG_Z];
+            d = u * -p[ALONG_Z] + v * p[ALONG_R];
+        } else {
+            d = p[SIGN] * (p[RADIUS] - hypot(u, v));
+            at = 0.0;
+            if (!beyond && p[HIGH] < turn) {
+                at = fmod(p[SIGN] * (atan2(v, u) - p[START]), turn);
+                if (at < 0) at += turn;
+            }
+        }
+        if (!beyond && (at < p[LOW] || at > p[HIGH])) continue;
+        if (isnan(d)) { *distance = d; return k; }
+        if (best < 0 || fabs(d) < fabs(*distance)) { *distance = d; best = k; }
+    }
+    return best;
+}
+
+void nearest(long points, const double *x, long pieces, long lines, const double *table, double *distance,
+             double *normal, double *curvature)
+{
+    for (long i = 0; i < points; i++, x += 2, normal += 2) {
+        long k = closest(x[0], x[1], pieces, lines, table, 0, distance + i);
+        if (k < 0) k = closest(x[0], x[1], pieces, lines, table, 1, distance + i);
+        const double *p = table + k * COLUMNS, u = x[0] - p[R], v = x[1] - p[Z], away = hypot(u, v);
+        curvature[i] = -p[SIGN] / (away > 1e-300 || isnan(away) ? away : 1e-300);
+        normal[0] = -p[ALONG_Z] + curvature[i] * u;
+        normal[1] = p[ALONG_R] + curvature[i] * v;
+    }
+}
+"""
+
+_FLAGS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
+
+
+def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the signed distance of points, its gradient and its curvature, shapes (n,), (n, 2) and (n,).
+
+    Args:
+        x: points, shape (n, 2), length.
+        table: pieces of the profile, lines first, shape (m, 9). Columns: origin (R, Z), direction (R, Z; 0 of arcs),
+            sense (0 of lines), lowest and highest coordinate along the piece, radius and first angle of an arc.
+        lines: number of lines.
+    """
+    ffi, doubles, function = _compiled()
+    n = len(x)
+    x, found = np.ascontiguousarray(x), np.empty(4 * n)
+    out = ffi.from_buffer(doubles, found)
+    function(n, ffi.from_buffer(doubles, x), len(table), lines, ffi.from_buffer(doubles, table), out, out + n,
+             out + 3 * n)
+    return found[:n], found[n:3 * n].reshape(n, 2), found[3 * n:]
+
+
+@functools.cache
+def _compiled() -> tuple[Any, Any, Any]:
+    """Return cffi's interface, its type of an array, and the function in C, compiled if no run before has done it.
+
+    Raises:
+        RuntimeError: the C compiler fails, with its message. Forms could not be compiled either.
+    """
+    from cffi import FFI
+    from dolfinx import jit
+    ffi = FFI()
+    ffi.cdef(_HEADER)
+    compiler = (sysconfig.get_config_var("CC") or "cc").split()
+    key = hashlib.sha1("\n".join([_SOURCE, *compiler, *_FLAGS, sysconfig.get_platform()]).encode()).hexdigest()
+    file = Path(jit.get_options()["cache_dir"]) / f"formingx_nearest_{key}.so"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=file.parent) as folder:        # then renamed: never half-written
+            source, made = Path(folder) / "nearest.c", Path(folder) / "nearest.so"
+            source.write_text(_SOURCE)
+            done = subprocess.run([*compiler, *_FLAGS, str(source), "-o", str(made), "-lm"], capture_output=True,
+                                  text=True)
+            if done.returncode:
+                raise RuntimeError(f"{' '.join(compiler)} cannot compile formingx/tools/nearest.py: {done.stderr}")
+            os.replace(made, file)
+    return ffi, ffi.typeof("double[]"), ffi.dlopen(str(file)).nearest
