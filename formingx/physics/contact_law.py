@@ -5,7 +5,6 @@ Positions, motions and tractions of n points have c components each, 2 in the pl
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cached_property
@@ -188,7 +187,7 @@ class NormalLaw:
 
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
-        self._near: tuple[np.ndarray, Nearest] | None = None        # points last asked for, and the result
+        self._near: tuple[bytes, Nearest] | None = None     # positions last asked for, and the result
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         raise NotImplementedError
@@ -207,9 +206,10 @@ class NormalLaw:
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """See `ContactLaw`; found once for the same points."""
-        if self._near is None or not np.array_equal(x, self._near[0]):
+        positions = x.tobytes()
+        if self._near is None or positions != self._near[0]:
             near = self.tool.nearest(x)
-            self._near = x.copy(), near._replace(distance=near.distance - self.shift)
+            self._near = positions, Nearest(near.distance - self.shift, near.normal, near.curvature)
         return self._near[1]
 
     def start(self, x: np.ndarray) -> Touch:
@@ -240,8 +240,7 @@ class NormalLaw:
         return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
 
     def part(self, points: np.ndarray | slice) -> Self:
-        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return self._with(**{name: value[points] for name, value in arrays.items()})
+        return self._with(**{name: value[points] for name, value in vars(self).items() if isinstance(value, np.ndarray)})
 
     def without(self, points: np.ndarray) -> Self:
         return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
@@ -251,8 +250,8 @@ class NormalLaw:
 
     def _with(self, **other: Any) -> Self:
         """Return the same law with other attributes."""
-        law = copy.copy(self)
-        vars(law).update(other, _near=None)
+        law = object.__new__(type(self))
+        vars(law).update(vars(self), **other, _near=None)
         return law
 
 

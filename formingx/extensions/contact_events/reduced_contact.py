@@ -106,6 +106,7 @@ class Points:
         self.by = [np.zeros((*face.points.shape, 0)) for face in faces]
         self.friction, self.elastic_slip, self._scale, self._pulls = none, none, none, none.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
+        self._owned: list[tuple[int, np.ndarray, np.ndarray, Any]] = []
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
         """Add points and solve for their compliance; return False without factors.
@@ -120,6 +121,7 @@ class Points:
         new = [point for rank in self._comm.allgather([(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
                                                        for i in numbers]) for point in rank]
         self.who += new
+        self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.who)]
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
         for f, face in enumerate(self._faces):
             by = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
@@ -144,18 +146,22 @@ class Points:
             values: for each face, values at its locally owned points.
             point_ids: (rank, face, point) of each point.
         """
-        point_ids = self.who if point_ids is None else point_ids
-        found = np.zeros((len(point_ids), *values[0].shape[1:]))
-        for k, (rank, f, i) in enumerate(point_ids):
-            if rank == self._comm.rank:
-                found[k] = values[f][i]
+        located = self._owned if point_ids is None else self._of_faces(point_ids)
+        found = np.zeros((len(self.who if point_ids is None else point_ids), *values[0].shape[1:]))
+        for f, k, i, *_ in located:
+            found[k] = values[f][i]
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
 
     def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
         """Write values of these points, shape (m, ...), into the values at each face's owned points."""
-        for (rank, f, i), value in zip(self.who, values, strict=True):
-            if rank == self._comm.rank:
-                among[f][i] = value
+        for f, k, i, _ in self._owned:
+            among[f][i] = values[k]
+
+    def _of_faces(self, point_ids: Sequence[tuple[int, int, int]]) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """Return for each face with owned points its number, the places of these points in a list, and their numbers."""
+        ids = np.array(point_ids, dtype=int).reshape(-1, 3)
+        mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
+        return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
 
     def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
         """Return the motion of points to `place` along their tools and to their depth normal to them, shape (m, 2)."""
@@ -166,15 +172,12 @@ class Points:
         """Return the geometry of the tools at all points, with forces F, shape (m, 2), at these points."""
         c = self._components
         found = np.zeros((len(self.who), c + c + 2))
-        for f, face in enumerate(self._faces):
-            mine = [k for k, (rank, g, _) in enumerate(self.who) if (rank, g) == (self._comm.rank, f)]
-            i = [self.who[k][2] for k in mine]
-            if mine:
-                law = face.law.part(i)
-                near = law.nearest(at[f][i])
-                N = np.einsum("ni,ni->n", force[mine], near.normal) / self._scale[mine]
-                depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
-                found[mine] = np.column_stack([near.normal, near.tangent, near.curvature, depth - near.distance])
+        for f, k, i, law in self._owned:
+            near = law.nearest(at[f][i])
+            N = np.einsum("ni,ni->n", force[k], near.normal) / self._scale[k]
+            depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
+            found[k, :c], found[k, c:-2], found[k, -2] = near.normal, near.tangent, near.curvature
+            found[k, -1] = depth - near.distance
         found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
         return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
@@ -306,31 +309,32 @@ class Points:
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return forces (or, without `to`, their rates) and motions, shape (m, 2); `slips` are elastic slips."""
         free, by, turn = small
-        size, held = len(free), status != ContactStatus.FREE
-        sticks = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction > 0))
-        slides = np.setdiff1d(np.flatnonzero(held), sticks)
-        rows, columns, prescribed, c = [], [], [], self._components
-        for way in (near.normal, near.tangent):
-            row = np.zeros((len(sticks), size))
-            for i in range(c):
-                row[np.arange(len(sticks)), c * sticks + i] = way[sticks, i]
-            rows.append(row)
-            columns.append(row.T)
-            prescribed.append(np.zeros(len(sticks)) if to is None else np.einsum("ni,ni->n", to[sticks], way[sticks]))
+        held, m, c = status != ContactStatus.FREE, len(status), self._components
+        stuck = held & (status == ContactStatus.STICKS) & (self.friction > 0)
+        sticks, slides = np.flatnonzero(stuck), np.flatnonzero(held & ~stuck)
         mu = np.where(self.friction < np.inf, self.friction, 0.0)
-        force = near.normal + (mu * status)[:, None] * near.tangent
-        into, against = np.zeros((len(slides), size)), np.zeros((size, len(slides)))
-        for i in range(c):
-            into[np.arange(len(slides)), c * slides + i] = near.normal[slides, i]
-            against[c * slides + i, np.arange(len(slides))] = force[slides, i]
-        A, B = np.concatenate([*rows, into]), np.concatenate([*columns, against], axis=1)
-        a = np.concatenate([*prescribed, np.zeros(len(slides)) if to is None else near.beyond[slides]])
-        gives = A @ by @ B
-        stiff = np.flatnonzero(np.abs(gives).max(1, initial=0.0) < _SEARCH.none * np.abs(gives).max(initial=0.0))
-        gives[stiff, stiff] = np.abs(gives).max(initial=0.0)        # along a support, or across the axis, nothing moves
+        # one unknown force along each way: normal and tangent of sticking points, the slip line of sliding points
+        point = np.concatenate([sticks, sticks, slides])
+        into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
+        against = into.copy()
+        against[2 * len(sticks):] += (mu * status)[slides, None] * near.tangent[slides]
+        rows = c * point[:, None] + np.arange(c)
+        B, each = np.zeros((len(free), len(point))), np.arange(len(point))
+        B[rows, each[:, None]] = against
+        moves = by @ B
+        gives = (moves[rows] * into[:, :, None]).sum(1)
+        along = (free.reshape(m, c)[point] * into).sum(1)
+        largest = np.abs(gives).max(1, initial=0.0)
+        most = largest.max(initial=0.0)
+        stiff = np.flatnonzero(largest < _SEARCH.none * most)
+        gives[stiff, stiff] = most                          # along a support, or across the axis, nothing moves
+        if to is not None:
+            n = 2 * len(sticks)
+            along[:n] -= (to[point[:n]] * into[:n]).sum(1)
+            along[n:] -= near.beyond[slides]
         if slips is not None:
-            k = np.arange(len(sticks), 2 * len(sticks))
+            k = each[len(sticks):2 * len(sticks)]
             gives[k, k] += slips[sticks]
-        size_of = np.linalg.solve(gives, A @ free - a)
-        dx = (free - by @ (B @ size_of)).reshape(near.normal.shape)
-        return (B @ size_of).reshape(dx.shape) + np.einsum("nij,nj->ni", turn, dx), dx
+        size_of = np.linalg.solve(gives, along)
+        dx = (free - moves @ size_of).reshape(m, c)
+        return (B @ size_of).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx
