@@ -4,11 +4,11 @@
 
 Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
 time while paths are followed, in all and by part (contact: laws, gap closures, local problems; tangents; LU factors;
-solves; rest), forms compiled before; what made steps shorter or fail. The limit is the time of the iterations' tangents,
-LU factors and solves alone; "over" is the run over this limit. `--against` puts another version of the package beside
-it, also one that is older than this script: both run in turns, `--turns` times, and the row is the fastest. `--finest`
-adds the largest difference of the walls, farther than a thickness from the rim, to one node a step in steps of at most
-`LARGEST`.
+solves; rest), forms compiled before; what made steps shorter or fail. The limit is the time of tangents, LU factors and
+solves, one of each per iteration; "over" is the run over this limit. `--against` puts another version of the package
+beside it, also one that is older than this script. Both run in turns, `--turns` times; the fastest run counts.
+`--finest` adds the largest difference of the walls, farther than a thickness from the rim, to one node a step in steps
+of at most `LARGEST`.
 """
 
 import argparse
@@ -107,7 +107,8 @@ def relaxing_pot(finest):
         contact(finest, "top", mould, "stick", name="mould"),
         contact(finest, "bottom", plug, 0.3, direction=(0, 1), name="plug")])
     return fx.Process(scene).run([
-        called(fx.Stage, "plug", control="plug", until=fx.travel(6.0), speed=6.0), called(fx.Stage, "hold", duration=1.0),
+        called(fx.Stage, "plug", control="plug", until=fx.travel(6.0), speed=6.0),
+        called(fx.Stage, "hold", duration=1.0),
         called(fx.Stage, "vacuum", control="air", until=fx.pressure(160.0), step=step(finest)),
         called(fx.Stage, "in the mould", duration=5.0, inactive=["plug"])], accuracy=1e-2, progress=False,
         step=step(True) if finest else None)
@@ -248,8 +249,8 @@ def measured(name, finest):
             "jumps": len(path.jumps), "seconds": sum(clock.seconds.values()),
             "limit": counts.iterations * (np.mean(clock.calls["tangent"]) + np.mean(clock.calls["factorise"])
                                           + np.median(clock.calls["solve_all"])),
-            "parts": {part: clock.seconds[part] for part in PARTS}, "limits": getattr(counts, "limits", []), "ended": ended,
-            "length": R[inside].tolist(), "wall": t[inside].tolist()}
+            "parts": {part: clock.seconds[part] for part in PARTS}, "limits": getattr(counts, "limits", []),
+            "ended": ended, "length": R[inside].tolist(), "wall": t[inside].tolist()}
 
 
 def in_child(name, finest, checkout, first=True):
@@ -289,7 +290,8 @@ def line(name, version, row):
     off = row.get("to_finest")
     limits = ", ".join(f"{why} {n}" for why, n in Counter(row["limits"]).most_common(4))
     return (f"{name:15}{version:8}{row['states']:7}{row['failures']:7}{row['iterations']:7}{row['jumps']:6}"
-            f"{row['seconds']:8.2f}{row['seconds'] / row['limit']:7.1f}" + "".join(f"{100 * row['parts'][p] / row['seconds']:11.0f}" for p in PARTS)
+            f"{row['seconds']:8.2f}{row['seconds'] / row['limit']:7.1f}"
+            + "".join(f"{100 * row['parts'][p] / row['seconds']:11.0f}" for p in PARTS)
             + (f"{off:9.1e}" if off is not None else f"{'-':>9}") + f"  {limits}  {row['ended']}")
 
 

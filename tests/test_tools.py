@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.tools.shapes import Arc, Line
 
 tools = fx.tools
 SHAPES = {
@@ -274,7 +275,8 @@ class TestNearest:
         """A piece of length 0 is refused; one of 1e-6 of the profile changes no distance by more than its length."""
         with pytest.raises(fx.InputError, match="no length"):
             fx.Tool.of_pieces([Line((0, 0), (1, 0)), Line((1, 0), (1, 0)), Line((1, 0), (2, 0))])
-        cut = fx.Tool.of_pieces([Line((0, 0), (1, 0)), Line((1, 0), (1 + 2e-6, 0)), Line((1 + 2e-6, 0), (2, 0))])
+        ends = [(0, 0), (1, 0), (1 + 2e-6, 0), (2, 0)]
+        cut = fx.Tool.of_pieces([Line(*pair) for pair in zip(ends, ends[1:])])
         x = np.random.default_rng(1).uniform(-3, 3, (500, 2))
         assert np.abs(cut.signed_distance(x) - tools.plane(0.0).signed_distance(x)).max() < 1e-12
 

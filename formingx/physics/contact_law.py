@@ -240,7 +240,8 @@ class NormalLaw:
         return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
 
     def part(self, points: np.ndarray | slice) -> Self:
-        return self._with(**{name: value[points] for name, value in vars(self).items() if isinstance(value, np.ndarray)})
+        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return self._with(**{name: value[points] for name, value in arrays.items()})
 
     def without(self, points: np.ndarray) -> Self:
         return self._with(shift=self.shift + np.where(points, _FAR, 0.0))

@@ -158,7 +158,7 @@ class Points:
             among[f][i] = values[k]
 
     def _of_faces(self, point_ids: Sequence[tuple[int, int, int]]) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """Return for each face with owned points its number, the places of these points in a list, and their numbers."""
+        """Return for each face with owned points its number, their places in the list, and their numbers."""
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
         return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
