@@ -109,4 +109,5 @@ def _compiled() -> tuple[Any, Any, Any]:
             if done.returncode:
                 raise RuntimeError(f"{' '.join(compiler)} cannot compile formingx/tools/nearest.py: {done.stderr}")
             os.replace(made, file)
-    return ffi, ffi.typeof("double[]"), ffi.dlopen(str(file)).nearest
+    library: Any = ffi.dlopen(str(file))
+    return ffi, ffi.typeof("double[]"), library.nearest
