@@ -135,8 +135,8 @@ def _demo(words: list[str]) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    from .checks.scripts import look_over
-    _say(str(look_over(options.script, options.arguments)))
+    from .checks.scripts import check_script
+    _say(str(check_script(options.script, options.arguments)))
 
 
 def _compare(options: argparse.Namespace) -> None:

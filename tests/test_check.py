@@ -10,7 +10,7 @@ from conftest import ROOT, treloar
 from scipy.optimize import brentq
 
 import formingx as fx
-from formingx.checks.scripts import look_over
+from formingx.checks.scripts import check_script
 from formingx.materials.inflation import Inflated, first_peak
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}
@@ -319,7 +319,7 @@ def test_every_demo_is_sound():
     try:
         for file in sorted((ROOT / "demos").glob("*.py")):
             if "def main" in file.read_text() and file.stem not in without:
-                found = look_over(file)
+                found = check_script(file)
                 said = [f.text for f in found.findings if told.get(file.stem, "\n") not in f.text]
                 assert not said and len(found.findings) == (file.stem in told), file.stem
     finally:

@@ -8,7 +8,7 @@ from conftest import treloar
 
 import formingx as fx
 from formingx.checks.check import before_run
-from formingx.checks.towards import moulds
+from formingx.checks.mould_side import moulds
 from formingx.findings import SEVERITIES, Finding, register, worst_first
 from formingx.results.evaluate import volume
 from formingx.results.files import checkpoint_data, status

@@ -1,1 +1,1 @@
-"""A scene, or a script's, looked over before a run."""
+"""Checks of a scene or of a script before a run, and of a run after its end."""

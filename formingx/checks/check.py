@@ -1,4 +1,4 @@
-"""Check of a scene before a run, or of a run; a good scene has no findings."""
+"""Check of a scene before a run, or of a run; a sound scene has no findings."""
 
 from collections.abc import Sequence
 
@@ -10,18 +10,18 @@ from ..scene.scene import Scene
 from ..solve.branches import ANOTHER_PATH
 from ..solve.stage import Stage
 from ..units import NONE, Units
-from . import ended, ranges, scenes, touched
+from . import end_of_run, ranges, scenes, tool_contact
 from .sizes import Body
 
-# modules that register checks are named here, as they are not called by name
-__all__ = ["Report", "before_run", "check", "ended", "ranges", "scenes", "touched"]
+# the imported modules register their checks
+__all__ = ["Report", "before_run", "check", "end_of_run", "ranges", "scenes", "tool_contact"]
 
 
 class Report:
     """Findings of `check`, the worst first; prints as text.
 
     Attributes:
-        findings: list of `Finding`; empty for a good scene.
+        findings: list of `Finding`; empty for a sound scene.
     """
 
     def __init__(self, findings: Sequence[Finding]):
@@ -29,7 +29,7 @@ class Report:
 
     @property
     def healthy(self) -> bool:
-        """True if nothing was found."""
+        """True if there are no findings."""
         return not self.findings
 
     def __str__(self) -> str:
@@ -40,23 +40,31 @@ class Report:
 
 def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
            units: Units = NONE) -> Report:
-    """Look a scene over before the run; collective, no form is compiled and nothing is solved.
+    """Check a scene before its run; nothing is compiled or solved; collective.
 
-    Elements (shape, number through a thick layer), the mesh against the edges of the tools, penalties against the
-    precision that they leave, sizes that look like mixed units, pressures and blow ratios that the material does not
-    bear, tools that move away or leave a way past them, a modulus that rises as the body cools. What makes every run
-    impossible or wrong, such as a body that is free to move, elements that lie over each other or lock, is an
-    `InputError` of `Scene` already; "serious" here is a target that `trace` refuses.
+    The check covers:
+
+    * Elements: their shape, their number through a thick layer, their size at edges of tools.
+    * Penalties and the accuracy that they allow.
+    * Quantities that suggest mixed units.
+    * Pressures and blow ratios that the material cannot bear.
+    * Tools that move away from the body, and open moulds.
+    * A modulus that rises on cooling.
+
+    A "serious" finding is a target that `trace` refuses. Faults that make every run impossible raise an `InputError` in
+    `Scene` already. Examples are a body that is free to move, overlapping elements, and locking.
 
     Args:
-        scene: the scene, or the `Path` of a run. The findings of a run, without notes, and its branch points are
-            added to the findings on its scene.
-        targets: targets of the run, which are checked, too.
-        stages: stages of the process, whose targets and tables are checked, too.
+        scene: the scene, or the `Path` of a run. For a path, its warnings and its branch points are added.
+        targets: targets of the run, to be checked, too.
+        stages: stages of the process; their targets and tables are checked, too.
         units: units of the numbers in the findings.
 
+    Returns:
+        The findings, the worst first.
+
     Raises:
-        InputError: `scene` is not a Scene or a Path, a target not a target, a stage not a stage or of another scene.
+        InputError: an argument is of the wrong type, or a stage belongs to another scene.
 
     >>> print(fx.check(scene, targets=[fx.pole_height(12.0)]))
     no fault was found in this scene
@@ -79,5 +87,11 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:
-    """Return the findings with which every run begins: units and ranges, tools on their way; collective."""
+    """Return the findings at the beginning of every run: on units, magnitudes and paths of tools; collective.
+
+    Args:
+        scene: the scene.
+        targets: targets of the run.
+        stages: stages of the process.
+    """
     return found_at("start", Body(scene, targets, stages, NONE))

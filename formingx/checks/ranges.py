@@ -1,4 +1,4 @@
-"""Checks of quantities against the range of all polymers, and of pressures against the side of the mould."""
+"""Checks of quantities against the range for polymers, and of the side on which a pressure acts."""
 
 from __future__ import annotations
 
@@ -9,65 +9,67 @@ import numpy as np
 from ..findings import Finding, register
 from ..physics.loads import CentrifugalLoad, Gravity
 from ..values.table import Table
+from .mould_side import moulds, sign_towards
 from .sizes import Body
-from .towards import moulds, sign_towards
 
-_ROUGHEST = 5.0            # coefficient of friction: rubber on dry steel has 1 to 4
-_LARGE = 5.0               # length of a body that is no length in metres
-_HUGE = 1e3                # length of a body from which on it may be one in micrometres
-_STIFFEST = 1e5            # shear modulus with such a length: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
-_SOFTEST = 1e-7            # shear modulus: 0.1 Pa in MPa
-_HARDEST = 1e11            # shear modulus: 100 GPa in Pa
-_HEAVIEST = 1e3            # weight over shear modulus: the body would fall apart
-_LIGHTEST = 1e-10          # weight over shear modulus: it moves nothing
+_LARGEST_FRICTION = 5.0         # coefficient of friction; rubber on dry steel has 1 to 4
+_LONGEST_IN_METRES = 5.0        # longest body whose length may be in metres
+_SHORTEST_IN_MICROMETRES = 1e3  # shortest body whose length may be in micrometres
+_LARGEST_MODULUS_IN_MM = 1e5    # shear modulus for a length in mm: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
+_SMALLEST_MODULUS = 1e-7        # shear modulus: 0.1 Pa in MPa
+_LARGEST_MODULUS = 1e11         # shear modulus: 100 GPa in Pa
+_LARGEST_WEIGHT = 1e3           # weight over shear modulus; above it no body is in equilibrium
+_SMALLEST_WEIGHT = 1e-10        # weight over shear modulus; below it has no effect
 
 
 @register("start")
 def moduli(body: Body) -> Iterator[Finding]:
-    """Shear moduli that no polymer has in any usual system of units, with a body of this length."""
+    """Report shear moduli outside the range of polymers in the usual systems of units."""
     for layer, value in body.moduli.items():
-        most = _STIFFEST if _LARGE < body.length < _HUGE else _HARDEST
-        if not _SOFTEST < value < most:
+        in_mm = _LONGEST_IN_METRES < body.length < _SHORTEST_IN_MICROMETRES
+        largest = _LARGEST_MODULUS_IN_MM if in_mm else _LARGEST_MODULUS
+        if not _SMALLEST_MODULUS < value < largest:
             yield Finding("warning", f"materials[{layer!r}]",
-                          f"its shear modulus is {body.say(value, 'stress')} and the body"
-                          f" {body.say(body.length, 'travel')} long: no polymer has that modulus in mm and MPa, m and"
-                          f" Pa, or in and psi. Are the units of stress and length of one system?")
+                          f"its shear modulus is {body.format(value, 'stress')} and the body"
+                          f" {body.format(body.length, 'travel')} long: no polymer has that modulus in mm and MPa, m"
+                          f" and Pa, or in and psi. Are the units of stress and length of one system?")
 
 
 @register("start")
 def friction(body: Body) -> Iterator[Finding]:
-    """Coefficients of friction above the largest of rubber on steel."""
+    """Report coefficients of friction above the largest one of rubber on steel."""
     for contact in body.scene.contacts:
         if contact.sticks:
             continue
         table = getattr(contact.mu, "function", None) if contact.friction_by_temperature else None
-        most = float(table.y.max()) if isinstance(table, Table) else contact.mu
-        if isinstance(most, float) and most > _ROUGHEST:
+        value = float(table.y.max()) if isinstance(table, Table) else contact.mu
+        if isinstance(value, float) and value > _LARGEST_FRICTION:
             yield Finding("warning", repr(contact),
-                          f"its coefficient of friction is {most:.4g}: that of polymers on metal is 0.05 to 1, of"
+                          f"its coefficient of friction is {value:.4g}: that of polymers on metal is 0.05 to 1, of"
                           f" rubber up to 4. Is it a percentage? For a sheet that sticks use 'stick'")
 
 
 @register("start")
 def weight(body: Body) -> Iterator[Finding]:
-    """Weight and centrifugal forces against the stiffness of the body."""
+    """Report weights and centrifugal forces that are too large or too small for the stiffness of the body."""
     for load in body.scene.loads:
         if not isinstance(load, Gravity | CentrifugalLoad) or load.value is None:
             continue
         size = body.length if isinstance(load, Gravity) else body.length**2
         stress = max(load.density.values()) * abs(load.value) * size
         ratio = stress / max(body.moduli.values())
-        if ratio > _HEAVIEST or 0 < ratio < _LIGHTEST:
+        if ratio > _LARGEST_WEIGHT or 0 < ratio < _SMALLEST_WEIGHT:
             what = "tears the body apart" if ratio > 1 else "moves nothing"
             yield Finding("warning", repr(load),
                           f"density x acceleration x length is {ratio:.2g} times the shear modulus"
-                          f" {body.say(max(body.moduli.values()), 'stress')}, and {what}: with mm and MPa the density"
-                          f" is in t/mm3 (1e-9 for water) and the acceleration in mm/s2; with m and Pa, kg/m3 and m/s2")
+                          f" {body.format(max(body.moduli.values()), 'stress')}, and {what}: with mm and MPa the"
+                          f" density is in t/mm3 (1e-9 for water) and the acceleration in mm/s2; with m and Pa, kg/m3"
+                          f" and m/s2")
 
 
 @register("start")
 def pressures(body: Body) -> Iterator[Finding]:
-    """Pressures that all push the body away from every mould in front of it."""
+    """Report pressures that all act away from the moulds."""
     acting = [pressure for pressure in body.pressures() if pressure.item is not None and pressure.value]
     found = moulds(body.scene) if acting else []
     towards = [np.sign(value) * sign_towards(contact, load) for load, _, value, _ in acting for contact in found]

@@ -1,4 +1,4 @@
-"""Checks of a scene before a run: mesh, penalties, sizes that belong together, targets."""
+"""Checks of a scene before a run: mesh, penalties, units, targets."""
 
 from collections.abc import Iterator
 
@@ -13,14 +13,15 @@ from ..scene.scene import Scene
 from ..tools.shapes import Arc
 from .sizes import Body
 
-_FLATTEST = 110.0          # longest edge over height: discs of aspect 100 end right in benchmarks/extremes.py
-_LONGEST = 2.0             # of elements of a soft layer over its thickness: measured, hard layers around it 150 to 1000
-_PER_FILLET = 2.0          # elements along a fillet
-_PENETRATION = 0.01        # of the thickness
+_ASPECT_RATIO = 110.0       # longest edge over height; discs with 100 give correct results in benchmarks/extremes.py
+_SOFT_ELEMENT_LENGTH = 2.0  # element length over thickness of a soft layer, for a modulus ratio of 150 to 1000
+_ELEMENTS_PER_FILLET = 2.0  # smallest number of elements along a fillet
+_PENETRATION = 0.01         # largest penetration over the thickness
 
 
 @register("scene")
 def _driven(body: Body) -> Iterator[Finding]:
+    """Report a scene without a controlled load, support or tool."""
     if not body.scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process of stages that wait can run; give one"
                                           " load no value, as Pressure('bottom'), or add a"
@@ -29,20 +30,21 @@ def _driven(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _edges(body: Body) -> Iterator[Finding]:
-    """Edges of a sheet in three dimensions that nothing holds: a flat membrane has no stiffness across them."""
+    """Report unsupported edges of a sheet in three dimensions; a flat membrane has no stiffness across them."""
     if body.scene.kinematics.components == 3:
-        held = {support.on for support in body.scene.supports}
-        for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - held):
+        supported = {support.on for support in body.scene.supports}
+        for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - supported):
             yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
                           f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 
 
 @register("scene")
 def _elements(body: Body) -> Iterator[Finding]:
+    """Report elements that are much longer than high."""
     if not body.scene.model.solid:
         return
     worst = int(np.argmax(body.slenderness))
-    if body.slenderness[worst] > _FLATTEST:
+    if body.slenderness[worst] > _ASPECT_RATIO:
         yield Finding("warning", "mesh", f"an element at {body.place(worst)} is {body.slenderness[worst]:.3g} times"
                                          f" longer than high (up to 100 was tried): use more elements along the sheet,"
                                          f" or Membrane() for one so thin")
@@ -50,6 +52,7 @@ def _elements(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _locking(body: Body) -> Iterator[Finding]:
+    """Report elements that lock."""
     found = body.scene.model.locking(body.scene.mesh)
     if found is not None:
         yield Finding("warning", "mesh", str(found))
@@ -57,17 +60,18 @@ def _locking(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _layers(body: Body) -> Iterator[Finding]:
-    """Warn of one element through a thick layer, which cannot show how the strain varies.
+    """Report a thick layer with one element through it, which cannot bend, and layers of very different modulus.
 
-    Nor can long elements how a soft one is sheared at a rim: hinged, 1000 times softer, it jumped by 66 % with elements
-    of 2.5 thicknesses, by 30 % (at the corner, which is singular) with shorter ones, for any number through it.
+    Long elements of a soft layer also misrepresent its shear at a rim. In a hinged sheet with a layer 1000 times
+    softer, the stretch jumped by 66 % between elements of 2.5 thicknesses. With shorter elements it jumped by 30 %, at
+    the singular corner. The number of elements through the layer made no difference.
     """
     if not body.scene.model.solid:
         return
     scene = body.scene
     bends = scene.contacts or not any(isinstance(s, Symmetry | PrescribedDisplacement) and s.component == 1
                                       for s in scene.supports)
-    for name in scene.mesh.layers if bends else ():          # between planes that it slides on a slice stays straight
+    for name in scene.mesh.layers if bends else ():          # a slice between symmetry planes does not bend
         mine = body.layer == name
         depth = body.area[mine].sum() / body.length
         span = np.ptp(body.corners[mine][:, :, 1], axis=1).max(initial=0.0)
@@ -77,7 +81,7 @@ def _layers(body: Body) -> Iterator[Finding]:
     hard, soft = (pick(body.moduli, key=body.moduli.__getitem__) for pick in (max, min))
     ratio = body.moduli[hard] / body.moduli[soft]
     depth, edge = body.area[body.layer == soft].sum() / body.length, body.edge[body.layer == soft].min()
-    if 100 < ratio <= 1e5 and edge > _LONGEST * depth:
+    if 100 < ratio <= 1e5 and edge > _SOFT_ELEMENT_LENGTH * depth:
         yield Finding("warning", f"layer {soft!r}",
                       f"it is {ratio:.3g} times softer than {hard!r} and {depth:.3g} thick, its elements {edge:.3g}"
                       f" long or more: near a rim its shear rises within a few thicknesses, and on such elements its"
@@ -91,35 +95,36 @@ def _layers(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _fillets(body: Body) -> Iterator[Finding]:
-    """Warn of rounded edges of a tool that the face cannot follow: fewer than two of its elements along one."""
+    """Report fillets of a tool that are shorter than two elements of the face."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
         nodes = body.scene.mesh.nodes_of(contact.on)
         facets = body.scene.mesh.facets_of(contact.on)
-        total = body.scene.mesh.comm.allreduce(_own(body.scene, facets), MPI.SUM)
+        total = body.scene.mesh.comm.allreduce(_n_owned(body.scene, facets), MPI.SUM)
         edge = np.hypot(*np.ptp(nodes, axis=0)) / max(total, 1)
         arcs = [p for p in contact.tool.pieces if isinstance(p, Arc) and p.radius > 0]
         if not arcs:
             continue
-        least = min(arcs, key=lambda p: p.radius * abs(p.sweep))
-        along = least.radius * abs(least.sweep)
-        if along < _PER_FILLET * edge:
-            need = int(np.ceil(total * _PER_FILLET * edge / along))
-            middle = least.centre + least.radius * np.array([np.cos(least.start + least.sweep / 2),
-                                                             np.sin(least.start + least.sweep / 2)])
-            yield Finding("warning", repr(contact), f"its fillet of radius {least.radius:.4g} at (R, Z) ="
-                          f" ({middle[0]:.4g}, {middle[1]:.4g}) is {along:.3g} long, {along / edge:.2g} elements of the"
-                          f" face ({edge:.3g} each): use {need} or more elements along it, or a larger fillet")
+        smallest = min(arcs, key=lambda p: p.radius * abs(p.sweep))
+        length = smallest.radius * abs(smallest.sweep)
+        if length < _ELEMENTS_PER_FILLET * edge:
+            need = int(np.ceil(total * _ELEMENTS_PER_FILLET * edge / length))
+            middle = smallest.centre + smallest.radius * np.array([np.cos(smallest.start + smallest.sweep / 2),
+                                                             np.sin(smallest.start + smallest.sweep / 2)])
+            yield Finding("warning", repr(contact), f"its fillet of radius {smallest.radius:.4g} at (R, Z) ="
+                          f" ({middle[0]:.4g}, {middle[1]:.4g}) is {length:.3g} long, {length / edge:.2g} elements of"
+                          f" the face ({edge:.3g} each): use {need} or more elements along it, or a larger fillet")
 
 
-def _own(scene: Scene, facets: np.ndarray) -> int:
+def _n_owned(scene: Scene, facets: np.ndarray) -> int:
+    """Return the number of locally owned facets."""
     return int(np.sum(facets < scene.mesh.domain.topology.index_map(1).size_local))
 
 
 @register("scene")
 def _contact_penalties(body: Body) -> Iterator[Finding]:
-    """Penetration over thickness is traction / (penalty mu); the tangent's condition grows with the penalty."""
+    """Report penalties with too much penetration, about traction / (penalty mu) thicknesses, or too much round-off."""
     stress = max(body.moduli.values())
     pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"
     presses = [abs(t.value) for t in body.targets if t.name.endswith("pressure")] if pressed else []
@@ -141,7 +146,10 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _volume_penalty(body: Body) -> Iterator[Finding]:
-    """Warn of volume changes of about eps stretch^2 / 8: pressure near mu stretch^2 over a bulk modulus 8 mu/eps."""
+    """Report a volume penalty eps with a volume change above 1 %.
+
+    The change is about eps stretch^2 / 8: a pressure of about mu stretch^2 over the bulk modulus 8 mu/eps.
+    """
     model = body.scene.model
     if not model.solid:
         return
@@ -162,7 +170,7 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def _units(body: Body) -> Iterator[Finding]:
-    """Sizes that belong together and differ by orders of magnitude."""
+    """Report forces, gaps and tools whose orders of magnitude do not fit the body."""
     natural = body.natural * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
     for target in body.targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
@@ -175,7 +183,7 @@ def _units(body: Body) -> Iterator[Finding]:
             yield Finding("warning", repr(contact), f"the tool is {gap:.3g} away from a body of length"
                           f" {body.length:.3g}: are the units of length the same (mm and m)?")
             continue
-        if tool.components == 3:                             # their sizes are looked at by Scene
+        if tool.components == 3:                             # checked by Scene
             continue
         arcs = [p.radius for p in tool.pieces if isinstance(p, Arc) and p.radius > 0]
         shaped = len(tool.pieces) > 2 or tool.closed
@@ -186,9 +194,10 @@ def _units(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _targets(body: Body) -> Iterator[Finding]:
+    """Report targets that cannot be reached."""
     for target in body.targets:
         why = unreachable(body.scene, target)
-        if why is not None:                                  # a stage may leave out an item in its way
+        if why is not None:                                  # a stage may have made an obstacle inactive
             yield Finding("serious" if body.scene.driven is not None else "warning", str(target), why)
         is_length = target.name.endswith(("pole_height", "travel")) or target.name.startswith("u_")
         if is_length and abs(target.value) > 20 * body.length:

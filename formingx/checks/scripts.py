@@ -1,4 +1,4 @@
-"""A script looked over before it runs: executed up to its first run, whose scene and targets `check` looks at."""
+"""Check of a script: it is executed up to its first run, whose scene and targets are checked."""
 
 import inspect
 import os
@@ -17,23 +17,29 @@ from ..run_hooks import dry_runs
 from .check import Report, check
 
 
-class _Looked(BaseException):
-    """Raised in place of the first run; no Exception, so that a script does not catch it."""
+class _DryRun(BaseException):
+    """Exception raised in place of the first run.
+
+    It is not an `Exception`, so that a script does not catch it.
+    """
 
     def __init__(self, report: Report):
         super().__init__()
         self.report = report
 
 
-def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
+def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
     """Check the first scene that a script runs; nothing is solved.
 
     Args:
-        script: a Python file; what it does before its first run is done, also heating (`heat`).
-        arguments: its command line.
+        script: a Python file. Its code before the first run is executed, heating (`heat`) included.
+        arguments: command line arguments of the script.
+
+    Returns:
+        The findings on the scene.
 
     Raises:
-        InputError: there is no such file, it is no Python, runs no scene, or the scene or a target is refused.
+        InputError: there is no such file, it is not Python, it runs no scene, or `check` refuses the scene or a target.
     """
     file = place("check: script", script)
     if not file.is_file():
@@ -44,7 +50,7 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
     try:
         with _no_runs():
             runpy.run_path(os.fspath(file), run_name="__main__")
-    except _Looked as found:
+    except _DryRun as found:
         return found.report
     finally:
         sys.argv, sys.path[:] = before
@@ -52,6 +58,11 @@ def look_over(script: Any, arguments: Sequence[str] = ()) -> Report:
 
 
 def _check_python(file: Path) -> None:
+    """Compile a script.
+
+    Raises:
+        InputError: it is not Python.
+    """
     try:
         compile(file.read_bytes(), os.fspath(file), "exec")
     except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError) as error:
@@ -62,16 +73,16 @@ def _check_python(file: Path) -> None:
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
-    """`trace`, `solve`, `Process.run` and the like look their scene over instead of running it."""
+    """Replace `trace`, `solve`, `Process.run` and similar functions by a check of their scene, within a block."""
     def trace(scene, *, until, intermediate=(), **_):
-        raise _Looked(check(scene, targets=[*intermediate, until]))
+        raise _DryRun(check(scene, targets=[*intermediate, until]))
 
     def solve(scene, **_):
-        raise _Looked(check(scene))
+        raise _DryRun(check(scene))
 
     def run(process, stages, **_):
-        raise _Looked(check(process.scene, stages=stages))
-    inner = inspect.unwrap(formingx.trace)                  # as modules of the package know it
+        raise _DryRun(check(process.scene, stages=stages))
+    inner = inspect.unwrap(formingx.trace)                  # the function that other modules import
     tracing = [module for name, module in list(sys.modules.items())
                if name.partition(".")[0] == "formingx" and inspect.unwrap(getattr(module, "trace", len)) is inner]
     others: list[Any] = [*((module, "trace", trace) for module in tracing), (formingx, "solve", solve),

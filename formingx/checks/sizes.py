@@ -1,4 +1,4 @@
-"""Checks of pressures, blow ratios and travels of tools against the size and the strength of the body."""
+"""Checks of pressures, blow ratios and tool travels against the size and the strength of the body."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from ..scene.scene import Scene
 from ..solve.stage import Stage
 from ..tools.shapes import Tool
 from ..units import Units
-from .towards import free_way, through
+from .mould_side import free_distance, outward_directions
 
 Found = Iterator[Finding]
 
-_PRESSED = 100.0           # of the shear modulus: more presses no wall further into any corner
-_SLIGHT = 1e-4             # of shear modulus x thickness / length: as good as no pressure
-_BEYOND = 1.1              # of the largest pressure of a cap, 3 % below the pressure of a disc
-_LEFT = 0.8                # of a tube's largest pressure, at the mould: see tests/test_check.py
-_BLOWN = 8.0               # blow ratio that no bottle has
-_DEEP = 0.5                # of the opening: a wall beyond it that high is a mould's, not a grip's
-_WIDER = 4.0               # times wider than the other: of a sheet and its mould one is in another unit
-_SHARP = 10.0              # degrees that a profile turns at a corner
-_LOOKS = 400               # places of a tool on its way
+_LARGEST_PRESSURE = 100.0  # pressure over shear modulus that fills every corner
+_SMALLEST_PRESSURE = 1e-4  # pressure over shear modulus x thickness / length that has no effect
+_ABOVE_PEAK = 1.1          # pressure over the maximum of a cap (3 % below the one of a disc)
+_PRESSURE_DROP = 0.8       # pressure at the mould over the peak pressure of a tube (tests/test_check.py)
+_BLOW_RATIO = 8.0          # largest blow ratio of bottles
+_MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
+_WIDTH_RATIO = 4.0         # width of a sheet over its mould, or the inverse, that suggests different units
+_CORNER_ANGLE = 10.0       # degrees by which a profile turns at a sharp corner
+_POSITIONS = 400           # examined positions of a moving tool
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
 
 
 class Aim(NamedTuple):
-    """Target of a run: a pressure or a travel.
+    """Target of a run that is a pressure or a travel.
 
     Attributes:
-        item: the load, support or tool; None: not known.
+        item: the load, support or tool; None if it is not known.
         quantity: "pressure" or "travel".
         value: stress or length.
         text: its name in findings.
@@ -51,16 +51,22 @@ class Aim(NamedTuple):
 
 
 class Body(Triangles):
-    """A body before its run, and the targets of the run.
+    """Body before its run, with the targets of the run.
+
+    Args:
+        scene: the scene.
+        targets: targets of the run.
+        stages: stages of the process.
+        units: units of the numbers in the findings.
 
     Attributes:
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
-        natural: shear modulus x thickness / length, the size of pressures that deform a sheet, stress.
-        aims: target pressures and travels, and the largest values of tables (`Aim`).
+        natural: shear modulus x thickness / length, the magnitude of pressures that deform a sheet, stress.
+        aims: target pressures and travels, and the largest values of tables.
         goals: True if there are targets or stages.
         targets: all targets of the run and of its stages.
-        highest: targets that its stages must not exceed.
+        highest: upper bounds of quantities in the stages.
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -73,26 +79,32 @@ class Body(Triangles):
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
         self.highest = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
-            drive = None if stage.control is None else scene.items[scene.number(stage.who, stage.control)]
+            control = None if stage.control is None else scene.items[scene.number(stage.who, stage.control)]
             for target in (*stage.intermediate, stage.until):
-                self.aims += [] if target is None else self._aim(target, drive)
+                self.aims += [] if target is None else self._aim(target, control)
             for name, table in stage.tables:
-                of = scene.items[scene.number(stage.who, name)]
-                most = float(table[np.argmax(np.abs(table[:, 1])), 1])
-                self.aims.append(Aim(of, str(of.quantity), most, f"the table of {name!r} in {stage.who}"))
+                item = scene.items[scene.number(stage.who, name)]
+                value = float(table[np.argmax(np.abs(table[:, 1])), 1])
+                self.aims.append(Aim(item, str(item.quantity), value, f"the table of {name!r} in {stage.who}"))
 
-    def say(self, value: float, kind: str) -> str:
-        """Return a number as text, with its unit: of a "pressure", a "travel" (a length) or a "force"."""
+    def format(self, value: float, kind: str) -> str:
+        """Return a number with its unit as text.
+
+        Args:
+            value: the number.
+            kind: "pressure", "travel" (a length), "force" or "stress".
+        """
         unit = self._units.of(kind)
         return f"{value:.4g}" + (f" {unit}" if unit else "")
 
-    def _aim(self, target: Target, drive: Any) -> list[Aim]:
+    def _aim(self, target: Target, control: Any) -> list[Aim]:
+        """Return the `Aim` of a target in a list, empty for other quantities."""
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
         items = [t for t in self.scene.items if t.driven and t.quantity == quantity]
-        of = next((t for t in items if name and t.name == name), drive if not name and drive in items else None)
-        return [Aim(of, quantity, target.value, str(target))]
+        item = next((t for t in items if name and t.name == name), control if not name and control in items else None)
+        return [Aim(item, quantity, target.value, str(target))]
 
     def pressures(self) -> list[Aim]:
         """Return all pressures that act or are targets."""
@@ -101,25 +113,37 @@ class Body(Triangles):
         return [*fixed, *(aim for aim in self.aims if aim.quantity == "pressure")]
 
     @cached_property
-    def pushed(self) -> list[Pushed]:
-        """Faces under pressure: towards fixed tools, or of a free sheet that is inflated."""
+    def pressurised_faces(self) -> list[PressurisedFace]:
+        """Faces under pressure: opposite to fixed tools, or of a free sheet."""
         found = []
         for load in (load for load in self.scene.loads if load.quantity == "pressure"):
             try:
                 line = self.scene.mesh.line_of(load.on)
-            except InputError:                               # not one line: a section that is no sheet
+            except InputError:                               # several lines: the section is not a sheet
                 continue
             tools = [c for c in self.scene.contacts if c.direction is None and c.on != load.on]
-            found.append(Pushed(self, load, line, tools))
+            found.append(PressurisedFace(self, load, line, tools))
         return found
 
 
-class Pushed:
-    """The face of a sheet that a pressure pushes.
+class PressurisedFace:
+    """Face of a sheet under pressure.
+
+    Args:
+        body: the body.
+        load: the pressure.
+        line: nodes of the face, shape (n, 2), length.
+        tools: contacts of the opposite face with fixed tools.
 
     Attributes:
-        tools: contacts with tools that stay on its other face. tall: a tube, not a disc.
-        radius: of the tube's middle, or the reach of the disc, length.
+        load: the pressure.
+        tools: contacts of the opposite face with fixed tools.
+        line: nodes of the face, shape (n, 2), length.
+        length: length of the face in the section.
+        round: True if axisymmetric.
+        tall: True for a tube.
+        flat: True for a flat sheet.
+        radius: mean radius of a tube, or outer radius of a disc, length.
     """
 
     def __init__(self, body: Body, load: Any, line: np.ndarray, tools: list[Contact]):
@@ -129,37 +153,42 @@ class Pushed:
         self.round = body.scene.kinematics.axisymmetric
         self.tall, self.flat = high > 2 * wide, high < 0.05 * wide
         self.radius = float(np.median(line[:, 0])) + body.thickness / 2 if self.tall else wide
-        self._line = line
+        self.line = line
 
     @cached_property
-    def ways(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the other face, and where each meets a tool straight on (or infinity), shape (n, 2) each."""
+    def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points of the opposite face, and the points of the tools straight ahead of them, shape (n, 2), length.
+
+        The latter are infinite where there is no tool ahead.
+        """
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
-        points, way = through(points, self._line)
-        far = 100 * self._body.length
-        gone = np.min([free_way(c.tool, points, way, far) for c in self.tools], axis=0)[:, None]
-        return points, np.where(np.isfinite(gone), points + np.where(np.isfinite(gone), gone, 0.0) * way, np.inf)
+        points, directions = outward_directions(points, self.line)
+        limit = 100 * self._body.length
+        distance = np.min([free_distance(c.tool, points, directions, limit) for c in self.tools], axis=0)[:, None]
+        found = np.isfinite(distance)
+        return points, np.where(found, points + np.where(found, distance, 0.0) * directions, np.inf)
 
     def peak(self) -> Peak | None:
-        """Return the state of the free sheet at its maximum pressure; None: there is none, or it is not known."""
+        """Return the state of the free sheet at its maximum pressure, or None if there is none or it is unknown."""
         materials = self._body.scene.materials
         if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
         blown = Inflated(self._layers(), self.radius)
         return first_peak(blown.tube if self.tall else blown.disc)
 
-    def left(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return (ratio, peak), or None if the peak is not known or not passed.
+    def pressure_drop(self, blow_ratio: float) -> tuple[float, Peak] | None:
+        """Return (ratio, peak) of a free tube, or None if its pressure has no peak below a blow ratio.
 
-        The ratio is the smallest pressure of the free tube between its peak and a blow ratio, over the peak pressure.
+        The ratio is the smallest pressure between the peak and the blow ratio, over the peak pressure.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
             return None
-        behind = Inflated(self._layers(), self.radius).tube(np.linspace(peak.stretch, blow_ratio, 200))
-        return float(behind.min()) / peak.pressure, peak
+        pressures = Inflated(self._layers(), self.radius).tube(np.linspace(peak.stretch, blow_ratio, 200))
+        return float(pressures.min()) / peak.pressure, peak
 
     def _layers(self) -> list[tuple[Any, float]]:
+        """Return (material, thickness) of each layer."""
         body = self._body
         return [(material, float(body.area[body.layer == name].sum()) / self.length)
                 for name, material in body.scene.materials.items()]
@@ -167,160 +196,163 @@ class Pushed:
 
 @register("start")
 def _pressures(body: Body) -> Found:
-    """Pressures that no sheet of this stiffness feels, or that none bears: free, or in a mould."""
+    """Report pressures that are too small to deform the sheet, or larger than any sheet can bear."""
     stiff = max(body.moduli.values())
     for _, _, value, name in body.pressures():
-        if 0 < abs(value) < _SLIGHT * body.natural:
+        if 0 < abs(value) < _SMALLEST_PRESSURE * body.natural:
             yield Finding("warning", name,
                           f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
-                          f" {body.say(body.natural, 'pressure')} (shear modulus {body.say(stiff, 'stress')}), and"
-                          f" moves nothing: are the units of stress the same (Pa, kPa, MPa)?")
+                          f" {body.format(body.natural, 'pressure')} (shear modulus {body.format(stiff, 'stress')}),"
+                          f" and moves nothing: are the units of stress the same (Pa, kPa, MPa)?")
         free = not body.scene.contacts and abs(value) > 1e3 * body.natural
-        if free or abs(value) > _PRESSED * stiff:
+        if free or abs(value) > _LARGEST_PRESSURE * stiff:
             size, what, enough = (stiff, "shear modulus", "some ten times that fill a corner as small as the wall")
             if free:
                 size, what, enough = body.natural, "shear modulus x thickness / length", "a free sheet bears about that"
             yield Finding("warning", name,
-                          f"it is {abs(value) / size:.2g} times {what} = {body.say(size, 'pressure')}: {enough}: are"
+                          f"it is {abs(value) / size:.2g} times {what} = {body.format(size, 'pressure')}: {enough}: are"
                           f" the units of stress the same (Pa, kPa, MPa)?")
 
 
 @register("scene")
-def _bears(body: Body) -> Found:
-    """Warn of pressures above the maximum of a free sheet whose energy does not stiffen."""
-    for pushed in body.pushed:
-        if body.scene.contacts or (peak := pushed.peak()) is None:
+def _limit_pressures(body: Body) -> Found:
+    """Report pressures above the limit point of a free sheet of a material that does not stiffen."""
+    for face in body.pressurised_faces:
+        if body.scene.contacts or (peak := face.peak()) is None:
             continue
         for _, _, value, name in body.pressures():
-            if _BEYOND * peak.pressure < abs(value) <= 1e3 * body.natural:
+            if _ABOVE_PEAK * peak.pressure < abs(value) <= 1e3 * body.natural:
                 yield Finding("warning", name,
-                              f"a free {'tube' if pushed.tall else 'sheet'} of {_names(body)} bears at most about"
-                              f" {body.say(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a"
+                              f"a free {'tube' if face.tall else 'sheet'} of {_names(body)} bears at most about"
+                              f" {body.format(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a"
                               f" pole height, a pole stretch or a volume as the target: these grow past that maximum;"
                               f" {_STIFFENS} bear more")
 
 
 @register("scene")
 def _blow_ratio(body: Body) -> Found:
-    """Warn of a tube whose pressure falls far behind its peak: it bulges at one place, which ends thin."""
-    for pushed in body.pushed:
-        if not (pushed.tools and pushed.tall and pushed.round):
+    """Report a tube whose pressure falls far below its peak: it bulges locally, and becomes thin there."""
+    for face in body.pressurised_faces:
+        if not (face.tools and face.tall and face.round):
             continue
-        points, ends = pushed.ways
+        points, ends = face.mould_points
         outer = points[:, 0].max()
-        beside = np.isfinite(ends[:, 0]) & (points[:, 0] > 0.95 * outer)     # not its round end
-        ratio = float(ends[beside, 0].max(initial=outer) / outer)
-        if ratio > _BLOWN:
-            yield Finding("warning", repr(pushed.tools[0]),
-                          f"the parison of radius {body.say(pushed.radius, 'travel')} is blown up"
+        cylindrical = np.isfinite(ends[:, 0]) & (points[:, 0] > 0.95 * outer)     # without its round end
+        ratio = float(ends[cylindrical, 0].max(initial=outer) / outer)
+        if ratio > _BLOW_RATIO:
+            yield Finding("warning", repr(face.tools[0]),
+                          f"the parison of radius {body.format(face.radius, 'travel')} is blown up"
                           f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
                           f" cm)?")
-        elif (found := pushed.left(ratio)) is not None and found[0] < _LEFT:
+        elif (found := face.pressure_drop(ratio)) is not None and found[0] < _PRESSURE_DROP:
             yield Finding("warning", "materials",
                           f"a tube of {_names(body)} has its largest pressure,"
-                          f" {body.say(found[1].pressure, 'pressure')}, at a blow ratio of"
+                          f" {body.format(found[1].pressure, 'pressure')}, at a blow ratio of"
                           f" {found[1].stretch:.3g}, and only {100 * found[0]:.0f} % of it on the way to this"
                           f" mould's ratio of {ratio:.3g}: it bulges at one place, snaps, and may find no"
                           f" equilibrium before the mould. Use a larger parison; {_STIFFENS} not bulge")
 
 
 @register("scene")
-def _closing(body: Body) -> Found:
-    """Warn of an open mould: a sheet that misses it bears no more than the pressure of a free sheet."""
-    for pushed in body.pushed:
-        if not pushed.tools:
+def _open_moulds(body: Body) -> Found:
+    """Report an open mould: a sheet that passes beside it bears only the pressure of a free sheet."""
+    for face in body.pressurised_faces:
+        if not face.tools:
             continue
-        points, ends = pushed.ways
+        points, ends = face.mould_points
         open_at = points[~np.isfinite(ends[:, 0])]
-        peak = pushed.peak()
-        if not len(open_at) or len(open_at) == len(points):  # closed; or a tool beside what is blown up
+        peak = face.peak()
+        if not len(open_at) or len(open_at) == len(points):  # a closed mould, or a tool beside the sheet
             continue
-        tool = pushed.tools[0].tool
-        wall = float((tool.surface()[0] - open_at.mean(0)).dot(_across(pushed, open_at)).max())
-        aims = [aim for aim in body.pressures() if peak is not None and abs(aim.value) > _BEYOND * peak.pressure]
-        deep = not body.goals and wall > _DEEP * np.ptp(points, axis=0).max()
+        tool = face.tools[0].tool
+        depth = float((tool.surface()[0] - open_at.mean(0)).dot(_pressure_direction(face, open_at)).max())
+        aims = [aim for aim in body.pressures() if peak is not None and abs(aim.value) > _ABOVE_PEAK * peak.pressure]
+        deep = not body.goals and depth > _MOULD_DEPTH * np.ptp(points, axis=0).max()
         if aims or deep:
-            why = f"{aims[0].text} is more than the {body.say(peak.pressure, 'pressure')} that the sheet bears alone" \
-                if aims and peak else "a sheet bears little alone"
-            yield Finding("warning", repr(pushed.tools[0]),
+            why = "a sheet bears little alone"
+            if aims and peak:
+                limit = body.format(peak.pressure, "pressure")
+                why = f"{aims[0].text} is more than the {limit} that the sheet bears alone"
+            yield Finding("warning", repr(face.tools[0]),
                           f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
                           f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
                           f" blown past its end. Give the profile a floor to R = 0, or a pole height"
                           f" or a volume as the target")
 
 
-def _across(pushed: Pushed, points: np.ndarray) -> np.ndarray:
-    """Return the direction in which the pressure pushes points, on the mean."""
-    away = points.mean(0) - pushed._line.mean(0)
-    return np.array([0.0, np.sign(away[1])]) if not pushed.tall else np.array([1.0, 0.0])
+def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray:
+    """Return the mean direction in which the pressure pushes points of the opposite face."""
+    away = points.mean(0) - face.line.mean(0)
+    return np.array([0.0, np.sign(away[1])]) if not face.tall else np.array([1.0, 0.0])
 
 
 @register("start")
 def _mould_sizes(body: Body) -> Found:
-    """Warn of a sheet many times wider or narrower than its mould."""
+    """Report a sheet that is many times wider or narrower than its mould."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
         face, outline = body.scene.mesh.nodes_of(contact.on), contact.tool.surface()[0]
-        wide, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
-        if contact.direction is not None or np.ptp(face[:, 1]) > 0.1 * wide:
+        radius, reach = float(np.abs(face[:, 0]).max()), np.abs(outline[:, 0])
+        if contact.direction is not None or np.ptp(face[:, 1]) > 0.1 * radius:
             continue
         bottom, flange = outline[[np.argmin(reach), np.argmax(reach)], 1] - face[:, 1].mean()
         gap = float(-contact.tool.signed_distance(face).max())
-        narrow = reach.max() < wide / _WIDER
-        if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDER * wide and wide < gap < 20 * wide):
-            what = "reaches to" if narrow else f"is {body.say(gap, 'travel')} away, and reaches to"
+        narrow = reach.max() < radius / _WIDTH_RATIO
+        if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDTH_RATIO * radius and radius < gap < 20 * radius):
+            what = "reaches to" if narrow else f"is {body.format(gap, 'travel')} away, and reaches to"
             yield Finding("warning", repr(contact),
-                          f"the mould {what} R = {body.say(float(reach.max()), 'travel')}, the sheet to"
-                          f" {body.say(wide, 'travel')}: are the units of length the same (mm and cm)?")
+                          f"the mould {what} R = {body.format(float(reach.max()), 'travel')}, the sheet to"
+                          f" {body.format(radius, 'travel')}: are the units of length the same (mm and cm)?")
 
 
 @register("start")
-def _ways(body: Body) -> Found:
-    """Warn of a tool that moves away from its face, or past it."""
+def _tool_paths(body: Body) -> Found:
+    """Report a tool that moves away from its face, or past it."""
     for i, tool in enumerate(body.scene.items):
         if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
             continue
         if body.scene.together(i)[0] != i:
             continue
-        meets = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
+        contacts = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
         aims = [aim.value for aim in body.aims if aim.item is tool]
-        if any(value < 0 for value in aims):                 # it is taken back, or pulls
-            if aims[0] < 0 and tool.separates and tool is not body.scene.driven:       # else the aim is refused
+        if any(value < 0 for value in aims):                 # the tool is retracted, or pulls
+            if aims[0] < 0 and tool.separates and tool is not body.scene.driven:     # otherwise refused by `trace`
                 yield Finding("warning", repr(tool),
-                              f"its first travel is {body.say(aims[0], 'travel')}: below 0 it moves away from"
+                              f"its first travel is {body.format(aims[0], 'travel')}: below 0 it moves away from"
                               f" {tool.on!r}. A tool comes in along direction ="
                               f" ({', '.join(f'{m:g}' for m in tool.direction)}) with a travel above 0")
             continue
         others = bool(body.scene.loads) or len(body.scene.drivable) > 1
         size = float(max(body.scene.extent))
-        faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in meets]
+        faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in contacts]
         start = _gap(faces, tool.direction, 0.0)
-        far = max([*aims, 0.0]) or 3 * size + 2 * max(start, 0.0)
-        gaps = np.array([_gap(faces, tool.direction, travel) for travel in np.linspace(0, far, _LOOKS)])
-        near = 0.5 * min(body.edge.min(), body.thickness)
-        if gaps.min() <= near and (start > near or gaps[1] <= gaps[0]) or not far > 0:
+        travel_range = max([*aims, 0.0]) or 3 * size + 2 * max(start, 0.0)
+        gaps = np.array([_gap(faces, tool.direction, travel) for travel in np.linspace(0, travel_range, _POSITIONS)])
+        tolerance = 0.5 * min(body.edge.min(), body.thickness)
+        if gaps.min() <= tolerance and (start > tolerance or gaps[1] <= gaps[0]) or not travel_range > 0:
             continue
-        if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= near or not others or not aims):
+        if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= tolerance or not others or not aims):
             yield Finding("warning", repr(tool),
-                          f"it moves away from the body: over a travel of {body.say(far, 'travel')} its gap to"
-                          f" {tool.on!r} grows from {body.say(max(0.0, start), 'travel')} to"
-                          f" {body.say(gaps[-1], 'travel')}: must it be direction ="
+                          f"it moves away from the body: over a travel of {body.format(travel_range, 'travel')} its gap"
+                          f" to {tool.on!r} grows from {body.format(max(0.0, start), 'travel')} to"
+                          f" {body.format(gaps[-1], 'travel')}: must it be direction ="
                           f" ({', '.join(f'{0 - m:g}' for m in tool.direction)})?")
-        elif not others and gaps.min() > near:
+        elif not others and gaps.min() > tolerance:
             yield Finding("warning", repr(tool),
-                          f"it touches nothing on its way: over a travel of {body.say(far, 'travel')} it comes no"
-                          f" nearer to {tool.on!r} than {body.say(gaps.min(), 'travel')}: place it nearer (moved),"
-                          f" turn its way, or let it travel farther")
+                          f"it touches nothing on its way: over a travel of {body.format(travel_range, 'travel')} it"
+                          f" comes no nearer to {tool.on!r} than {body.format(gaps.min(), 'travel')}: place it nearer"
+                          f" (moved), turn its way, or let it travel farther")
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> float:
+    """Return the smallest gap between faces and tools at a travel, length."""
     return min(float(-tool.signed_distance(nodes - travel * np.array(moves)).max()) for tool, nodes in faces)
 
 
 @register("scene")
 def _sharp_edges(body: Body) -> Found:
-    """Warn of sharp edges of sliding tools: the force depends on the positions of nodes (tests/test_check.py)."""
+    """Report sharp edges of sliding tools: the force depends on the positions of the nodes (tests/test_check.py)."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -331,7 +363,7 @@ def _sharp_edges(body: Body) -> Found:
         pieces = contact.tool.pieces
         for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
-            if turn > _SHARP:                                # the solid is to the left: convex
+            if turn > _CORNER_ANGLE:                                # the solid is to the left: convex
                 yield Finding("warning", repr(contact),
                               f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
                               f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
@@ -341,4 +373,5 @@ def _sharp_edges(body: Body) -> Found:
 
 
 def _names(body: Body) -> str:
+    """Return the names of the materials."""
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))

@@ -1,1 +1,1 @@
-"""Numbers, tables and files of other programs, read and written."""
+"""Reading and writing of numbers, tables and files of other programs."""

@@ -1,4 +1,4 @@
-"""Tables that other programs write: CSV with named columns, and their units."""
+"""CSV tables of other programs, with named columns and units."""
 
 import csv
 import os
@@ -21,9 +21,9 @@ class Table(NamedTuple):
     """Columns of numbers.
 
     Attributes:
-        name: of the file, for messages.
+        name: name of the file, for messages.
         columns: {name: values, shape (n,)}.
-        units: {name: unit as the header states it, or None}.
+        units: {name: unit in the header, or None}.
         kinds: the column `kind` that `Path.to_csv` writes, or None.
     """
 
@@ -33,10 +33,17 @@ class Table(NamedTuple):
     kinds: list[str] | None = None
 
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
-        """Return a column times a factor (a number), or in a unit (its name; the header must state its own).
+        """Return a column in another unit.
+
+        Args:
+            column: name of the column.
+            requested: a factor, or the name of a unit, which needs a unit in the header; default as in the file.
+
+        Returns:
+            The values, shape (n,).
 
         Raises:
-            InputError: there is no such column, a cell was empty or not a number, a unit is not known or not stated.
+            InputError: there is no such column, a cell is empty or not a number, or a unit is unknown or missing.
         """
         known(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]
@@ -60,7 +67,7 @@ def conversion(unit: str, requested: str) -> float:
     """Return the number of `requested` units in one `unit`.
 
     Raises:
-        InputError: a unit is not known, or they are of different kinds.
+        InputError: a unit is unknown, or the units are of different kinds.
     """
     if unit == requested:
         return 1.0
@@ -75,11 +82,12 @@ def conversion(unit: str, requested: str) -> float:
 
 
 def read(file: Any) -> Table:
-    """Return a CSV file: a header of column names, each with its unit in brackets if it has one ("pressure [psi]"),
-    then rows.
+    """Return the table in a CSV file.
+
+    The header names the columns, with units in brackets, as in "pressure [psi]".
 
     Raises:
-        InputError: as `records`; the file has no header, a row of another length, or fewer than two rows.
+        InputError: as in `records`. There is no header, fewer than two rows, or a row of another length.
     """
     name = os.fspath(place("table", file))
     cells = records(name)
@@ -103,14 +111,17 @@ def read(file: Any) -> Table:
 
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
-    """[(line, cells)] of a CSV file, in which numbers have decimal points.
+    """Return the cells of a CSV file, with decimal points.
 
-    Cells are parted by semicolons or tabs if the first line has any outside quotes, else by commas; lines that begin
-    with # are left out. Decimal commas (of semicolons, tabs, or cells in quotes) become points,
-    where no number has a point.
+    Semicolons or tabs separate cells if the first line contains one outside quotes; otherwise commas do. Lines that
+    begin with # are skipped. Decimal commas become points unless a number contains a point. They are recognised in
+    cells between semicolons, tabs or quotes.
+
+    Returns:
+        [(line number, cells)].
 
     Raises:
-        InputError: the file cannot be read, quotes do not match, some numbers have commas and others points.
+        InputError: the file cannot be read, quotes do not match, or some numbers have commas and others points.
     """
     name = os.fspath(file)
     try:
@@ -127,8 +138,8 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
         for row in reader:
             found.append((lines[reader.line_num - 1][0], [cell.strip() for cell in row]))
     except csv.Error as error:
-        at = lines[min(reader.line_num, len(lines)) - 1][0] if lines else 0
-        raise InputError(f"table {name!r}, line {at}: {error}") from None
+        line_number = lines[min(reader.line_num, len(lines)) - 1][0] if lines else 0
+        raise InputError(f"table {name!r}, line {line_number}: {error}") from None
     commas = [(n, cell) for n, row in found for cell in row if _DECIMAL_COMMA.fullmatch(cell)]
     if not commas:
         return found
@@ -141,7 +152,7 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """Return [(number, line)] without empty lines and comment lines (#), other than inside quotes."""
+    """Return [(line number, line)] without empty lines and comment lines (#) outside quotes."""
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):
@@ -151,7 +162,15 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
-    """Return a table of arrays, all of one length of at least 2."""
+    """Return a table of arrays.
+
+    Args:
+        name: name of the table, for messages.
+        columns: {name: values, shape (n,)}, n at least 2.
+
+    Raises:
+        InputError: a column does not hold numbers, or the lengths differ or are below 2.
+    """
     arrays = {}
     for key, values in columns.items():
         try:
@@ -166,7 +185,10 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
 
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:
-    """("pressure", "psi") of "pressure [psi]"; None for a number without a unit."""
+    """Return the name and the unit from a cell of the header.
+
+    "pressure [psi]" gives ("pressure", "psi"). The unit is None for a dimensionless column.
+    """
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
     if not found or not found[1]:
         return cell, None

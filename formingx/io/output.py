@@ -13,36 +13,42 @@ from ..errors import place
 
 
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
-    """Write beside the file, then rename: an earlier file survives a failure, and its mode and owner stay.
+    """Write a file under a temporary name, then rename it.
 
-    Symbolic links are followed. An existing device or pipe is written to directly.
+    An earlier file survives a failure; its mode and owner are kept. Symbolic links are followed. An existing device or
+    pipe is written to directly.
+
+    Args:
+        file: the file.
+        write: function that writes to a stream.
+        mode: "w" or "wb".
 
     Raises:
-        OSError: the file cannot be written; it names the file, and no part is left behind.
+        OSError: the file cannot be written; the message names it. No partial file remains.
     """
     file = place("file", file)
     target = Path(os.path.realpath(file))
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    how: dict[str, Any] = {} if "b" in mode else {"newline": "", "encoding": "utf-8"}
+    temporary = target.with_name(f"{target.name}.{os.getpid()}.part")
+    options: dict[str, Any] = {} if "b" in mode else {"newline": "", "encoding": "utf-8"}
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        there = target.stat() if target.exists() else None
-        if there and not stat.S_ISREG(there.st_mode):
-            with tempfile.TemporaryFile(f"{mode}+", **how) as whole, open(target, mode, **how) as stream:
+        earlier = target.stat() if target.exists() else None
+        if earlier and not stat.S_ISREG(earlier.st_mode):
+            with tempfile.TemporaryFile(f"{mode}+", **options) as whole, open(target, mode, **options) as stream:
                 write(whole)
                 whole.seek(0)
                 shutil.copyfileobj(whole, stream)
             return
-        with open(part, mode, **how) as stream:
+        with open(temporary, mode, **options) as stream:
             write(stream)
-        if there:
+        if earlier:
             with contextlib.suppress(PermissionError):
-                os.chown(part, there.st_uid, there.st_gid)
-            os.chmod(part, stat.S_IMODE(there.st_mode))
-        os.replace(part, target)
+                os.chown(temporary, earlier.st_uid, earlier.st_gid)
+            os.chmod(temporary, stat.S_IMODE(earlier.st_mode))
+        os.replace(temporary, target)
     except BaseException as error:
         with contextlib.suppress(OSError):
-            part.unlink()
+            temporary.unlink()
         if isinstance(error, OSError):
             raise OSError(error.errno, f"{os.fspath(file)!r} could not be written: {error.strerror}") from None
         raise

@@ -10,13 +10,24 @@ from .output import replace
 
 
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the volume inside closed surfaces of triangles whose normals point outward, length^3."""
+    """Return the volume inside closed surfaces of triangles, length^3.
+
+    Args:
+        points: shape (n, 3), length.
+        triangles: numbers of the corners, shape (m, 3), with outward normals.
+    """
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
-    """Write a surface of points, shape (n, 3), and triangles, shape (m, 3), as binary STL."""
+    """Write a surface of triangles as binary STL.
+
+    Args:
+        points: shape (n, 3), length.
+        triangles: numbers of the corners, shape (m, 3).
+        file: the file.
+    """
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

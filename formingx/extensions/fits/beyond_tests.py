@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 
 from ... import _compat
-from ...checks.draws import draws
+from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
 from ...forms.carry import shapes_of
 from ...mesh.nodes import COORDINATES
@@ -30,7 +30,7 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
             yield Finding("warning", about, f"its tests ({tested}) do not determine {', '.join(tested.undetermined)}:"
                           f" in another mode of deformation its stress is a guess",
                           "fit it to tests of another mode too, or choose a law with fewer constants")
-        for what, stretch in draws(body):
+        for what, stretch in expected_stretches(body):
             strain = principal(np.array([[stretch], [stretch]]))
             if tested.outside(strain)[0]:
                 yield Finding("warning", about, f"{what} stretches it about {stretch:.3g}-fold in all directions;"

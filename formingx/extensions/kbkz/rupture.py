@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from ...checks.draws import draws
+from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
@@ -18,7 +18,7 @@ def ruptures(body: Any) -> Iterator[Finding]:
         if not hasattr(melt, "rupture_stretch"):
             continue
         most = melt.rupture_stretch("equibiaxial")
-        for about, stretch in draws(body):
+        for about, stretch in expected_stretches(body):
             if stretch > most:
                 yield Finding("warning", f"materials[{name!r}]",
                               f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly"

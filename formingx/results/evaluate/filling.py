@@ -13,7 +13,7 @@ from ...tools.shapes import Arc, Tool
 from ..files.sheet import Sheet
 from .profile import distance_to_line, fine
 
-_FLAT = 1e-6         # radians: a joint that turns less is no corner
+_FLAT = 1e-6  # radians: a joint that turns less is no corner
 
 
 class Corner(NamedTuple):

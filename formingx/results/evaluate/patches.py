@@ -12,8 +12,8 @@ import numpy as np
 
 _POWERS = np.array([(i, n - i) for n in range(4) for i in range(n, -1, -1)])
 """Exponents of (R, Z) in a cubic, shape (10, 2)."""
-_CHUNK = 2048                  # cells at a time: some 30 MB
-_KEPT = 2**25                  # numbers: operators of the fits are kept for the next state if they take less (256 MB)
+_CHUNK = 2048  # cells at a time: some 30 MB
+_KEPT = 2**25  # numbers: operators of the fits are kept for the next state if they take less (256 MB)
 
 
 class Patches:

@@ -27,12 +27,12 @@ from ...solve.newton import Failure
 
 _LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
-_RAMP_EDGE = 0.06           # distance from the outer edge of the contact ramp, over its half width, that counts as 0
-_SMALL = 1e-5          # half of a difference quotient, over the arc length of a state
-_STEP_IMBALANCE = 2e-4         # allowed imbalance of a step over the largest energy
-_RUN_IMBALANCE = 5e-3       # allowed imbalance of a run over the largest entry
-_HALVINGS = 6          # largest number of halvings of a step
-_SPLITS = 0.5, 0.35, 0.65   # positions in a step at which it is split
+_RAMP_EDGE = 0.06          # distance from the outer edge of the contact ramp, over its half width, that counts as 0
+_SMALL = 1e-5              # half of a difference quotient, over the arc length of a state
+_STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest energy
+_RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry
+_HALVINGS = 6              # largest number of halvings of a step
+_SPLITS = 0.5, 0.35, 0.65  # positions in a step at which it is split
 
 
 class _Line(NamedTuple):

@@ -9,8 +9,8 @@ from ...errors import InputError
 from ...units import NONE, Units
 from . import tabular
 
-_SHOWN = 10           # rows that are printed: the first and the last
-_LONGEST = 32_767     # characters of a cell in Excel
+_SHOWN = 10        # rows that are printed: the first and the last
+_LONGEST = 32_767  # characters of a cell in Excel
 
 
 class Sheet:

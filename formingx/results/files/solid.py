@@ -13,7 +13,7 @@ from ...units import LENGTHS, NONE, Units
 from ..evaluate.profile import fine
 from . import tabular
 
-_PARTS = 4          # straight pieces for an element's edge
+_PARTS = 4  # straight pieces for an element's edge
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Stretches to be expected of a flat sheet before it is run."""
+"""Expected stretches of a flat sheet, estimated before its run."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,24 +6,31 @@ from typing import Any
 import numpy as np
 
 
-def draws(body: Any) -> Iterator[tuple[str, float]]:
-    """Yield (what, stretch) of a flat sheet: at the pole of a free dome, in a mould the root of the draw ratio."""
-    for pushed in body.pushed:
-        if not pushed.flat or not pushed.round:
+def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
+    """Yield pairs (cause, expected stretch) of a flat sheet.
+
+    A free dome has its largest stretch at the pole. In a mould, the stretch is estimated as the root of the areal draw
+    ratio.
+
+    Args:
+        body: the `Body` to be checked.
+    """
+    for face in body.pressurised_faces:
+        if not face.flat or not face.round:
             continue
         for target in (*body.targets, *body.highest):
-            if (stretch := _of_cap(target, pushed.radius)) is not None:
+            if (stretch := _of_cap(target, face.radius)) is not None:
                 yield str(target), stretch
-        if pushed.tools:
-            points, ends = pushed.ways
+        if face.tools:
+            points, ends = face.ways
             if np.all(np.isfinite(ends)) and len(ends) > 1:
-                yield repr(pushed.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
+                yield repr(face.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
 
 
 def _of_cap(target: Any, radius: float) -> float | None:
-    """Return the stretch at the pole of a flat disc that is blown to a cap of height h radii, about 1 + h^2, or None.
+    """Return the stretch at the pole of a disc inflated to a spherical cap, 1 + (height / radius)^2.
 
-    A thin disc has it if its points move at right angles to the caps that they pass through.
+    This holds for a thin disc whose points move at right angles to the successive caps. It is None for other targets.
     """
     if target.name == "pole_stretch":
         return float(target.value)

@@ -1,4 +1,4 @@
-"""Checks of a run's tools: untouched tools, and moulds from which the body moved away."""
+"""Checks of the tools of a run: tools that were never touched, and moulds from which the body moved away."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 from ..contact import resultants
 from ..contact.tooling import Tooling
 from ..findings import Finding, register
-from .towards import moulds
+from .mould_side import moulds
 
-_AWAY = 1.1                # mean distance of the face from its mould at the end over that at the start
+_GAP_GROWTH = 1.1  # mean distance of the face from its mould, end over start
 
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
-    """Tools that the body never touched in the stages that they took part in, and moulds that it left; collective."""
+    """Report tools that never touched the body in their stages, and moulds from which it moved away; collective."""
     segment = path.segments[-1]
     problem, states = segment.problem, segment.states
-    if len(path.segments) > 1 or len(states) < 2:            # a new mesh: its states do not show what was before
+    if len(path.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
         return
-    before = moulds(problem.scene)
+    mould_contacts = moulds(problem.scene)
     names = Tooling.of_problem(problem).names
     for name in dict.fromkeys(names):
         contacts = [contact for contact, tool in zip(problem.contacts, names, strict=True) if tool == name]
@@ -30,12 +30,12 @@ def untouched(path: Any) -> Iterator[Finding]:
         active = [state for state in states if not items <= set(state.setting.get("off", ()))]
         if len(active) < 2:
             continue
-        touched = any(_touches(problem, state, contacts) for state in _looked_at(path, active[1:], name))
+        touched = any(_touches(problem, state, contacts) for state in _states_with_contact(path, active[1:], name))
         start, end = (_distances(problem, state, contacts) for state in (active[0], active[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
         gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
-        if law.direction is None and any(entry.contact in before for entry in contacts) and \
-                end.mean() > _AWAY * start.mean() + contacts[0].thickness:
+        if law.direction is None and any(entry.contact in mould_contacts for entry in contacts) and \
+                end.mean() > _GAP_GROWTH * start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
                           f" {law.on!r} grew from {start.mean():.4g} to {end.mean():.4g}. Does the pressure act on the"
                           f" other face, and has it the right sign?")
@@ -49,10 +49,10 @@ def untouched(path: Any) -> Iterator[Finding]:
             yield Finding("warning", tool, f"the body never touched this tool: {gaps}")
 
 
-def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states that can show a touch: the last with a force on the tool, else all with contact.
+def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
+    """Return the states that can show contact: the last one with a force on the tool, or else all with contact.
 
-    Side walls bear no force along Z.
+    The side walls of a mould bear no force along Z.
     """
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
@@ -61,13 +61,14 @@ def _looked_at(path: Any, states: list[Any], name: str) -> list[Any]:
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
+    """Return True if a contact touches in a state."""
     with problem.state_context(state):
         return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
                    if contact in problem.present)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Distances of the points of faces from their tools at a state, of all ranks, shape (n,), length."""
+    """Return the distances between faces and their tools in a state, of all ranks, shape (n,), length."""
     with problem.state_context(state):
         found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
                  for contact in contacts]

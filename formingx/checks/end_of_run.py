@@ -1,4 +1,4 @@
-"""Checks of a run that has ended: its last state, its jumps, the contacts of its tools."""
+"""Checks at the end of a run: its last state, its jumps, the contact with its tools."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -9,7 +9,7 @@ from ..results.evaluate import edges, resticking, snaps, tension, volume
 
 @register("end")
 def inadmissible(path: Any) -> Iterator[Finding]:
-    """Inadmissible states, from the first one on (`State.verdict`)."""
+    """Report the first inadmissible state (`State.verdict`)."""
     bad = next((state for state in path.states if state.verdict), None)
     if bad is not None:
         yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used: {bad.verdict}")
@@ -17,7 +17,7 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def volumes(path: Any) -> Iterator[Finding]:
-    """Elements of the last state that do not keep their volumes; collective."""
+    """Report elements of the last state that do not keep their volumes; collective."""
     error = path.last.measures["volume_error"]
     yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > volume.BOUND else None)
     yield from volume.of_point(path)
@@ -25,7 +25,7 @@ def volumes(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def contact(path: Any) -> Iterator[Finding]:
-    """Penetration that changes forces, faces in tools between contact points, edges, points that stick again."""
+    """Report penetration that changes forces, coarse elements at edges, and points that stick again elsewhere."""
     yield from path.admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
     yield from resticking.findings(resticking.furthest(path))
@@ -33,6 +33,6 @@ def contact(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def equilibrium(path: Any) -> Iterator[Finding]:
-    """Membranes in compression, and jumps that change the wall; collective."""
+    """Report membranes in compression, and jumps that change the wall; collective."""
     yield from tension.findings(tension.first_compression(path))
     yield from snaps.findings(snaps.largest(path))
