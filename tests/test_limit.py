@@ -7,8 +7,10 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT, run
+from scipy.spatial import cKDTree
 
 from formingx.forms.material_history import MaterialHistory
+from formingx.mesh import nodes as mesh_nodes
 from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -20,6 +22,25 @@ def test_importing_loads_nothing_that_only_some_scripts_use():
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert "formingx.extensions.heat" in loaded
     assert {"gmsh", "matplotlib", "plotly", "pyvista", "scipy", "tqdm"}.isdisjoint(loaded)
+
+
+def test_a_picture_does_not_load_pyplot():
+    """PyVista imports it for charts, which are drawn nonetheless."""
+    code = """import sys
+from formingx import figures
+pyvista = figures.pyvista()
+print("matplotlib.pyplot" in sys.modules, pyvista.plotting.charts.plt.get_fignums(), "matplotlib.pyplot" in sys.modules)
+import matplotlib.pyplot
+print(matplotlib.pyplot.get_fignums())"""
+    printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert printed == "False [] True\n[]\n"
+
+
+def test_nearest_points_are_those_of_a_tree():
+    points, places = (np.random.default_rng(k).random((n, 2)) for k, n in ((1, 60), (2, 50)))
+    places = places.reshape(2, 25, 2)
+    for found, wanted in zip(mesh_nodes.nearest(points, places), cKDTree(points).query(places)):
+        assert np.array_equal(found, wanted)
 
 
 def test_a_run_costs_little_more_than_its_linear_algebra():

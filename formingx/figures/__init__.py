@@ -1,5 +1,8 @@
 """Empty figures, drawn without a screen and shown by notebooks, and the tools of a scene in them."""
 
+import importlib
+import sys
+import types
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -31,6 +34,27 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
         a.set_axisbelow(True)
         a.spines[["top", "right"]].set_visible(False)
     return drawing, axes[0] if len(axes) == 1 else axes
+
+
+def pyvista() -> Any:
+    """Return the module pyvista, imported without `matplotlib.pyplot`: it is loaded if pyvista uses it, for charts."""
+    name = "matplotlib.pyplot"
+    if "pyvista" not in sys.modules and name not in sys.modules:
+        sys.modules[name] = _LoadedWhenUsed(name)
+        try:
+            importlib.import_module("pyvista.plotting")
+        finally:
+            del sys.modules[name]
+    return importlib.import_module("pyvista")
+
+
+class _LoadedWhenUsed(types.ModuleType):
+    """A module that is imported when one of its names is used."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):                               # asked for by the machinery of imports
+            raise AttributeError(name)
+        return getattr(importlib.import_module(self.__name__), name)
 
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:

@@ -7,6 +7,8 @@ from mpi4py import MPI
 
 from .. import _compat
 
+MOST_COMPARED = 1_000_000
+"""At most so many coordinates are compared to find nearest points one by one."""
 COORDINATES = 2
 """Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
 
@@ -36,6 +38,21 @@ def span(domain: Any, comm: Any) -> np.ndarray:
 def of_space(space: Any) -> np.ndarray:
     """Return the reference positions of the unknowns of a space (of blocks, the blocks), shape (n, COORDINATES)."""
     return space.tabulate_dof_coordinates()[:, :COORDINATES]
+
+
+def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance from each place to the nearest point, and the number of that point, shapes as of `places`.
+
+    Args:
+        points: shape (n, d), length.
+        places: shape (..., d), length.
+    """
+    if len(points) * places.size > MOST_COMPARED:
+        from scipy.spatial import cKDTree
+        return cKDTree(points).query(places)
+    squares = ((places[..., None, :] - points) ** 2).sum(-1)            # importing SciPy takes longer than all of them
+    numbers = squares.argmin(-1)
+    return np.sqrt(np.take_along_axis(squares, numbers[..., None], -1)[..., 0]), numbers
 
 
 def of_cells(domain: Any, cells: Any) -> np.ndarray:

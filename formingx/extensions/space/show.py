@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import figures
 from ...errors import InputError
 from ...mesh.nodes import COORDINATES
 from ...results import files
@@ -41,7 +42,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     images = path.scene.symmetry.images(3)
 
     def draw():
-        import pyvista
+        pyvista = figures.pyvista()
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import figures
 from ...errors import positive
 from ...results import files
 from ...results.show.views import plotted
@@ -39,7 +40,7 @@ def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _draw(loss: Any, lines: list, file: Any, scale: float) -> None:
-    import pyvista
+    pyvista = figures.pyvista()
     axisymmetric = loss.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])
     size = scale * np.ptp(everything, axis=0).max()

@@ -10,7 +10,7 @@ import numpy as np
 from ...contact import resultants
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...mesh.nodes import of_facets
+from ...mesh.nodes import nearest, of_facets
 from ...ranks import gathered
 from ..files.sheet import Sheet
 
@@ -59,12 +59,11 @@ class ContactFace:
     """
 
     def __init__(self, path: Any, contact: Any):
-        from scipy.spatial import cKDTree
         self._path, self._contact = path, contact
         self._at_nodes = contact.contact.points == "nodes"
         self.reference_points, _ = self._gathered(contact.points)
         self.nodes = self._edge_points().reshape(-1, self.reference_points.shape[1])
-        self.nearest = cKDTree(self.reference_points).query(self.nodes)[1]
+        self.nearest = nearest(self.reference_points, self.nodes)[1]
         if self._at_nodes:
             self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # ghost edges occur twice
             self._reference_tangents = _tangents(self.reference_points[self._edges])

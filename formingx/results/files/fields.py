@@ -28,10 +28,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import ufl
 
-from ... import _compat
+from ... import _compat, figures
 from ...errors import InputError
 from ...measures.relaxed import ElasticStretches
-from ...mesh.nodes import own_cells
+from ...mesh.nodes import nearest, own_cells
 from .. import files
 from ..evaluate.contact_face import ContactFace
 
@@ -111,12 +111,11 @@ class Fields:
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
         """Return the contact pressure at the nodes of the cells, zero away from tools, shape (cells, nodes)."""
-        from scipy.spatial import cKDTree
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
                 face = ContactFace(self._path, contact)
-                away, at = cKDTree(face.nodes).query(self.points.reshape(-1, self.points.shape[-1]))
+                away, at = nearest(face.nodes, self.points.reshape(-1, self.points.shape[-1]))
                 self._faces[k] = face, face.nearest[at], away < 1e-9 * self._problem.forms.length
             face, at, on_face = self._faces[k]
             pressure += np.where(on_face, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
@@ -158,7 +157,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
     """Return a VTU file as text: points and {name: values}, shape (cells, nodes, components)."""
-    import pyvista
+    pyvista = figures.pyvista()
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
     cells, nodes = points.shape[:2]
     kind = {3: pyvista.CellType.QUADRATIC_EDGE, 6: pyvista.CellType.QUADRATIC_TRIANGLE}[nodes]

@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import math
 from importlib import resources
 from typing import Any
 
@@ -75,6 +76,41 @@ def picture(png: bytes, caption: str, kind: str) -> str:
     text = html.escape(caption, quote=True)
     return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
             f"<figcaption>{text}</figcaption></figure>")
+
+
+def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
+    """Return lines over 1, 2, 3, ... with a logarithmic axis as a small figure (SVG), with a caption.
+
+    Args:
+        lines: positive values; empty lines are left out.
+        x: label of the horizontal axis; y: of the vertical axis.
+    """
+    values = [value for line in lines for value in line]
+    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    high, longest = max(high, low + 1), max(max(map(len, lines)), 2)
+    left, top, width, height = 60, 10, 400, 260
+
+    def across(number):
+        return left + width * (number - 0.7) / (longest - 0.4)
+
+    def down(exponent):
+        return top + height * (high - exponent) / (high - low)
+    drawn = []
+    for number in range(1, longest + 1, 1 + longest // 12):
+        drawn.append(f"<path class=line d='M{across(number):.1f} {top}v{height}' />"
+                     f"<text x={across(number):.1f} y={top + height + 18}>{number}</text>")
+    for exponent in range(low, high + 1, 1 + (high - low) // 8):
+        drawn.append(f"<path class=line d='M{left} {down(exponent):.1f}h{width}' />"
+                     f"<text class=left x={left - 6} y={down(exponent) + 5:.1f}>1e{exponent}</text>")
+    for line in filter(None, lines):
+        points = [f"M{across(k):.1f} {down(math.log10(value)):.1f}" for k, value in enumerate(line, 1)]
+        drawn.append(f"<path d='{'L'.join(points).replace('LM', 'L')}' />")
+        drawn += [f"<path class=dot d='{point}h0' />" for point in points]
+    drawn += [f"<text x={left + width // 2} y=312>{html.escape(x)}</text>",
+              f"<text x={-top - height // 2} y=14 transform='rotate(-90)'>{html.escape(y)}</text>"]
+    words = html.escape(caption)
+    return (f"<figure class=small><svg viewBox='0 0 480 320' role=img><title>{words}</title>{''.join(drawn)}</svg>"
+            f"<figcaption>{words}</figcaption></figure>")
 
 
 def lines(text: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...findings import Finding, worst_first
+from ...mesh.nodes import nearest
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from .. import files
 from ..evaluate import volume
@@ -275,16 +276,15 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
     """Return the temperature at the nodes of profiles, from the history variables in a checkpoint."""
-    from scipy.spatial import cKDTree
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
-    nearest = None
+    numbers = None
     for values, state in zip(found, states):
         kept = next((m for m in state["memory"] if "temperature" in m and "points" in m), None)
         if kept is None or last is None:
             return found
-        if nearest is None:
-            nearest = cKDTree(kept["points"]).query(np.array([last.reference_bottom, last.reference_top]))[1]
-        values["temperature"] = np.asarray(kept["temperature"])[nearest].mean(0)
+        if numbers is None:
+            numbers = nearest(np.asarray(kept["points"]), np.array([last.reference_bottom, last.reference_top]))[1]
+        values["temperature"] = np.asarray(kept["temperature"])[numbers].mean(0)
     return found
 
 
@@ -362,8 +362,6 @@ def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
 
     The face of the sheet that is nearer to the contact points is used.
     """
-    from scipy.spatial import cKDTree
-    tree = cKDTree(table.reference_points)
-    away, at = zip(*(tree.query(p) for p in points))
+    away, at = zip(*(nearest(table.reference_points, p) for p in points))
     nearer = np.argmin([a.mean() for a in away])
     return table.pressure[at[nearer]]

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from ...units import NONE, Units
 from .. import files
 from ..evaluate.part import Part, part
 from ..evaluate.wall import Wall
-from . import interactive, page, plots
+from . import interactive, page
 from .record import Record, of_checkpoint, of_path, words
 
 
@@ -161,13 +160,10 @@ def _behind(record: Record, units: Units) -> list[str]:
         found += ["<h2>Tools</h2>", _tools(record, units)]
     found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()])]
     found.append(page.details("All measures at limit points and at the end", _key_numbers(record, units)))
-    caption = "Correction of every Newton iteration, one line a state."
     if record.limits:
         found.append("<p>What made steps shorter, or fail: " + html.escape(", ".join(
             f"{why} ({times} times)" for why, times in record.limits.items())) + ".</p>")
-    drawn = any(len(h) > 1 for h in record.histories)
-    convergence = page.figure(_convergence(record), caption, "small") if drawn else ""
-    found.append(page.details("Convergence", convergence + _iterations(record)))
+    found.append(page.details("Convergence", _convergence(record) + _iterations(record)))
     some = "States that are drawn" if len(record.frames) < len(record.kinds) else "All states"
     found.append(page.details(some, _states(record, units)))
     return found
@@ -321,10 +317,11 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
         return file.read_bytes()
 
 
-def _convergence(record: Record) -> Any:
-    """Return a figure of the convergence of the Newton iterations."""
-    states = [SimpleNamespace(history=[SimpleNamespace(correction=row[1]) for row in h]) for h in record.histories]
-    return plots.convergence(SimpleNamespace(states=states)).figure
+def _convergence(record: Record) -> str:
+    """Return a drawing of the corrections of all Newton iterations, one line a state; empty without iterations."""
+    lines = [[row[1] for row in history if row[1] > 0] for history in record.histories]
+    return page.logarithmic(lines, "Newton iteration", "correction |\u0394x|/|x|",
+                            "Correction of every Newton iteration, one line a state.") if any(lines) else ""
 
 
 def _iterations(record: Record) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import figures
 from ...errors import InputError
 from .. import files
 from ..evaluate.profile import distance_to_line
@@ -69,7 +70,7 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
     """Draw the swept section on this rank."""
-    import pyvista
+    pyvista = figures.pyvista()
 
     def swept(line, values):
         points = np.array([place(line, s) for s in stations])                      # (stations, coordinate, point)
@@ -107,7 +108,7 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
     Yields:
         The pyvista plotter.
     """
-    import pyvista
+    pyvista = figures.pyvista()
     picture = io.BytesIO()
     with screen():
         plotter: Any = pyvista.Plotter(off_screen=True, window_size=(1000, height))
