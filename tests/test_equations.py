@@ -8,7 +8,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import formingx as fx
-from formingx.forms.schedule import Setting
+from formingx.forms.schedule import StepData
 from formingx.measures.targets import Target
 from formingx.solve.arc_length import Curve
 from formingx.solve.equations import Equations
@@ -34,7 +34,7 @@ class Arch(Equations):
     def __init__(self):
         self.comm, self.memory, self.clock, self.force_scale = MPI.COMM_SELF, [], 0.0, 0.0
         self.matrix = PETSc.Mat().createAIJ((2, 2), nnz=2, comm=self.comm)
-        self.x, self._setting = self.matrix.createVecRight(), Setting([0.0, 0.0], [1.0, 0.0], [])
+        self.x, self._setting = self.matrix.createVecRight(), StepData([0.0, 0.0], [1.0, 0.0], [])
 
     symmetric, setting = True, property(lambda self: self._setting)
 

@@ -9,7 +9,7 @@ from test_contact import support_force
 
 import formingx as fx
 from formingx.forms.formulation import Formulation
-from formingx.forms.schedule import Setting
+from formingx.forms.schedule import StepData
 from formingx.problem.problem import Problem
 from formingx.results.show.plots import main_columns
 from formingx.solve.state import State
@@ -182,8 +182,8 @@ def test_derivative_by_control_after_a_change_of_stage(number):
     rate[number] = 1.0
     if number == 1:                                                         # all together
         rate = [0.3, 0.0, 0.0, -0.5, 0.2, 0.1]
-    base = Setting(**state.setting).standing(state.control)
-    problem.enter(Setting(base, rate, [], stage=9), state.x, 0.0)
+    base = StepData(**state.setting).amplitudes(state.control)
+    problem.enter(StepData(base, rate, [], stage=9), state.x, 0.0)
     plus, minus, exact, x = (problem.x.duplicate() for _ in range(4))
     for out, control in ((plus, h), (minus, -h)):
         x.setArray(state.x)
@@ -301,7 +301,7 @@ def test_supports_that_open_and_close():
     assert same(opened, plain.last)
     own = held.forms.space.dofmap.index_map.size_local
     assert same(end(path, "close"), plain.last, n=own)      # without the hinge's force
-    held.enter(Setting(**end(path, "down").setting), end(path, "down").x, 0.0)
+    held.enter(StepData(**end(path, "down").setting), end(path, "down").x, 0.0)
     assert np.abs(end(path, "down").x - opened.x)[held.held].max() < 1e-14
     assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent
     assert np.abs(path.last.x).max() < 1e-8

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
-from formingx.forms.schedule import Setting
+from formingx.forms.schedule import StepData
 from formingx.materials.material import Material
-from formingx.physics.supports import MeanHeld
+from formingx.physics.supports import ConstrainedMean
 from formingx.problem.problem import Problem
 from formingx.results.files.arrays import pack, unpack
 
@@ -25,7 +25,7 @@ class Hung(fx.Support):
     """The mean displacement along Z is 0: an even traction carries what hangs."""
 
     def constraints(self):
-        return [MeanHeld(1, self.on)]
+        return [ConstrainedMean(1, self.on)]
 
 
 class Foundation(fx.Support):
@@ -246,7 +246,7 @@ def test_the_identity_of_a_scene_sees_its_fields():
 def relaxing(model, material=None):
     problem = Problem(fx.Scene(mesh=disc(), materials=material or Relaxing(1.0, 2.0, 0.5), model=model,
                                supports=[SYMMETRY, fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")]))
-    problem.enter(Setting([0.1, 0, 0, 0.2], [0.5, 0, 0, 2.0], []), np.zeros(problem.x.getLocalSize()), 0.0)
+    problem.enter(StepData([0.1, 0, 0, 0.2], [0.5, 0, 0, 2.0], []), np.zeros(problem.x.getLocalSize()), 0.0)
     return problem
 
 

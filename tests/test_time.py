@@ -148,7 +148,7 @@ def test_tangent_and_control_derivative_in_time(model):
     with problem.state_context(last):
         setting = problem.setting
         rate = [1.0 if item in scene.loads else 0.0 for item in scene.items] + [2.0]
-        base = [*setting.standing(last.control)[:-1], last.time + 0.1]
+        base = [*setting.amplitudes(last.control)[:-1], last.time + 0.1]
         base = [b - r * last.control for b, r in zip(base, rate)]
         problem.enter(type(setting)(base, rate, []), last.x, last.control)
         x, d, out = (problem.x.duplicate() for _ in range(3))

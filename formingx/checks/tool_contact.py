@@ -27,7 +27,7 @@ def untouched(path: Any) -> Iterator[Finding]:
     for name in dict.fromkeys(names):
         contacts = [contact for contact, tool in zip(problem.contacts, names, strict=True) if tool == name]
         items = {i for i, item in enumerate(problem.scene.items) if any(item is c.contact for c in contacts)}
-        active = [state for state in states if not items <= set(state.setting.get("off", ()))]
+        active = [state for state in states if not items <= set(state.setting.get("inactive", ()))]
         if len(active) < 2:
             continue
         touched = any(_touches(problem, state, contacts) for state in _states_with_contact(path, active[1:], name))

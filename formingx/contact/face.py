@@ -76,7 +76,7 @@ class FaceContact:
         self.start()
 
     def enter(self, base: float, rate: float, present: bool) -> None:
-        """Take a stage: the travel is base + rate * control (`Setting`), if the contact takes part."""
+        """Take a stage: the travel is base + rate * control (`StepData`), if the contact takes part."""
         self._base, self._rate, self.present = base, rate, present
 
     def shift_distances(self, by: np.ndarray) -> None:
@@ -349,11 +349,11 @@ class FaceContact:
         return Memory(touch, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
     def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
-              there: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
+              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
         """See `History`: a point touches if the nearest point of the source touched, and has the slip fitted there."""
         if memory is None:
             return None
-        carrier, touch, theta = Carrier(self.comm, there(source.points), self.points), memory.touch, self.law.theta
+        carrier, touch, theta = Carrier(self.comm, mapping(source.points), self.points), memory.touch, self.law.theta
         distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
                                       (touch.distance, memory.arrived, memory.penalty))
         touched, position = distance > -source.law.theta, self.positions(x, control)

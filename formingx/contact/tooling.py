@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 from ..physics.contact import Contact
 from ..tools.shapes import Arc, Line, Tool
 
@@ -56,8 +56,8 @@ class Tooling(NamedTuple):
         """Return the travel of each tool (length) for these step data and control; None: the tool is inactive."""
         if not setting:
             return [0.0] * len(self.contacts)
-        there = Setting(**setting)
-        return [None if i in there.off else self.length * there.amplitude(i, control)
+        there = StepData(**setting)
+        return [None if i in there.inactive else self.length * there.amplitude(i, control)
                 for i in range(self.before, self.before + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:

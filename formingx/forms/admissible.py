@@ -1,7 +1,7 @@
-"""Admissibility of a body: lengths along the hoop and areas in the plane are positive.
+"""Admissibility of a body: hoop stretches and in-plane determinants are positive.
 
-det F > 0 at the quadrature points is not enough: beyond the axis the hoop stretch and the in-plane determinant are both
-negative, and between those points a strongly bent edge may turn an element inside out.
+det F > 0 at the quadrature points is not enough. Beyond the axis the hoop stretch and the in-plane determinant are
+both negative, so their product is positive. A strongly bent edge may also invert an element between these points.
 """
 
 from __future__ import annotations
@@ -16,13 +16,17 @@ from .. import _compat
 from ..mesh.nodes import of_cells, own_cells
 
 _MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
-"""Midpoints of the edges. (Corners are left out: where a free side turns onto a plate a corner is singular, and the
-determinant there has no limit.)"""
+"""Midpoints of the edges. Corners are left out: where a free side turns onto a plate, the determinant has no limit."""
 
 
-class Least(NamedTuple):
-    """The worst value found: which quantity ("hoop stretch", "in-plane determinant" or "volume ratio"), its value, and
-    the reference point (R, Z) where it is, length."""
+class WorstValue(NamedTuple):
+    """Worst value of the checked quantities in a body.
+
+    Attributes:
+        quantity: "hoop stretch", "in-plane determinant" or "volume ratio".
+        value: value of the quantity (dimensionless).
+        point: reference position (R, Z) of the value, length.
+    """
 
     quantity: str
     value: float
@@ -30,17 +34,22 @@ class Least(NamedTuple):
 
 
 class Admissible:
-    """Hoop stretch and in-plane determinant of a formulation at two sets of quadrature points and at edge midpoints.
+    r"""Hoop stretch and in-plane determinant of a body at two sets of quadrature points and at edge midpoints.
 
-    The in-plane determinant is det(1 + grad u) of the two in-plane components; on the axis the hoop stretch is its
-    limit, dr/dR. Membranes have a hoop stretch only. All that does not depend on the state is computed once; a
-    state then costs some products of arrays.
+    .. math::
+        \lambda_\theta = 1 + u_r / R, \qquad
+        d = \left(1 + \frac{\partial u_r}{\partial R}\right) \left(1 + \frac{\partial u_z}{\partial Z}\right)
+            - \frac{\partial u_r}{\partial Z} \frac{\partial u_z}{\partial R}
+
+    On the axis the hoop stretch is its limit, :math:`1 + \partial u_r / \partial R`. A membrane has a hoop stretch
+    only.
+    The constructor computes all arrays that do not depend on the state.
 
     Args:
         forms: a `Formulation`; its `w` is the examined field.
 
     Attributes:
-        dofs: unknowns of u_r and of u_z of this rank's own cells, shape (cells, n) each.
+        dofs: unknowns of each displacement component in the locally owned cells, list of arrays of shape (cells, n).
     """
 
     def __init__(self, forms: Any):
@@ -69,36 +78,44 @@ class Admissible:
             gradients = np.einsum("dpa,cpdx->cpxa", shapes[1:], np.linalg.inv(jacobian))
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
-    def least(self) -> Least:
-        """Return the smallest hoop stretch or in-plane determinant at the state last set; collective.
+    def least(self) -> WorstValue:
+        """Return the smallest hoop stretch or in-plane determinant of the current fields; collective.
 
-        If values are not finite, the first of them.
+        Returns:
+            The smallest value with its reference position; the first value that is not finite, if there is one.
         """
-        found = [Least("in-plane determinant", np.inf, (0.0, 0.0))]
+        found = [WorstValue("in-plane determinant", np.inf, (0.0, 0.0))]
         for quantity, values in self.quantities().items():
             if values.size:
                 k = np.unravel_index(np.argmin(np.where(np.isfinite(values), values, -np.inf)), values.shape)
-                found.append(Least(quantity, float(values[k]), tuple(self._X[k].tolist())))
+                found.append(WorstValue(quantity, float(values[k]), tuple(self._X[k].tolist())))
         parts = [part for parts in self._forms.comm.allgather(found) for part in parts]
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
-    def furthest_volume_ratio(self) -> Least | None:
-        """Return the volume ratio J whose logarithm is largest at the state last set; None of a membrane;
-        collective."""
+    def furthest_volume_ratio(self) -> WorstValue | None:
+        """Return the volume ratio J with the largest |ln J| of the current fields; collective.
+
+        Returns:
+            The volume ratio with its reference position; None for a membrane.
+        """
         if not self._solid:
             return None
-        found = Least("volume ratio", 1.0, (0.0, 0.0))
+        found = WorstValue("volume ratio", 1.0, (0.0, 0.0))
         J = np.prod(list(self.quantities().values()), axis=0)
         if J.size:
             k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
-            found = Least("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
+            found = WorstValue("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
         return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
-        """Return the root mean square of J - 1 at the state last set over the elements away from places; collective.
+        """Return the root mean square of J - 1 over the elements far from given positions; collective.
 
         Args:
-            places: reference points, shape (k, 2), length; distance: elements that come nearer do not count, length.
+            places: reference positions, shape (k, 2), length.
+            distance: elements with a quadrature point nearer to one of the positions are left out, length.
+
+        Returns:
+            Volume-weighted root mean square for the current fields (dimensionless); 0 if no element is left.
         """
         X, n = self._X[:, : self._n], self._n
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
@@ -109,17 +126,25 @@ class Admissible:
         return float(np.sqrt(squares / total)) if total else 0.0
 
     def volume_ratios(self) -> tuple[float, float]:
-        """Return the least and the largest J at quadrature points of the energy, at the state last set; collective."""
+        """Return the extreme volume ratios at the quadrature points of the energy; collective.
+
+        Returns:
+            Smallest and largest J of the current fields (dimensionless).
+        """
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
         found = self._forms.comm.allgather((J.min(initial=np.inf), J.max(initial=-np.inf)))
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
-        """Return True if no point is beyond the axis and in-plane determinants are positive at quadrature points.
+        """Check that no point lies beyond the axis and that elements are not inverted; collective.
 
-        The quadrature points belong to the energy. Between them an element that a sharp edge bends strongly may be
-        inside out without harm to the solution, as in a coarse mesh under a plug: `least` finds it. All ranks, at the
-        state last set; collective.
+        In-plane determinants are checked at the quadrature points of the energy only. Between them a sharp edge may
+        invert
+        a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `least` finds such
+        points.
+
+        Returns:
+            True if all checked values of the current fields are positive on all ranks.
         """
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
@@ -127,9 +152,11 @@ class Admissible:
         return all(self._forms.comm.allgather(mine))
 
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
-        """Return (number of elements with a point where J <= 0, of all elements, the worst point (R, Z)) of a solid.
+        """Count the inverted elements of a solid for the current fields; collective.
 
-        At the state last set; collective.
+        Returns:
+            Number of elements with a point where J <= 0, number of all elements, reference position (R, Z) of the
+            smallest J.
         """
         J = np.prod(list(self.quantities().values()), axis=0)
         mine = (np.inf, (0.0, 0.0))
@@ -140,14 +167,18 @@ class Admissible:
         return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
 
     def quantities(self) -> dict[str, np.ndarray]:
-        """{quantity: its values at the points of this rank's own cells, shape (cells, points)}."""
+        """Return the checked quantities at the points of the locally owned cells.
+
+        Returns:
+            Mapping from the name of a quantity to its values, shape (cells, points).
+        """
         w, size = self._forms.w.x.array, self._forms.length
         u = np.stack([w[dofs] for dofs in self.dofs], -1) * size                  # (cells, dofs, 2)
         found, along = {}, np.ones(())
         if self._solid:
-            by_R, by_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, len(self.dofs)), 2, 0)
-            along = 1 + by_R[..., 0]
-            found["in-plane determinant"] = along * (1 + by_Z[..., 1]) - by_Z[..., 0] * by_R[..., 1]
+            d_R, d_Z = np.moveaxis((self._gradients @ u).reshape(*self._X.shape, len(self.dofs)), 2, 0)
+            along = 1 + d_R[..., 0]
+            found["in-plane determinant"] = along * (1 + d_Z[..., 1]) - d_Z[..., 0] * d_R[..., 1]
         if self._has_hoop:
             hoop = 1 + (u[..., 0] @ self._values.T) / self._R
             found["hoop stretch"] = np.where(self._on_axis, along, hoop)

@@ -14,19 +14,29 @@ from ..ranks import gathered
 from .probes import Probe
 
 _NEIGHBOURS = 12
-"""Points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
+"""Number of points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
 
 
 class Carrier:
-    """Local fits of quadratic polynomials to values at scattered points: exact for quadratics, else of third order.
+    r"""Interpolating moving least squares between scattered points.
 
-    Weights are the inverse fourth power of the distance, so values at a point that both meshes have stay as they are
-    (interpolating moving least squares: Lancaster and Salkauskas, Mathematics of Computation 37, 1981). At a jump of
-    the values a fit overshoots by less than a tenth of it.
+    A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
+    (Lancaster and Salkauskas, Mathematics of Computation 37, 1981):
+
+    .. math::
+        \min_p \sum_{i=1}^{k} \frac{(p(x_i) - f_i)^2}{|x_i - y|^4}
+
+    Quadratic functions are reproduced exactly; other functions have an error of third order in the distance of the
+    points. A value at a point of both sets is kept. At a discontinuity the fit overshoots by less than a tenth of the
+    jump.
 
     Args:
-        comm: communicator; source, target: locally owned points, shapes (m, components), (n, components), length;
-            collective.
+        comm: MPI communicator; the constructor is collective.
+        source: locally owned source points, shape (m, components), length.
+        target: locally owned target points, shape (n, components), length.
+
+    Attributes:
+        nearest: number of the source point nearest to each target point, in the order of `all`, shape (n,).
     """
 
     def __init__(self, comm: Any, source: np.ndarray, target: np.ndarray):
@@ -44,22 +54,37 @@ class Carrier:
         self._share = np.linalg.pinv(weight[..., None] * basis, rcond=1e-9)[:, 0] * weight
 
     def fitted(self, values: np.ndarray) -> np.ndarray:
-        """Return the fit at `target`, shape (n, ...), of owned values at `source`, shape (m, ...); collective."""
+        """Return the fit at the target points; collective.
+
+        Args:
+            values: values at the locally owned source points, shape (m, ...).
+
+        Returns:
+            Fitted values at the locally owned target points, shape (n, ...).
+        """
         return np.einsum("nk,nk...->n...", self._share, self.all(values)[self._rows])
 
     def all(self, values: np.ndarray) -> np.ndarray:
-        """Return the values at `source` of all ranks, which `nearest` numbers; collective."""
+        """Return the values at the source points of all ranks; collective.
+
+        Args:
+            values: values at the locally owned source points, shape (m, ...).
+
+        Returns:
+            Values in the order that `nearest` refers to, shape (all source points, ...).
+        """
         return gathered(self._comm, values)
 
 
 def take_fields(source: Any, state: Any, problem: Any) -> None:
-    """Set the fields of a problem on a part of a mesh to those of a solid in a state on the whole mesh; collective.
+    """Set the fields of a problem on part of a mesh from a state on the whole mesh; collective.
 
-    Exact, cell by cell: a displacement is quadratic with a bubble, a pressure linear.
+    The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear.
 
     Args:
-        source, state: the problem on the whole mesh, and its state.
-        problem: the problem on the part, whose `forms.w` is set.
+        source: problem of a solid on the whole mesh.
+        state: state of `source`.
+        problem: problem on the part of the mesh; its `forms.w` is set.
     """
     whole, part = source.forms, problem.forms
     domain = whole.domain
@@ -86,12 +111,20 @@ def take_fields(source: Any, state: Any, problem: Any) -> None:
 
 
 _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
-"""Corners, middles of the edges opposite to them, centre of a cell."""
+"""Corners, midpoints of the opposite edges, centroid of the reference triangle."""
 
 
 def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
-    """Return a UFL expression in this rank's own cells at places of the reference cell, shape (cells, places,
-    components)."""
+    """Evaluate a UFL expression in the locally owned cells.
+
+    Args:
+        domain: DOLFINx mesh.
+        expression: UFL expression with c components.
+        where: positions in the reference cell, shape (q, dimension).
+
+    Returns:
+        Values, shape (cells, q, c).
+    """
     cells = own_cells(domain)
     shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
     found = _compat.compile_expression(expression, where)
@@ -108,18 +141,21 @@ def _shapes(barycentric: np.ndarray) -> np.ndarray:
 
 
 def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
+    """Return the corner positions of a cell as a set that identifies it, independent of their order."""
     return frozenset((float(r), float(z)) for r, z in corners)
 
 
 def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, moved: bool = False) -> None:
-    """Set the history variables of a problem from a state of the same body on another mesh; collective.
+    """Set the history variables of a problem from a state on another mesh of the body; collective.
 
-    Contact histories are left out if the problems have different numbers of histories, or if `moved`.
+    Contact histories are left out if the problems have different numbers of histories, or if `moved` is True.
 
     Args:
-        source, state: the problem on the other mesh, and its state.
-        problem: the problem whose history variables are set.
-        x, control: the same state on the mesh of `problem`, locally owned entries.
+        source: problem on the other mesh.
+        state: state of `source`.
+        problem: problem whose history variables are set.
+        x: unknowns of the same state on the mesh of `problem`, locally owned entries.
+        control: control of the state.
         moved: True if the mesh of `problem` is a mesh of the deformed body in `state`.
     """
     problem.look_at(x, control)
@@ -133,24 +169,34 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
             mine.put(mine.carry(other, kept, x[: problem.n_owned], control, on_this_mesh))
 
 
-def fitted_shapes(carrier: Carrier, values: np.ndarray, there: np.ndarray, here: np.ndarray) -> np.ndarray:
-    """Return the fit of positive tensors, as C, entries 11, 22, 12, 33, at the targets, shape (n, 4); collective.
+def fitted_shapes(carrier: Carrier, values: np.ndarray, source_F: np.ndarray, target_F: np.ndarray) -> np.ndarray:
+    r"""Return a fit of symmetric positive definite tensors at the target points; collective.
 
-    The fit is of the logarithm of F^-T C F^-1, the tensor relative to the present configuration. So the stresses
-    continue, independently of a fit of F.
+    The logarithm of the tensor relative to the present configuration is fitted:
+
+    .. math::
+        \ln(F^{-T} C F^{-1})
+
+    Stresses are therefore continuous under the transfer, independently of a fit of F.
 
     Args:
-        values: the tensors at the source points, shape (m, 4).
-        there, here: deformation gradients at the source points and at the targets, shapes (m, 3, 3), (n, 3, 3).
+        carrier: transfer between the points.
+        values: entries 11, 22, 12, 33 of C at the source points, shape (m, 4).
+        source_F: deformation gradients at the source points, shape (m, 3, 3).
+        target_F: deformation gradients at the target points, shape (n, 3, 3).
+
+    Returns:
+        Entries 11, 22, 12, 33 of C at the target points, shape (n, 4).
     """
-    seen = np.linalg.solve(np.swapaxes(there, 1, 2), _matrices(values))
-    w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(there, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
+    seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
+    w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
     w, v = np.linalg.eigh(carrier.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))
-    C = np.einsum("nji,njl,nl,nml,nmk->nik", here, v, np.exp(w), v, here, optimize=True)
+    C = np.einsum("nji,njl,nl,nml,nmk->nik", target_F, v, np.exp(w), v, target_F, optimize=True)
     return np.stack([C[:, 0, 0], C[:, 1, 1], C[:, 0, 1], C[:, 2, 2]], axis=1)
 
 
 def _matrices(entries: np.ndarray) -> np.ndarray:
+    """Return the matrices of tensors with the entries 11, 22, 12, 33, shape (n, 3, 3)."""
     found = np.zeros((len(entries), 3, 3))
     found[:, 0, 0], found[:, 1, 1], found[:, 0, 1], found[:, 2, 2] = entries.T
     found[:, 1, 0] = found[:, 0, 1]
@@ -158,8 +204,16 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 
 def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the deformation gradient that materials see, scaled to det F = 1, at places in some cells, shape (n, 3,
-    3); collective."""
+    """Evaluate the isochoric elastic deformation gradient in some cells; collective.
+
+    Args:
+        forms: the `Formulation`.
+        cells: local numbers of the cells.
+        places: positions in the reference cell, shape (q, dimension).
+
+    Returns:
+        F without thermal expansion, scaled to det F = 1, shape (cells q, 3, 3).
+    """
     F = forms.elastic_F
     expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
     found = (expression.eval(forms.domain, cells) if len(cells) else np.zeros(0)).reshape(-1, 3, 3)

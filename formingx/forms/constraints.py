@@ -1,4 +1,4 @@
-"""Constraints by supports: of unknowns, and of means over boundaries; and the active ones of a stage."""
+"""Constraints of unknowns and of boundary means by supports, and the active constraints of a stage."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..errors import InputError
-from ..physics.supports import Held
+from ..physics.supports import Constrained
 
 
 class Entry(NamedTuple):
     """Unknowns that one item of the scene can constrain.
 
     Attributes:
-        item: number of the item in `Scene.items`, -1 for unknowns that appear in no equation.
+        item: number of the item in `Scene.items`; -1 for unknowns that appear in no equation.
         bc: the DirichletBC.
-        dofs: local numbers of the unknowns, ghosts too, shape (n,).
-        driven: True if they follow the control.
+        dofs: local numbers of the unknowns with ghosts, shape (n,).
+        driven: True if the unknowns follow the control.
     """
 
     item: int
@@ -31,15 +31,15 @@ class Entry(NamedTuple):
 
 
 class Active(NamedTuple):
-    """Constraints that are active while some items take no part.
+    """Constraints that are active while some items are inactive.
 
     Attributes:
-        bcs: DirichletBCs.
-        dofs: local numbers of the constrained unknowns, ghosts too, ascending, shape (n,).
-        owned: mask of the locally owned ones, shape (n,).
+        bcs: list of the DirichletBCs.
+        dofs: local numbers of the n constrained unknowns with ghosts, ascending, shape (n,).
+        owned: mask of the locally owned unknowns in `dofs`, shape (n,).
         driver: number of the item that moves each unknown, or -1, shape (n,).
-        rows: row of each constrained mean of the scene, locally owned entries; 0 if the mean is not active.
-        present: for each of these means True if it is active.
+        rows: row of each constrained mean of the scene, locally owned entries; 0 if the mean is inactive.
+        present: True for each of these means that is active.
     """
 
     bcs: list[Any]
@@ -51,15 +51,18 @@ class Active(NamedTuple):
 
 
 class Constraints:
-    """All constraints that a scene can have.
+    """All constraints that the supports of a scene can impose.
 
     Args:
         forms: the `Formulation`.
         assemble: function that returns the locally owned entries of a compiled linear form.
 
     Attributes:
-        entries: constrained unknowns, a list of `Entry`.
-        means: constrained means, [(number of the item, row: locally owned entries, shape (n,))].
+        entries: list of `Entry`, the constrained unknowns.
+        means: constrained means, list of (number of the item, row); a row has the locally owned entries, shape (n,).
+
+    Raises:
+        InputError: a support at a position where the mesh has no node.
     """
 
     def __init__(self, forms: Any, assemble: Callable[[Any], np.ndarray]):
@@ -69,7 +72,7 @@ class Constraints:
         self.means: list[tuple[int, np.ndarray]] = []
         for i, support in enumerate(forms.scene.items):
             for item in forms.constraints(support):
-                if isinstance(item, Held):
+                if isinstance(item, Constrained):
                     sub = forms.space.sub(0).sub(item.component)
                     dofs = self._dofs_of(support, sub, item)
                     self.entries.append(Entry(i, fem.dirichletbc(zero, dofs, sub), dofs, item.driven))
@@ -84,26 +87,41 @@ class Constraints:
         return any(entry.driven for entry in self.entries)
 
     def driven_by(self, item: int) -> np.ndarray:
-        """Return the local numbers of the owned unknowns that an item of the scene (its number) moves."""
+        """Return the unknowns that an item of the scene moves.
+
+        Args:
+            item: number of the item in `Scene.items`.
+
+        Returns:
+            Local numbers of the locally owned unknowns, ascending, shape (n,).
+        """
         dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.item == item and e.driven]))
         return dofs[dofs < self._n]
 
-    def without(self, off: set[int]) -> Active:
-        """Return the constraints that are active without the items of these numbers."""
-        entries = [entry for entry in self.entries if entry.item not in off]
+    def active(self, inactive: set[int]) -> Active:
+        """Return the active constraints for a set of inactive items.
+
+        Args:
+            inactive: numbers of the inactive items in `Scene.items`.
+
+        Returns:
+            The constraints of all other items. Where two supports meet, a driven one takes precedence.
+        """
+        entries = [entry for entry in self.entries if entry.item not in inactive]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
         drivers = np.concatenate([np.zeros(0, dtype=int),
                                   *(np.full(len(e.dofs), e.item if e.driven else -1) for e in entries)])
         order = np.argsort(drivers < 0, kind="stable")          # where two supports meet, the driven one counts
         dofs, first = np.unique(numbers[order], return_index=True)
         owned = dofs < self._n
-        present = [item not in off for item, _ in self.means]
+        present = [item not in inactive for item, _ in self.means]
         rows = [active * row for (_, row), active in zip(self.means, present, strict=True)]
         for row in rows:
             row[dofs[owned]] = 0
         return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)
 
-    def _dofs_of(self, support: Any, sub: Any, item: Held) -> np.ndarray:
+    def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
+        """Return the local numbers of the unknowns that a support constrains, shape (n,)."""
         forms = self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(sub, forms.mesh.facets.dim, forms.mesh.facets_of(item.on))

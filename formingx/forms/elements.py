@@ -1,4 +1,4 @@
-"""Elements of a body in a state: their deformation and their shape quality."""
+"""Deformation and shape quality of the elements of a body in a state."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge,
 
 
 class Body(NamedTuple):
-    """A solid in one state, all ranks: m elements with k quadrature points each.
+    """Elements of a solid in one state, all ranks: m elements with k quadrature points each.
 
     Attributes:
-        points, moved: reference and deformed quadrature points, shape (m, k, 2), length.
-        J, I1: det F and tr F^T F at these points, shape (m, k).
-        section: F within the section, shape (m, k, 2, 2).
-        layers: tag of each element, shape (m,).
+        points: reference quadrature points, shape (m, k, 2), length.
+        moved: deformed quadrature points, shape (m, k, 2), length.
+        J: det F at the quadrature points, shape (m, k).
+        I1: tr F^T F at the quadrature points, shape (m, k).
+        section: in-plane part of F, shape (m, k, 2, 2).
+        layers: tag of the layer of each element, shape (m,).
         outline: deformed nodes around each element, shape (m, 6, 2), length.
-        quality, at_rest: `shape_quality` of the corner triangle of each element, deformed and in the reference
-            configuration, shape (m,).
+        quality: `shape_quality` of the deformed corner triangle of each element, shape (m,).
+        initial_quality: the same in the reference configuration, shape (m,).
     """
 
     points: np.ndarray
@@ -37,11 +39,20 @@ class Body(NamedTuple):
     layers: np.ndarray
     outline: np.ndarray
     quality: np.ndarray
-    at_rest: np.ndarray
+    initial_quality: np.ndarray
 
 
 def body(problem: Any, x: Any, control: float) -> Body | None:
-    """Return the elements of a solid at a state (None: a membrane has no elements across its thickness); collective."""
+    """Evaluate the elements of a solid in a state; collective.
+
+    Args:
+        problem: the `Problem`.
+        x: unknowns of the state.
+        control: control of the state.
+
+    Returns:
+        The elements; None for a membrane, which has no elements across its thickness.
+    """
     forms = problem.forms
     domain = forms.domain
     if domain.topology.dim != 2 or domain.geometry.dim != 2:

@@ -1,4 +1,4 @@
-"""Temperature-dependent coefficients in the forms: at the beginning of a step, and their change in it."""
+"""Temperature-dependent coefficients at the beginning of a step, and their extrapolation within it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,21 @@ from dolfinx import fem
 
 
 class Followed:
-    """f(T) at the quadrature points of the energy, above 0 or below, where the temperature may change with time.
+    r"""Coefficient f(T) at the quadrature points of the energy, for temperatures that may change with time.
 
-    The temperature is known at the beginning of a step. In the step f goes on as it went in the step before, its
-    logarithm in proportion to the time: the error is of second order in the step, and f does not change its sign.
+    The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
+    with
+    its logarithmic rate in the previous step:
+
+    .. math::
+        f(t) = f_0 \exp(a (t - t_0)), \qquad a = \frac{\ln f_0 - \ln f_{-1}}{t_0 - t_{-1}}
+
+    The error is of second order in the step length, and f keeps its sign.
 
     Args:
-        forms: the `Formulation`; values: a `Function` of a quadrature element, which holds f(T).
-        parts: [(local numbers of cells, f)].
+        forms: the `Formulation`.
+        values: `Function` of a quadrature element, set to f(T).
+        parts: list of (local numbers of cells, f).
         temperatures: temperatures in the cells of each part, see `take`.
     """
 
@@ -31,11 +38,21 @@ class Followed:
         self.take(temperatures)
 
     def at(self, time: Any) -> Any:
-        """Return f at a time (UFL scalar) of the step."""
+        """Return the coefficient at a time of the step.
+
+        Args:
+            time: process time (UFL scalar).
+
+        Returns:
+            f (UFL scalar).
+        """
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
     def take(self, temperatures: Iterable[np.ndarray]) -> None:
-        """Update f to changed temperatures: the result of `Temperature.now_and_before` for the cells of each part.
+        """Update the coefficient to changed temperatures.
+
+        Args:
+            temperatures: `Temperature.now_and_before` for the cells of each part, shape (1 or 2, cells, q) each.
 
         Raises:
             InputError: f has no value at a temperature.

@@ -1,13 +1,12 @@
-"""Forms of a scene: the common base of a solid and a membrane.
+"""Forms of a scene: common base class of solids and membranes.
 
-Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
-largest shear modulus). The energy is divided by stress times reference volume. So a run does not depend on the
-user's units, and `solve` works with numbers of order one.
+Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress`
+(the largest shear modulus). The energy is divided by stress times reference volume. A run therefore does not depend
+on the user's units, and the solver works with numbers of order one.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import Any
 
 import basix.ufl
@@ -22,6 +21,7 @@ from .. import _compat
 from ..errors import together
 from ..physics import kinematics as kin
 from .admissible import Admissible
+from .body_model import BodyModel
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -31,36 +31,47 @@ from .probes import Probe
 from .temperature import Temperature
 
 
-class Formulation(ABC):
-    """The forms of a scene.
+class Formulation(BodyModel):
+    """Forms of a scene.
 
     Attributes:
-        scene: the scene.
-        mesh: the `Mesh` that the fields live on; domain, comm: its `dolfinx.mesh.Mesh` and communicator.
-        length, stress, volume: scales L and mu, and the reference volume, in the user's units.
-        space, w: the mixed `FunctionSpace` and the `Function` of all fields (dimensionless), displacement first.
-        displacement_element: the scalar element of a displacement component.
-        u, X: displacement and reference position (UFL, user's unit of length, shape (2,)).
-        F: deformation gradient (UFL, shape (3, 3)); elastic_F: less thermal expansion; J: determinant of
-            that over `ratio_before`: det F of the deformation transferred from another mesh (`Preformed`).
-        dx, weight: weight * dx is the element of reference volume.
-        control: the `Constant` of the dimensionless control; time: process time (UFL), which follows it.
-        scales: the user's value (pressure, travel, ...) over the amplitude (`Setting`), for every item of the scene;
-            last, 1 for the time. control_scale: scale of the only controlled item, or L.
+        scene: the `Scene`.
+        mesh: `Mesh` of the fields.
+        domain: `dolfinx.mesh.Mesh` of the fields.
+        comm: MPI communicator.
+        length: scale L of lengths, the largest extent of the mesh, length.
+        stress: scale of stresses, the largest shear modulus, stress.
+        volume: reference volume, length^3.
+        space: mixed `FunctionSpace` of all fields, displacement first.
+        w: `Function` of all fields (dimensionless).
+        displacement_element: scalar element of a displacement component.
+        u: displacement (UFL, length, shape (2,)).
+        X: reference position (UFL, length, shape (2,)).
+        F: deformation gradient (UFL, shape (3, 3)).
+        elastic_F: F without thermal expansion (UFL, shape (3, 3)).
+        J: det `elastic_F` over `ratio_before` (UFL scalar).
+        ratio_before: det F of the deformation transferred from another mesh (`Preformed`), else 1.
+        dx: measure of the domain.
+        weight: reference volume per measure `dx` (UFL scalar).
+        control: `Constant` of the dimensionless control.
+        time: process time, a function of the control (UFL scalar, time).
+        scales: for every item of the scene, its value (pressure, travel, ...) in the user's units over its amplitude
+            (`StepData`); the last entry, 1, belongs to the time.
+        control_scale: scale of the only controlled item, or L.
         terms: the `MaterialTerms` of each material of the scene.
         histories: arguments of the forms besides fields, control and time (`History`).
         potential: potential of a step over stress times volume (UFL, rank 0).
-        energy: stored energy over stress times volume (UFL, rank 0), without histories the potential; or None.
+        energy: stored energy over stress times volume (UFL, rank 0), or None; without histories the potential.
         dissipation: dissipated power over stress times volume (UFL, rank 0), or None.
-        damage_energy: energy that damage has cost over stress times volume (UFL, rank 0), or None.
-        load_values: [(load, its value (UFL, the user's unit))], as the stage and the control have it.
-        residual: dpotential/dw - external virtual work (UFL, rank 1).
-        control_derivative, time_derivative: derivatives of `residual` by the control, through the loads and through
-            the time in materials; or None.
-        elastic_supports: [(support with an energy, 1 while the support is active, else 0 (`Constant`))].
+        damage_energy: energy dissipated by damage over stress times volume (UFL, rank 0), or None.
+        load_values: list of (load, its value at the present stage and control (UFL, the user's units)).
+        residual: dpotential/dw minus the external virtual work (UFL, rank 1).
+        control_derivative: derivative of `residual` with respect to the control, through the loads, or None.
+        time_derivative: derivative of `residual` with respect to the control, through the time in materials, or None.
+        elastic_supports: list of (support with an energy, `Constant` that is 1 while the support is active, else 0).
         load_works: virtual work of each load of the scene at its present value (UFL, rank 1, user's units).
-        temperature: the `Temperature` of the body, or None.
-        faces: the faces in contact of the problem (`FaceContact`), which makes them after the forms.
+        temperature: `Temperature` of the body, or None.
+        faces: contact faces of the problem (`FaceContact`); the problem sets them.
         slack_at_rest: True if the body in the reference configuration has no stiffness in some direction.
     """
 
@@ -102,56 +113,12 @@ class Formulation(ABC):
         self._take_supports(body)
         self.residual, self.control_derivative, self.time_derivative = self._residual(body)
 
-    @abstractmethod
-    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """(outward normal, measure) of a boundary that a load acts on."""
-
-    @abstractmethod
-    def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints of a support: a list of Held or MeanHeld."""
-
-    @abstractmethod
-    def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of `mesh` that represent points of the body, shape (n, 2)."""
-
-    @abstractmethod
-    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
-        """Return the integral (UFL) of a density over the reference volume of some layers."""
-
-    @abstractmethod
-    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return Z of the points of a layer that the points (R, Z) of `mesh` represent, shape (n,) each."""
-
-    @abstractmethod
-    def _make_mesh(self) -> Any:
-        """Return the `Mesh` of the fields."""
-
-    @abstractmethod
-    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
-        """Return the scalar element of the displacement, and the elements of all fields."""
-
-    @abstractmethod
-    def _groups(self) -> list[tuple[Any, list[str]]]:
-        """[(material, layers)] with one form of the energy."""
-
-    @abstractmethod
-    def _weight(self) -> Any:
-        """See `weight`."""
-
-    @abstractmethod
-    def _deformation_gradient(self) -> Any:
-        """See `F`."""
-
-    @abstractmethod
-    def _energy(self, of: Any) -> Any:
-        """`potential` or `energy`: of(terms, F) is the energy density (stress) of a `MaterialTerms`."""
-
     def _take_materials(self) -> None:
         """Set the coefficients, histories and energies of the materials."""
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.terms = list(dict.fromkeys(self._terms.values()))
-        self._pasts = [terms.material.integral.history(self, terms) for terms in self.terms if terms.held]
+        self._pasts = [terms.material.integral.history(self, terms) for terms in self.terms if terms.past_integrals]
         changing = [terms for terms in self.terms if terms.internal]
         self.histories: list[History] = [*self._pasts, *(MaterialHistory(self, terms) for terms in changing)]
         self.potential = self._energy(MaterialTerms.step_energy)
@@ -176,25 +143,46 @@ class Formulation(ABC):
                                                for e in (self.potential, self.energy))
 
     def refresh(self) -> None:
-        """Update the coefficients that depend on changed fields or time."""
+        """Update the coefficients that depend on changed fields or on time."""
         for past in self._pasts:
             past.refresh()
 
     def dissipated(self, factor: Any) -> Any:
-        """Return the integral (UFL) of a factor times the power that is dissipated per reference volume."""
+        """Return the weighted integral of the dissipated power.
+
+        Args:
+            factor: weight (UFL scalar).
+
+        Returns:
+            Integral (UFL) of the factor times the dissipated power per reference volume.
+        """
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
                    for terms in self.terms if terms.internal)
 
     def elastic(self, F: Any) -> Any:
-        """Return the mechanical part of a deformation gradient F (UFL, shape (3, 3)), without thermal expansion."""
+        """Return a deformation gradient without thermal expansion.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            Its elastic part (UFL, shape (3, 3)).
+        """
         return F if self._free is None else self._free.elastic(F)
 
     def temperatures(self, terms: MaterialTerms) -> np.ndarray:
-        """`Temperature.now_and_before` at the quadrature points of a material."""
+        """Return the temperatures at the quadrature points of a material.
+
+        Args:
+            terms: the `MaterialTerms`.
+
+        Returns:
+            Result of `Temperature.now_and_before`, shape (1 or 2, cells, q).
+        """
         return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 
     def take_temperature(self) -> None:
-        """Update the constants to a changed temperature; scales stay as they are; collective.
+        """Update the constants to a changed temperature; scales are kept; collective.
 
         Raises:
             InputError: a constant has no value at a temperature.
@@ -203,35 +191,83 @@ class Formulation(ABC):
         together(self.comm, [entry.take_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
-        """Return the cells of `mesh` in which some layers are, this rank's own and ghosts, ascending local numbers."""
+        """Return the cells of some layers.
+
+        Args:
+            layers: names of the layers.
+
+        Returns:
+            Local cell numbers with ghosts, ascending, shape (n,).
+        """
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
     def admissible(self) -> Any:
-        """Return the check of the admissibility of the body."""
+        """Return the admissibility check of the body.
+
+        Returns:
+            A new `Admissible` for the fields `w`.
+        """
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:
-        """Return the `Probe` of the displacement at reference points (R, Z), shape (n, 2)."""
+        """Return the probe of the displacement at reference points.
+
+        Args:
+            problem: the `Problem`.
+            points: reference positions (R, Z), shape (n, 2), length.
+
+        Returns:
+            The `Probe`.
+        """
         return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
 
-    def mean_row(self, held: Any) -> Any:
-        """Return the linear form of a `MeanHeld`: mean of a displacement component (dimensionless) over a boundary."""
+    def mean_row(self, constraint: Any) -> Any:
+        """Return the linear form of a constrained mean.
+
+        Args:
+            constraint: the `ConstrainedMean`.
+
+        Returns:
+            Mean of a displacement component (dimensionless) over a boundary (UFL, rank 1).
+        """
         raise NotImplementedError
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
-        """Return [(sub space, local dofs)] of unknowns that appear in no equation: they stay 0."""
+        """Return the unknowns that appear in no equation and stay 0.
+
+        Returns:
+            List of (subspace, local numbers of its unknowns).
+        """
         return []
 
     def set_stiff(self) -> None:
-        """Set `w` near the reference configuration with a regular tangent, for the first direction of a path."""
+        """Set `w` near the reference configuration to fields with a regular tangent, for the first direction of a path.
+        """
         self.w.x.array[:] = 0
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a number in a form that can be changed without compiling it again."""
+        """Return a number in a form that can be changed without recompiling the form.
+
+        Args:
+            value: initial value.
+
+        Returns:
+            The `Constant`.
+        """
         return fem.Constant(self.domain, PETSc.ScalarType(value))
 
     def compile(self, form: Any) -> Any:
-        """Return a compiled form."""
+        """Compile a form.
+
+        Args:
+            form: UFL form.
+
+        Returns:
+            The compiled form.
+
+        Raises:
+            TimeoutError: another process has not finished the compilation of the same form.
+        """
         try:
             return _compat.compile_form(form)
         except TimeoutError as error:
@@ -241,37 +277,70 @@ class Formulation(ABC):
                 " .cache/fenics") from error
 
     def integral(self, form: Any) -> float:
-        """Return the value of a UFL integral over all ranks, compiled for this one use."""
+        """Compute an integral over all ranks; the form is compiled for this one use.
+
+        Args:
+            form: UFL form of rank 0.
+
+        Returns:
+            Value of the integral.
+        """
         return float(self.comm.allreduce(fem.assemble_scalar(self.compile(form)), MPI.SUM))
 
     def test_function(self) -> Any:
-        """The test function of all fields (dimensionless)."""
+        """Return the test function of all fields.
+
+        Returns:
+            The test function (UFL, dimensionless).
+        """
         return ufl.TestFunction(self.space)
 
     def test_displacement(self) -> Any:
-        """The test function of the displacement (UFL, the user's unit of length, shape (2,))."""
+        """Return the test function of the displacement.
+
+        Returns:
+            Virtual displacement (UFL, length, shape (2,)).
+        """
         return self.constant(self.length) * ufl.split(self.test_function())[0]
 
     def metric_row(self) -> Any:
-        """Linear form whose vector is the lumped mass of the displacement, over the volume."""
+        """Return the linear form of the lumped mass of the displacement, over the volume.
+
+        Returns:
+            Linear form (UFL, rank 1, dimensionless).
+        """
         v = ufl.split(self.test_function())[0]
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return sum(v[i] for i in range(self.domain.geometry.dim)) * self.weight / self.constant(self.volume) * dx
 
     def viscosity(self) -> Any:
-        """Bilinear form of a viscous stress, P = dF/dt, as the residual is scaled: dF : dF over the volume."""
+        r"""Return the bilinear form of a viscous stress, scaled like the residual.
+
+        .. math::
+            \frac{1}{V} \int \dot F : \delta F \, dV
+
+        Returns:
+            Bilinear form (UFL, rank 2, dimensionless).
+        """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return ufl.derivative(ufl.derivative(potential * dx, self.w, self.test_function()), self.w)
 
     def thickness(self, boundary: str) -> float:
-        """Volume of the body over the area of a boundary, length."""
+        """Return the mean thickness of the body above a boundary.
+
+        Args:
+            boundary: name of the boundary.
+
+        Returns:
+            Volume of the body over the area of the boundary, length.
+        """
         return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: from the setting, or set by a run that chooses its time steps."""
+        """Process time at control 0, from the step data or from a run that chooses its time steps."""
         return float(self._time[0].value)
 
     @clock.setter
@@ -279,7 +348,14 @@ class Formulation(ABC):
         self._time[0].value = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a control in the present setting."""
+        """Return the process time at a control, for the present step data.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            Process time.
+        """
         base, rate = self._time
         return float(base.value + rate.value * control)
 
@@ -289,18 +365,22 @@ class Formulation(ABC):
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
-        """Set loads, elastic supports and process time as in a `Setting`."""
+        """Set loads, elastic supports and process time from step data.
+
+        Args:
+            setting: the `StepData`.
+        """
         for support, present in self.elastic_supports:
-            present.value = float(not any(self.scene.items[i] is support for i in setting.off))
+            present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
         for i, (load, base, rate) in enumerate(self._loads):
-            active = i not in setting.off
+            active = i not in setting.inactive
             base.value = active * (setting.base[i] if load.driven else load.value)
             rate.value = active * setting.rate[i]
         for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
             constant.value = value
 
     def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
-        """`residual`, `control_derivative` and `time_derivative`."""
+        """Return `residual`, `control_derivative` and `time_derivative`."""
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
         for entry in self.terms:

@@ -15,7 +15,14 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 
 def formulate(scene: Any) -> Formulation:
-    """Return the forms of a scene."""
+    """Return the forms of a scene.
+
+    Args:
+        scene: the `Scene`.
+
+    Returns:
+        The `Formulation` of the scene's kinematics if it defines one, else of the scene's model.
+    """
     if (formulation := scene.kinematics.formulation) is not None:
         return formulation(scene)
     return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

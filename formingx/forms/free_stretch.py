@@ -13,13 +13,21 @@ from .followed import Followed
 
 
 class FreeStretch:
-    """J_T^(1/3) at the quadrature points of the energy; 1 in layers that do not expand.
+    """Stretch of the stress-free thermal expansion at the quadrature points of the energy.
+
+    The deformation gradient is split into an elastic and an isotropic thermal part:
+
+    .. math::
+        F = J_T^{1/3} F_e
+
+    The stretch is 1 in layers without expansion.
 
     Args:
-        forms: the `Formulation`; expansion: {layer: its `Expansion`}.
+        forms: the `Formulation`.
+        expansion: {layer: its `Expansion`}.
 
     Attributes:
-        stretch: J_T^(1/3) at the present time (UFL scalar).
+        stretch: :math:`J_T^{1/3}` at the present time (UFL scalar).
     """
 
     def __init__(self, forms: Any, expansion: dict[str, Any]):
@@ -28,15 +36,23 @@ class FreeStretch:
         stretch = fem.Function(fem.functionspace(forms.domain, element), name="free stretch")
         stretch.x.array[:] = 1.0
         self._cells = [forms.cells_of([name]) for name in expansion]
-        self._there = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
+        self._temperatures = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
         self._followed = Followed(forms, stretch, [(cells, partial(law.stretch, clamped=True)) for cells, law in
-                                                   zip(self._cells, expansion.values())], map(self._there, self._cells))
+                                                   zip(self._cells, expansion.values())],
+                                  map(self._temperatures, self._cells))
         self.stretch = self._followed.at(forms.time)
 
     def take_temperature(self) -> None:
-        """See `Followed.take`."""
-        self._followed.take(map(self._there, self._cells))
+        """Update the stretch to a changed temperature."""
+        self._followed.take(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:
-        """Return the elastic part of a deformation gradient F, shape (3, 3)."""
+        """Return the elastic part of a deformation gradient.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            F / J_T^(1/3) (UFL, shape (3, 3)).
+        """
         return F / self.stretch

@@ -1,4 +1,4 @@
-"""Histories of a problem, and the time: the arguments of F besides x and control."""
+"""Histories of a problem: the arguments of the residual F besides x, control and time."""
 
 from __future__ import annotations
 
@@ -10,34 +10,44 @@ from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
-    """Histories of a problem: contact first, then materials, then heat."""
+    """Histories of a problem, in the order contact, materials, heat.
+
+    Attributes:
+        forms: the `Formulation`.
+        histories: all histories of the problem.
+    """
 
     forms: Any
     histories: list[History]
-    _foretold: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms there
+    _predicted: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms there
 
     @property
     def n_owned(self) -> int:
-        """Number of fields' unknowns that this rank owns."""
+        """Number of field unknowns that this rank owns."""
         raise NotImplementedError
 
     @property
     def control(self) -> float:
-        """The present control of the forms."""
+        """Present control of the forms."""
         raise NotImplementedError
 
     def look_at(self, x: np.ndarray, control: float) -> None:
-        """Set the fields of the forms to x, locally owned entries, and their control."""
+        """Set the fields and the control of the forms.
+
+        Args:
+            x: unknowns, locally owned entries, shape (n,).
+            control: dimensionless control.
+        """
         raise NotImplementedError
 
     @property
     def has_history(self) -> bool:
-        """True if F depends on more than x and control."""
+        """True if the residual depends on more than x and control."""
         return bool(self.histories)
 
     @property
     def materials(self) -> list[ConstitutiveHistory]:
-        """The histories of materials."""
+        """Histories of the materials."""
         return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
 
     @property
@@ -47,7 +57,7 @@ class Histories:
 
     @property
     def relaxes(self) -> bool:
-        """True if F depends on time: on histories of rate-dependent materials, contact or heat."""
+        """True if the residual depends on time, through rate-dependent materials, contact or heat."""
         return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
                    for history in self.forms.histories)
 
@@ -58,7 +68,7 @@ class Histories:
 
     @property
     def clock(self) -> float:
-        """Process time at control 0: from the setting, or set by a run that chooses its time steps."""
+        """Process time at control 0, from the step data or from a run that chooses its time steps."""
         return self.forms.clock
 
     @clock.setter
@@ -66,32 +76,44 @@ class Histories:
         self.forms.clock = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a control in the present setting."""
+        """Return the process time at a control, for the present step data.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            Process time.
+        """
         return self.forms.time_at(control)
 
     @property
     def memory(self) -> list[Any]:
-        """History variables of the last accepted state."""
+        """History variables of the last accepted state, one entry for each history."""
         return [history.get() for history in self.histories]
 
     @memory.setter
     def memory(self, memory: list[Any]) -> None:
-        self._foretold = None, []
+        self._predicted = None, []
         for history, remembered in zip(self.histories, memory, strict=True):
             history.put(remembered)
 
     def advance(self, x: np.ndarray, control: float) -> None:
-        """Update the history variables for an accepted state. x: locally owned entries, shape (n,)."""
+        """Update the history variables to an accepted state.
+
+        Args:
+            x: unknowns of the state, locally owned entries, shape (n,).
+            control: control of the state.
+        """
         if self.forms.histories:
             self.look_at(x, control)
-        known = self._foretold[1] if self._foretold[0] is x else []
+        known = self._predicted[1] if self._predicted[0] is x else []
         for history in self.histories[: len(self.histories) - len(known)]:
             history.advance(x[: self.n_owned], control)
         for history, memory in zip(self.forms.histories, known):
             history.put(memory)
-        self._foretold = None, []
+        self._predicted = None, []
 
-    def foretell(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
+    def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
         """Advance the histories of the forms to a state; return their history variables there, for `advance`.
 
         The histories are left in the new state: the caller restores the old one. start: the state that the step begins
@@ -101,5 +123,5 @@ class Histories:
         for history in self.forms.histories:
             history.advance(x[: self.n_owned], control, start)
         after = [history.get() for history in self.forms.histories]
-        self._foretold = x, after
+        self._predicted = x, after
         return after

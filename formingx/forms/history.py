@@ -1,4 +1,4 @@
-"""One protocol for history variables: arguments of F that change when a state is accepted."""
+"""Protocol of history variables: arguments of the residual F that change when a state is accepted."""
 
 from __future__ import annotations
 
@@ -9,73 +9,108 @@ import numpy as np
 
 
 class Start(Protocol):
-    """The state that a step begins at: x, locally owned entries, and the control. A `State` is one."""
+    """State at the beginning of a step; a `State` is one.
+
+    Attributes:
+        x: unknowns, locally owned entries, shape (n,).
+        control: dimensionless control.
+    """
 
     x: np.ndarray
     control: float
 
 
 class History(Protocol):
-    """History variables of one part of a scene: materials, contacts, the temperature.
+    """History variables of one part of a scene: a material, a contact or the temperature.
 
-    The order of calls, contacts first, then materials, the temperature last, which takes the heat that they dissipate:
+    Contacts come first, then materials. The temperature comes last, since it takes the heat that they dissipate. Calls:
 
-        start                   the body is in the reference configuration;
-        get, advance, put       a step is tried: the new history variables; back to the old ones;
-        advance                 a state is accepted;
-        get, put                to another accepted state, and back;
-        save, load              to a file and back, on any number of ranks;
-        carry                   to a problem of the same body on another mesh.
+        start                   set the reference configuration;
+        get, advance, put       try a step: save the variables, update them, restore them;
+        advance                 accept a state;
+        get, put                go to another accepted state and return;
+        save, load              write to and read from a file, on any number of ranks;
+        carry                   transfer to a problem of the same body on another mesh.
 
-    A memory (`get`) is never changed, and fits only the ranks that it was made on. The result of `save` fits all.
+    The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any
+    ranks.
     """
 
     def start(self) -> None:
         """Set the history variables of the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables for the state of the forms, where a step then begins. x: its owned unknowns.
+        """Update the history variables to the current state of the forms, where the next step begins.
 
-        start: the state at the beginning of the step that ends now, if there is one.
+        Args:
+            x: unknowns of the state, locally owned entries, shape (n,).
+            control: control of the state.
+            start: state at the beginning of the step that ends now, or None.
         """
 
     def get(self) -> Any:
-        """Return the present history variables (a memory)."""
+        """Return the present history variables.
+
+        Returns:
+            Values that `put` accepts.
+        """
 
     def put(self, memory: Any) -> None:
-        """Set the history variables from a memory."""
+        """Set the history variables.
+
+        Args:
+            memory: values from `get`.
+        """
 
     def save(self, memory: Any) -> dict[str, Any]:
-        """Return a memory as plain data and arrays, independent of ranks and the same on all of them; collective."""
+        """Return history variables as plain data and arrays, the same on all ranks; collective.
+
+        Args:
+            memory: values from `get`.
+
+        Returns:
+            Data that do not depend on the number of ranks.
+        """
 
     def load(self, data: dict[str, Any]) -> Any:
-        """Return the memory, locally owned entries, from the result of `save`.
+        """Return the history variables of this rank from the result of `save`.
+
+        Args:
+            data: result of `save`.
+
+        Returns:
+            Values that `put` accepts.
 
         Raises:
-            InputError: it does not fit this scene.
+            InputError: the data do not match this scene.
         """
 
     def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
-              there: Callable[[np.ndarray], np.ndarray]) -> Any:
+              mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
         """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 
         Args:
             source: history of the same part in the other problem, which is set to the state of `memory`.
             memory: history variables of `source` in that state.
-            x, control: the state of this problem (owned unknowns), which its forms are set to.
-            there: function that maps reference points of the other mesh, shape (n, coordinates), to this mesh.
+            x: unknowns of this problem, to which its forms are set, locally owned entries, shape (n,).
+            control: control of the state.
+            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
+
+        Returns:
+            Values that `put` accepts.
         """
 
 
 @runtime_checkable
 class ConstitutiveHistory(History, Protocol):
-    """The history of one material of the body.
+    """History of one material of the body.
 
     Attributes:
-        rate_dependent: False if the history follows the strain alone.
+        rate_dependent: False if the history depends on the strain alone.
     """
 
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Reset the variables of motion (`Material.of_motion`): the last step predicts nothing of the next one."""
+        """Reset the variables of motion (`Material.of_motion`), so the last step does not affect the next prediction.
+        """

@@ -1,4 +1,4 @@
-"""The body as loads and elastic supports use it: the fields, and its integrals."""
+"""Body as loads and elastic supports see it: fields and integrals."""
 
 from __future__ import annotations
 
@@ -13,26 +13,42 @@ from ..errors import InputError, known
 
 
 class Face(NamedTuple):
-    """A boundary of the body. normal: outward, in the reference configuration (UFL); measure: reference length;
-    weight: area per length."""
+    """Boundary of the body.
+
+    Attributes:
+        normal: outward normal in the reference configuration (UFL, shape (2,)).
+        measure: measure of the reference boundary.
+        weight: reference area per length of the boundary (UFL scalar).
+    """
 
     normal: Any
     measure: Any
     weight: Any
 
     def integral(self, integrand: Any) -> Any:
-        """Return the integral (UFL) over the reference area."""
+        """Return an integral over the reference area.
+
+        Args:
+            integrand: value per reference area (UFL scalar).
+
+        Returns:
+            The integral (UFL).
+        """
         return integrand * self.weight * self.measure
 
 
 class LoadedBody:
-    """The body of a scene as `Load.virtual_work` sees it, a solid or a membrane.
+    """Solid or membrane of a scene as `Load.virtual_work` and `Support.stored_energy` use it.
 
     Attributes:
-        u, du, X: displacement, virtual displacement and reference position (UFL, length, shape (2,): components r, z).
+        u: displacement (UFL, length, shape (2,): components r, z).
+        du: virtual displacement (UFL, length, shape (2,)).
+        X: reference position (UFL, length, shape (2,)).
         F: deformation gradient (UFL, shape (3, 3)).
         kinematics: the `Kinematics` of the scene.
-        stress, length, volume: largest shear modulus, largest extent and reference volume, in the user's units.
+        stress: largest shear modulus, stress.
+        length: largest extent, length.
+        volume: reference volume, length^3.
     """
 
     def __init__(self, forms: Any):
@@ -42,28 +58,67 @@ class LoadedBody:
         self.stress, self.length, self.volume = forms.stress, forms.length, forms.volume
 
     def integral(self, integrand: Any, layer: str | None = None) -> Any:
-        """Return the integral (UFL) over the reference volume, of all layers or of one; per unit depth in plane
-        strain."""
+        """Return an integral over the reference volume; per unit depth in plane strain.
+
+        Args:
+            integrand: value per reference volume (UFL scalar).
+            layer: name of a layer; None for all layers.
+
+        Returns:
+            The integral (UFL).
+        """
         layers = self._forms.mesh.layers
         if layer is not None:
             known("body.integral: layer", layer, layers)
         return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:
-        """Return a boundary by its name (of a membrane its lower or its upper face)."""
+        """Return a boundary of the body.
+
+        Args:
+            on: name of the boundary; for a membrane its lower or its upper face.
+            quadrature_degree: degree of the quadrature on it.
+
+        Returns:
+            The `Face`.
+        """
         normal, measure = self._forms.face(on, quadrature_degree)
         return Face(normal, measure, self.kinematics.weight(self.X))
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a number for a form, which is not compiled again when it changes."""
+        """Return a number in a form that can be changed without recompiling the form.
+
+        Args:
+            value: initial value.
+
+        Returns:
+            The `Constant`.
+        """
         return self._forms.constant(value)
 
     def thickness(self, boundary: str) -> float:
-        """Volume of the body over the area of a boundary, length."""
+        """Return the mean thickness of the body above a boundary.
+
+        Args:
+            boundary: name of the boundary.
+
+        Returns:
+            Volume of the body over the area of the boundary, length.
+        """
         return self._forms.thickness(boundary)
 
     def stored(self, support: Any) -> Any:
-        """Return the energy of a support, or None; raise an InputError unless it is a form without `body.du`."""
+        """Return the stored energy of an elastic support.
+
+        Args:
+            support: the `Support`.
+
+        Returns:
+            Energy (UFL, rank 0, user's units), or None.
+
+        Raises:
+            InputError: the energy is not a UFL form of rank 0.
+        """
         form = support.stored_energy(self)
         if form is not None and (not isinstance(form, ufl.Form) or form.arguments()):
             raise InputError(f"{support!r}: stored_energy must return a UFL form without body.du, such as"
@@ -71,7 +126,18 @@ class LoadedBody:
         return form
 
     def work(self, load: Any, value: Any) -> Any:
-        """Return the virtual work of a load; raise an InputError unless it is a form that is linear in `du`."""
+        """Return the virtual work of a load.
+
+        Args:
+            load: the `Load`.
+            value: its value (UFL scalar, user's units).
+
+        Returns:
+            Virtual work (UFL, rank 1, user's units).
+
+        Raises:
+            InputError: the virtual work is not a UFL form linear in `du`.
+        """
         form = load.virtual_work(self, value)
         if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
             raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"
@@ -79,8 +145,20 @@ class LoadedBody:
         return form
 
     def unit(self, load: Any) -> float:
-        """Return the value at which the nodal forces of a load in the reference configuration add up to stress times
-        volume over length."""
+        """Return the value of a load that scales its amplitude.
+
+        In the reference configuration, the nodal forces of a load of this value add up to stress times volume over
+        length.
+
+        Args:
+            load: the `Load`.
+
+        Returns:
+            The value, in the user's units.
+
+        Raises:
+            InputError: the nodal forces of a unit load vanish or are not finite.
+        """
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
         forces = _compat.assemble_vector(la.vector(index_map, 1), form)

@@ -17,8 +17,12 @@ from .history import Start
 
 
 class Memory(NamedTuple):
-    """History of a material: the process time of the last accepted state, and {name: values in the owned cells of
-    the layers, shape (cells, points, components)}."""
+    """History variables of a material.
+
+    Attributes:
+        time: process time of the last accepted state.
+        values: {name: values in the locally owned cells of the layers, shape (cells, points, components)}.
+    """
 
     time: float
     values: dict[str, np.ndarray]
@@ -28,7 +32,8 @@ class MaterialHistory:
     """Internal variables of one material at the quadrature points of the energy.
 
     Args:
-        forms: the `Formulation`; terms: the `MaterialTerms`.
+        forms: the `Formulation`.
+        terms: the `MaterialTerms`.
     """
 
     def __init__(self, forms: Any, terms: Any):
@@ -45,41 +50,49 @@ class MaterialHistory:
         self.start()
 
     def start(self) -> None:
-        """See `History`."""
+        """Set the internal variables of the reference configuration."""
         self._now = None
         for name, rest in self._terms.material.internal.items():
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`."""
+        """Update the internal variables to the current state of the forms; see `History.advance`."""
         self._now = None
         for name, values in self._after(self._cells).items():
             self._set(name, self._cells, values)
         self._terms.start.value = self._forms.time_at(control)
 
     def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """{name: values in some cells, shape (cells, points, components)} at the end of the step."""
+        """Return {name: values at the end of the step in some cells, shape (cells, points, components)}."""
         shape = len(cells), len(self._terms.places), sum(self._sizes.values())
         values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
         return dict(zip(self._sizes, parts, strict=True))
 
     def forget_motion(self) -> None:
-        """See `ConstitutiveHistory`; `Material.of_motion` names the variables."""
+        """Reset the variables that `Material.of_motion` names to their initial values."""
         for name in self._terms.material.of_motion:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
     def get(self) -> Memory:
-        """See `History`."""
+        """Return the present internal variables.
+
+        Returns:
+            The variables and the process time; the arrays are read-only.
+        """
         if self._now is None:
             values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
             self._now = _unchangeable(Memory(float(self._terms.start.value), values))
         return self._now
 
     def put(self, memory: Memory) -> None:
-        """See `History`."""
+        """Set the internal variables and the process time.
+
+        Args:
+            memory: values from `get`.
+        """
         if memory is self._now:
             return
         for name, values in memory.values.items():
@@ -89,7 +102,14 @@ class MaterialHistory:
         self._now = memory
 
     def save(self, memory: Memory) -> dict[str, Any]:
-        """See `History`."""
+        """Return internal variables as arrays, the same on all ranks; collective.
+
+        Args:
+            memory: values from `get`.
+
+        Returns:
+            {"time": process time, "cells": cell numbers of the script's mesh, "values": {name: values in these cells}}.
+        """
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
         order = np.argsort(numbers)
@@ -97,7 +117,17 @@ class MaterialHistory:
                 "values": {name: gathered(comm, v)[order] for name, v in memory.values.items()}}
 
     def load(self, data: dict[str, Any]) -> Memory:
-        """See `History`."""
+        """Return the internal variables of this rank from the result of `save`.
+
+        Args:
+            data: result of `save`.
+
+        Returns:
+            Values that `put` accepts.
+
+        Raises:
+            InputError: the data belong to another mesh or another material.
+        """
         numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}
@@ -111,9 +141,20 @@ class MaterialHistory:
         return Memory(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
     def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float,
-              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
-        """See `History`."""
-        carrier = Carrier(self._forms.comm, there(source.points), self.points)
+              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
+        """Interpolate the internal variables of the same material on another mesh; collective.
+
+        Args:
+            source: history of the material on the other mesh.
+            memory: its history variables.
+            x: unknowns of this problem, locally owned entries.
+            control: control of the state.
+            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
+
+        Returns:
+            Values that `put` accepts.
+        """
+        carrier = Carrier(self._forms.comm, mapping(source.points), self.points)
         shapes = self._terms.material.shapes
         F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)] if shapes else []
 
@@ -136,18 +177,20 @@ class MaterialHistory:
         return where.eval(self._forms.domain, self._own).reshape(-1, components)
 
     def _array(self, name: str) -> np.ndarray:
-        """All values of a variable, a row for each point."""
+        """Return all values of a variable, shape (points, components)."""
         return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
 
     def _points(self, name: str, cells: np.ndarray) -> np.ndarray:
-        """Rows of the points of some cells, shape (cells, points)."""
+        """Return the rows of `_array` that belong to some cells, shape (cells, points)."""
         return self._terms.internal[name].function_space.dofmap.list[cells]
 
     def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
+        """Set a variable in some cells to values of shape (components,) or (cells, points, components)."""
         self._array(name)[self._points(name, cells)] = values
 
 
 def _unchangeable(memory: Memory) -> Memory:
+    """Make the arrays of history variables read-only."""
     for array in memory.values.values():
         array.setflags(write=False)
     return memory

@@ -1,4 +1,4 @@
-"""A material in the forms: its constants as coefficients, its internal variables, its energies."""
+"""Material in the forms: its constants as coefficients, its internal variables, its energies."""
 
 from __future__ import annotations
 
@@ -18,20 +18,26 @@ from .followed import Followed
 
 
 class MaterialTerms:
-    """One material of some layers.
+    """One material of some layers in the forms.
 
     Args:
         forms: the `Formulation`.
+        material: the `Material`.
+        names: names of the layers.
 
     Attributes:
-        constants: {name: coefficient}: a `Constant` for a number; for a varying coefficient a `Function` or another
-            UFL scalar.
-        rest_stress: stress that the energy leaves at F = I (UFL scalar).
-        internal: {name: `Function` of a quadrature element} of the internal variables at the beginning of the step.
-        held: {name: `Function` of a quadrature element} of an integral over past states at the present fields
+        forms: the `Formulation`.
+        material: the `Material`.
+        names: names of the layers.
+        X: reference position (UFL, length, shape (2,)).
+        constants: {name: coefficient}, a `Constant` for a number; else a `Function` or another UFL scalar.
+        rest_stress: stress dW/dF11 of the energy at F = I (UFL scalar, stress).
+        internal: {name: `Function` of a quadrature element}, internal variables at the beginning of the step.
+        past_integrals: {name: `Function` of a quadrature element}, coefficients of an integral over past states
             (`IntegralLaw.coefficients`).
-        start: the process time at the beginning of the step (`Constant`).
-        cells, own_cells: local numbers of its cells, with ghosts, and the locally owned ones.
+        start: process time at the beginning of the step (`Constant`).
+        cells: local numbers of the cells of the layers, with ghosts, ascending.
+        own_cells: the locally owned ones of `cells`.
         places: quadrature points of the energy in the reference cell, shape (q, dimension).
     """
 
@@ -48,10 +54,11 @@ class MaterialTerms:
         self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
             material.rest_stress)
         self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
-        self.held = {name: self.quadrature_function(np.shape(value)) for name, value in
+        self.past_integrals = {name: self.quadrature_function(np.shape(value)) for name, value in
                      (material.integral.coefficients if material.integral else {}).items()}
 
     def _constant(self, name: str, value: Any) -> Any:
+        """Return the coefficient of a material constant."""
         self._in_middle = name in self.material.of_flow
         return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
 
@@ -61,18 +68,32 @@ class MaterialTerms:
         return bool(self._followed)
 
     @property
-    def remembers(self) -> bool:
+    def has_history(self) -> bool:
         """True if the stress of the material depends on more than the deformation."""
-        return bool(self.internal or self.held)
+        return bool(self.internal or self.past_integrals)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
-        """Return a `Function` with a value of a shape at every quadrature point of the energy."""
+        """Return a `Function` with a value at every quadrature point of the energy.
+
+        Args:
+            shape: shape of a value.
+
+        Returns:
+            The `Function`, with value 0.
+        """
         element = basix.ufl.quadrature_element(self.forms.domain.basix_cell(), value_shape=shape, scheme="default",
                                                degree=self.forms.scene.quadrature_degree)
         return fem.Function(fem.functionspace(self.forms.domain, element))
 
     def of_position(self, function: Any) -> fem.Function:
-        """f(R, Z) at the quadrature points of the energy, exactly."""
+        """Evaluate a function of the reference position at the quadrature points of the energy.
+
+        Args:
+            function: f(R, Z), vectorised.
+
+        Returns:
+            `Function` with the exact values of f.
+        """
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.preformed
 
         def values(X: np.ndarray) -> np.ndarray:
@@ -82,7 +103,14 @@ class MaterialTerms:
         return found
 
     def of_temperature(self, function: Any) -> Any:
-        """f(T) at the quadrature points of the energy, exactly, at the end of a step, or in its middle."""
+        """Evaluate a function of the temperature at the quadrature points of the energy.
+
+        Args:
+            function: f(T), vectorised.
+
+        Returns:
+            f (UFL scalar) at the end of a step; in the middle of a step for a constant named in `Material.of_flow`.
+        """
         forms, found = self.forms, self.quadrature_function()
         law = getattr(function, "clamped", function)          # a user's own constant may be any function
         followed = Followed(forms, found, [(self.cells, law)], [forms.temperatures(self)])
@@ -100,52 +128,116 @@ class MaterialTerms:
             followed.take(temperatures)
 
     def of_mesh(self, expression: Any) -> Any:
-        """Return a UFL scalar of the scene's mesh, where the fields live on it."""
+        """Return a coefficient that is given on the scene's mesh.
+
+        Args:
+            expression: UFL scalar.
+
+        Returns:
+            The same expression.
+
+        Raises:
+            InputError: the fields live on another mesh, as those of a membrane.
+        """
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
                              f" (R, Z)")
         return expression
 
     def step_energy(self, F: Any) -> Any:
-        """Return the potential of the step, per reference volume (UFL, stress)."""
-        if not self.remembers:
+        """Return the potential of the step per reference volume.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            Potential (UFL, stress); without history variables it is the strain energy.
+        """
+        if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
-        return self.material.step_energy(F, self.internal | self.held, self._time_step, **self.constants)
+        return self.material.step_energy(F, self.internal | self.past_integrals, self._time_step, **self.constants)
 
     def stored_energy(self, F: Any) -> Any:
-        """Return the energy that is stored, per reference volume (UFL, stress)."""
-        if not self.remembers:
+        """Return the stored energy per reference volume.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            Energy (UFL, stress).
+        """
+        if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
-        return self.material.stored_energy(F, self.internal | self.held, **self.constants)
+        return self.material.stored_energy(F, self.internal | self.past_integrals, **self.constants)
 
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
-        """Virtual work beside the step's potential, per reference volume (UFL, stress), or None.
+        """Return the virtual work that no potential has, per reference volume.
 
-        derivative: a function that returns the virtual change of a UFL expression.
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+            derivative: function that returns the virtual change of a UFL expression.
+
+        Returns:
+            Virtual work (UFL, stress); None if the tangent of the material is symmetric.
         """
         if self.material.symmetric:
             return None
         C = isochoric(F)
-        return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.held)
+        return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.past_integrals)
 
     def equilibrium_energy(self, F: Any) -> Any:
-        """Return the energy that is left when all has relaxed, per reference volume (UFL, stress), or None."""
+        """Return the energy after complete relaxation, per reference volume.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            Energy (UFL, stress); None if the material has none.
+        """
         return self.material.equilibrium_energy(F, **self.constants)
 
     def elastic_stretches(self, F: Any) -> list[Any]:
-        """Return the largest principal elastic stretch of each relaxing branch (UFL)."""
+        """Return the largest principal elastic stretch of each relaxing branch.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            List of stretches (UFL scalars).
+        """
         return self.material.elastic_stretches(F, self.internal, **self.constants)
 
     def dissipation(self, F: Any) -> Any:
-        """Return the power that is dissipated, per reference volume (UFL, stress over time)."""
+        """Return the dissipated power per reference volume.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            Power (UFL, stress over time).
+        """
         return self.material.dissipation(F, self.internal, **self.constants)
 
     def damage_energy(self) -> Any:
-        """Return the energy that damage has cost, per reference volume (UFL, stress)."""
+        """Return the energy dissipated by damage per reference volume.
+
+        Returns:
+            Energy (UFL, stress).
+        """
         return self.material.damage_energy(self.internal, **self.constants)
 
     def updated(self, F: Any) -> dict[str, Any]:
-        """{name: internal variable at the end of the step (UFL)}."""
+        """Return the internal variables at the end of the step.
+
+        Args:
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+
+        Returns:
+            {name: internal variable (UFL)}.
+
+        Raises:
+            InputError: the material returns other variables than it has, or other shapes.
+        """
         found = self.material.updated(F, self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}
         requested = {name: np.shape(value) for name, value in self.material.internal.items()}
@@ -156,9 +248,10 @@ class MaterialTerms:
 
     @property
     def _time_step(self) -> Any:
+        """Length of the step (UFL scalar, time)."""
         return self.forms.time - self.start
 
     def _rest_stress(self, constants: dict[str, Any]) -> Any:
-        """dW/dF11 at F = I (UFL scalar)."""
+        """Return dW/dF11 at F = I (UFL scalar, stress)."""
         F = ufl.variable(ufl.Identity(3))
         return ufl.diff(self.material.strain_energy(F, **constants), F)[0, 0]

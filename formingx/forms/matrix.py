@@ -1,7 +1,10 @@
-"""A sparse matrix with a few dense rows and columns at the end: tangent and Lagrange multipliers in one.
+r"""Sparse matrix of a tangent that is extended by a few dense rows and columns of Lagrange multipliers.
 
-[K  C^T]   K: compiled form; rows of C: constraints. The multipliers' rows and columns stand at the end of the last
-[C   0 ]   rank's part, so all fields keep DOLFINx's global numbers.
+.. math::
+    \begin{pmatrix} K & C^T \\ C & 0 \end{pmatrix}
+
+K is a compiled form, each row of C a constraint. The rows and columns of the multipliers follow the entries of the
+last rank, so all fields keep the global numbers of DOLFINx.
 """
 
 from __future__ import annotations
@@ -17,18 +20,25 @@ from .. import _compat
 
 
 class ExtendedMatrix:
-    """Sparse matrix of tangent and constraints, created once and refilled for every tangent.
+    """Sparse matrix of tangent and constraints, allocated once and refilled for every tangent.
 
     Args:
-        form: compiled bilinear form of K; index_map: of its space (block size 1); bcs, rows: see `hold`; later
-            constraints must be among them.
+        form: compiled bilinear form of K.
+        index_map: index map of its space (block size 1).
+        bcs: constrained unknowns, see `constrain`; all later ones must be among them.
+        rows: rows of C, see `constrain`; the nonzero entries of all later ones must be among theirs.
+        comm: MPI communicator.
+        symmetric: True if K is symmetric.
+
+    Attributes:
+        mat: the PETSc matrix.
     """
 
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
         self._form, self._index_map, self._comm = form, index_map, comm
         self._first = index_map.size_global
         self._last_rank = comm.rank == comm.size - 1
-        self.hold(bcs, rows)
+        self.constrain(bcs, rows)
         n, m = index_map.size_local, len(rows)
         size = n + (m if self._last_rank else 0)
         indptr, columns = self._pattern(rows, m)
@@ -41,7 +51,7 @@ class ExtendedMatrix:
         if symmetric:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
-    def hold(self, bcs: list, rows: list[np.ndarray]) -> None:
+    def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
         """Set the constraints of the tangents from now on.
 
         Args:
@@ -50,9 +60,9 @@ class ExtendedMatrix:
                 multiplier become unit vectors too.
         """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
-        self._held = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
+        self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
         for bc in bcs:
-            self._held[bc.dof_indices()[0]] = True
+            self._constrained[bc.dof_indices()[0]] = True
         self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
         for row in rows:
             mine = np.flatnonzero(row)
@@ -61,16 +71,22 @@ class ExtendedMatrix:
                                   np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
-        """Return the matrix at the present values of the form's functions.
+        """Assemble the matrix for the present values of the form's functions.
 
-        blocks: (local dofs (n, m), ghosts too, values (n, m, m)) to be added to K; dofs of a block must share a cell.
+        Args:
+            blocks: list of (local unknowns with ghosts, shape (n, m), values added to K, shape (n, m, m)); the unknowns
+                of a
+                block must share a cell.
+
+        Returns:
+            The assembled matrix.
         """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()
         _compat.assemble_matrix(A, self._form, self._bcs)
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
         for dofs, values in blocks:
-            free = ~self._held[dofs]
+            free = ~self._constrained[dofs]
             values = values * free[:, :, None] * free[:, None, :]
             A.setValuesLocalRCV(dofs, dofs, values.reshape(len(dofs), dofs.shape[1] ** 2), addv=add)
         for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
@@ -83,7 +99,7 @@ class ExtendedMatrix:
         return A
 
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
-        """Row pointers and global columns of all owned rows."""
+        """Return row pointers and global columns of all locally owned rows."""
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()

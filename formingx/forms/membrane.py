@@ -1,10 +1,17 @@
-"""A scene as a membrane: its mid-surface as a line, its thickness as data (Adkins and Rivlin 1952).
+r"""Scene as a membrane: the mid-surface as a line, the thickness as data (Adkins and Rivlin 1952).
 
-With the meridional stretch l1 = |dx/dS| and the hoop stretch l2 (r/R, or 1 in plane strain), the energy per reference
-area of the mid-surface is the sum over the layers of h W(l1, l2, 1/(l1 l2)): the volume is kept exactly, and no
-pressure is needed. The follower pressure acts on the mid-surface. A flat membrane without stretch has no stiffness
-normal to itself: its pressure grows with the cube of the pole height. So a path leaves the reference configuration
-along the deflection of the membrane under a vanishing tension. Every state on the path solves the unchanged equations.
+The stretches are the meridional one, along the reference arc length S, and the hoop stretch, which is 1 in plane
+strain. The energy per reference area of the mid-surface is summed over the layers of thickness h:
+
+.. math::
+    \Psi = \sum h \, W\!\left(\lambda_1, \lambda_2, \frac{1}{\lambda_1 \lambda_2}\right), \qquad
+    \lambda_1 = \left|\frac{dx}{dS}\right|, \quad \lambda_2 = \frac{r}{R}
+
+The volume is preserved exactly without a pressure field. The follower pressure acts on the mid-surface.
+
+A flat unstretched membrane has no stiffness normal to itself: its pressure grows with the cube of the pole height. A
+path therefore leaves the reference configuration along the deflection under a vanishing tension. Every state on the
+path solves the unchanged equations.
 """
 
 from __future__ import annotations
@@ -21,36 +28,50 @@ from .. import _compat
 from ..errors import InputError
 from ..mesh.mesh import Mesh
 from ..mesh.nodes import of_cells, own_cells
-from ..physics.supports import Held
+from ..physics.supports import Constrained
 from ..ranks import gathered
 from .formulation import Formulation
 from .probes import MidSurfaceProbe
 
 FIRST_STRETCH = 1e-6
-"""Stretch at which the first direction of a path is taken (a direction only: no state is solved for there)."""
+"""Stretch for the first direction of a path; no state is solved for at this stretch."""
 
 
 class MidSurface(Formulation):
-    """The forms of a scene as a membrane; the only field is the displacement of the mid-surface.
+    """Forms of a scene as a membrane; the only field is the displacement of the mid-surface.
 
     Attributes:
-        thicknesses: {layer: its thickness normal to the mid-surface in the reference configuration (`Function`,
-            length)}.
+        thicknesses: {layer: thickness normal to the mid-surface in the reference configuration (`Function`, length)}.
 
     Raises:
-        InputError: the sheet is not a graph over R, or a load or support is where a membrane has neither face nor end.
+        InputError: the sheet is not a graph over R, or a load or support is not on a face or an end of the membrane.
     """
 
     slack_at_rest = True
 
     @property
     def bodies(self) -> list[tuple[Any, list[str]]]:
-        """Raise an InputError: a membrane has none."""
+        """Undefined for a membrane.
+
+        Raises:
+            InputError: always; a membrane has no stress through its thickness.
+        """
         raise InputError("a membrane has no stress through its thickness, nor between its layers: use a solid model,"
                          " MixedPressure()")
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return (normal of the mid-surface away from the loaded face, the whole mid-surface)."""
+        """Return the normal of the mid-surface away from the loaded face, and the measure of the mid-surface.
+
+        Args:
+            name: boundary that is the whole lower or the whole upper face.
+            quadrature_degree: degree of the quadrature on it.
+
+        Returns:
+            Reference normal (UFL, shape (2,)) and measure.
+
+        Raises:
+            InputError: the boundary is not a whole face.
+        """
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
         whole = len(nodes) and np.allclose([nodes[0, 0], nodes[-1, 0]], [self._R[0], self._R[-1]], rtol=0, atol=near)
@@ -62,21 +83,47 @@ class MidSurface(Formulation):
                          f" only")
 
     def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints of a support at an end; a mean over an end becomes the value at its point."""
-        held = [Held(c.component, on=c.on) if not isinstance(c, Held) else c for c in support.constraints()]
-        for item in held:
+        """Return the constraints of a support at an end; a mean over an end becomes the value at its point.
+
+        Args:
+            support: the `Support`.
+
+        Returns:
+            List of `Constrained`.
+
+        Raises:
+            InputError: the boundary is not an end of the membrane.
+        """
+        items = [c if isinstance(c, Constrained) else Constrained(c.component, on=c.on) for c in support.constraints()]
+        for item in items:
             if item.on is not None and item.on not in self.mesh.boundaries:
                 raise InputError(f"{support!r}: a membrane can be held at its ends only, which are"
                                  f" {list(self.mesh.boundaries)}")
-        return held
+        return items
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of the mid-surface at the same R, shape (n, 2)."""
+        """Return the points of the mid-surface at the same R.
+
+        Args:
+            points: reference positions, shape (n, 2), length.
+
+        Returns:
+            Reference positions on the mid-surface, shape (n, 2), length.
+        """
         R = np.asarray(points, dtype=float)[:, 0]
         return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
 
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return Z halfway between the faces of the layer, shape (n,); Z of the argument is not used."""
+        """Return the heights halfway between the faces of a layer.
+
+        Args:
+            layer: name of the layer.
+            R: radii, shape (n,), length.
+            Z: not used.
+
+        Returns:
+            Z, shape (n,), length.
+        """
         low, high = self._ends[layer]
         return np.interp(R, self._R, (low + high) / 2)
 
@@ -89,7 +136,14 @@ class MidSurface(Formulation):
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
     def temperatures(self, terms: Any) -> np.ndarray:
-        """Return the temperature halfway between the faces of the layer; it does not change."""
+        """Return the constant temperature halfway between the faces of the layer.
+
+        Args:
+            terms: the `MaterialTerms`.
+
+        Returns:
+            Temperatures at the quadrature points, shape (1, cells, q).
+        """
         nodes = of_cells(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
@@ -101,11 +155,11 @@ class MidSurface(Formulation):
         return MidSurfaceProbe(problem, points)
 
     def set_stiff(self) -> None:
-        """Apply a small stretch in all directions."""
+        """Apply a small stretch in all directions, for the first direction of a path."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:
-        """Return the line halfway between the two faces, with a node wherever the lower face has one."""
+        """Return the line halfway between the two faces, with a node at the R of each node of the lower face."""
         mesh = self.scene.mesh
         comm = mesh.comm
         if "bottom" not in mesh.boundaries:
@@ -147,7 +201,7 @@ class MidSurface(Formulation):
         return element, [basix.ufl.blocked_element(element, shape=(self.scene.kinematics.components,))]
 
     def _weight(self) -> Any:
-        """Return the kinematic weight times the thickness normal to the mid-surface; the faces are measured along Z."""
+        """Return the kinematic weight times the thickness normal to the mid-surface; faces are given along Z."""
         direction = ufl.Jacobian(self.domain)[:, 0]
         direction = direction / ufl.sqrt(ufl.inner(direction, direction))
         self._tangent = ufl.sign(direction[0]) * direction                     # towards growing R
@@ -159,6 +213,9 @@ class MidSurface(Formulation):
         return self._area() * sum(self.thicknesses.values())
 
     def _area(self) -> Any:
+        """Return the kinematic weight times dR/dS, which turns a thickness along Z into a volume per arc length (UFL
+        scalar).
+        """
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:
@@ -171,12 +228,12 @@ class MidSurface(Formulation):
     def _groups(self) -> list[tuple[Any, list[str]]]:
         return [(material, [name]) for name, material in self.scene.materials.items()]
 
-    def _energy(self, of: Any) -> Any:
-        return sum(self.weighted(self._scale * of(terms, self.F), terms.names) for terms in self._terms.values())
+    def _energy(self, density: Any) -> Any:
+        return sum(self.weighted(self._scale * density(terms, self.F), terms.names) for terms in self._terms.values())
 
 
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest Z of a layer at each of the ascending R, shape (n,); (inf, -inf) where it is absent."""
+    """Return lowest and highest Z of a layer at ascending R, shape (n,) each; (inf, -inf) where the layer is absent."""
     cells = mesh.cells.find(mesh.layers[layer])
     nodes = of_cells(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them

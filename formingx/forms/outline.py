@@ -1,4 +1,4 @@
-"""Boundary of a deformed solid body: curved edges of all ranks."""
+"""Boundary of a deformed solid: curved edges of all ranks."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ..mesh.check import crossing, crossings
 from ..ranks import gathered
 
 _PARTS = 8
-"""Straight pieces of an edge."""
+"""Straight pieces of an edge in the search for self-intersections."""
 
 
 class Outline:
-    """The m edges of the boundary, each a parabola through its ends and its middle, the body to its left.
+    """The m boundary edges, each a parabola through its ends and its midpoint; the body lies to the left.
 
     Args:
         forms: the `Solid`; its `w` is the examined field.
 
     Attributes:
-        rest: end, other end and middle of each edge in the reference configuration, shape (m, 3, 2), length.
-        ends: numbers of the corners at its two ends, the same of edges that meet, shape (m, 2).
+        rest: start, end and midpoint of each edge in the reference configuration, shape (m, 3, 2), length.
+        ends: numbers of the corners at start and end, equal for edges that meet, shape (m, 2).
     """
 
     def __init__(self, forms: Any):
@@ -51,14 +51,18 @@ class Outline:
         self.rest = self._gathered(self._own)
 
     def edges(self) -> np.ndarray:
-        """Return the deformed edges, as `rest`; collective."""
+        """Return the deformed edges; collective.
+
+        Returns:
+            Start, end and midpoint of each edge, shape (m, 3, 2), length.
+        """
         return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
-    def of(self, boundary: str) -> np.ndarray:
+    def mask(self, boundary: str) -> np.ndarray:
         """Return a mask of the edges of a boundary of the mesh, shape (m,); collective."""
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
-    def around(self, caller: str) -> list[int]:
+    def ordered(self, caller: str) -> list[int]:
         """Return the edges in order round the body, by number; raise an InputError for a hole or several parts."""
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
@@ -69,7 +73,15 @@ class Outline:
         return order
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
-        """(points, shape (n, 2), length; straight pieces between them, shape (parts m, 2)) along `edges()`."""
+        """Divide curved edges into straight pieces.
+
+        Args:
+            edges: result of `edges`, shape (m, 3, 2), length.
+            parts: number of pieces of an edge.
+
+        Returns:
+            Points, shape (n, 2), length; point numbers of the ends of each piece, shape (m parts, 2).
+        """
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]
@@ -79,9 +91,15 @@ class Outline:
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
     def fold(self, edges: np.ndarray) -> np.ndarray | None:
-        """Return a point where the deformed edges (`edges`) cross, shape (2,), length; None if they cross nowhere.
+        """Find a self-intersection of the deformed boundary.
 
-        Edges that have a neighbour in common do not count: an element that bends over a sharp edge makes a crease.
+        Edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
+
+        Args:
+            edges: result of `edges`, shape (m, 3, 2), length.
+
+        Returns:
+            A point where edges cross, shape (2,), length; None if there is none.
         """
         if crossing(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
@@ -92,7 +110,7 @@ class Outline:
         return None
 
     def _near(self, i: int, j: int) -> bool:
-        """Return True if two edges are the same or neighbours, or have a neighbour in common."""
+        """Return True if two edges are identical, neighbours, or have a common neighbour."""
         around = np.isin(self.ends, self.ends[i]).any(1)
         return bool(np.isin(self.ends[around], self.ends[j]).any())
 
@@ -102,13 +120,29 @@ class Outline:
 
 
 def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
-    """Points of edges, shape (m, 3, 2), from one end to the other, shape (m, parts + 1, 2)."""
+    """Return equidistant parameter points on parabolic edges.
+
+    Args:
+        edges: start, end and midpoint of each edge, shape (m, 3, 2), length.
+        parts: number of intervals of the parameter.
+
+    Returns:
+        Points from start to end, shape (m, parts + 1, 2), length.
+    """
     s = np.linspace(0, 1, parts + 1)
     return np.einsum("pk,mki->mpi", np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)]), edges)
 
 
 def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Return the two ends and the middle of an edge: no two of its nodes are further apart than the ends."""
+    """Sort the three nodes of an edge: the two nodes that are furthest apart come first.
+
+    Args:
+        nodes: node numbers, shape (3,).
+        X: reference positions of all nodes, shape (n, 2), length.
+
+    Returns:
+        Numbers of both ends and of the middle node, shape (3,).
+    """
     away = np.linalg.norm(X[nodes][:, None] - X[nodes][None], axis=-1)
     i, j = np.unravel_index(np.argmax(away), (3, 3))
     return nodes[[i, j, 3 - i - j]]

@@ -1,4 +1,4 @@
-"""Displacements at points of the body, read off the fields of a problem."""
+"""Displacements at reference points, evaluated from the fields of a problem."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from ..ranks import gathered
 
 
 class Probe:
-    """Displacement at fixed reference points: rows of weights on the unknowns.
+    """Displacement at fixed reference points, as rows of weights of the unknowns.
 
     Args:
         problem: the `Problem`.
-        points: reference coordinates (R, Z), in three dimensions (x, y), shape (n, 2), the same on all ranks.
+        points: reference positions (R, Z), in three dimensions (x, y), shape (n, 2), length, the same on all ranks.
 
     Attributes:
+        points: the reference positions, shape (n, 2), length.
         so_far: displacement of the points before this mesh was made, shape (n, components), length.
 
     Raises:
@@ -42,17 +43,31 @@ class Probe:
         self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def _dofs_of(self, cells: np.ndarray) -> np.ndarray:
-        """Local numbers of the unknowns of cells, component by component, shape (m, components, dim)."""
+        """Return the local numbers of the unknowns of cells, component by component, shape (m, components, dim)."""
         return np.array([[sub.cell_dofs(c) for sub in self._subs] for c in cells], dtype=np.int64).reshape(
             len(cells), self._components, self._problem.forms.displacement_element.dim)
 
     def displacement(self, x: Any) -> np.ndarray:
-        """u at the points in the user's unit, shape (n, components), all ranks."""
+        """Return the displacement at the points, on all ranks.
+
+        Args:
+            x: unknowns (PETSc vector).
+
+        Returns:
+            Displacement, shape (n, components), length.
+        """
         self._problem.place(x.array_r)
         return self._read()
 
     def displacement_in(self, state: Any) -> np.ndarray:
-        """Return `displacement` in a state; the fields of the forms are restored afterwards; collective."""
+        """Return the displacement at the points in a state; the fields of the forms are restored; collective.
+
+        Args:
+            state: the state.
+
+        Returns:
+            Displacement, shape (n, components), length.
+        """
         w = self._problem.forms.w.x.array
         before = w.copy()
         try:
@@ -62,26 +77,44 @@ class Probe:
             w[:] = before
 
     def _read(self) -> np.ndarray:
+        """Return the displacement at the points for the current fields, shape (n, components), length."""
         w = self._problem.forms.w.x.array
         values = np.zeros((len(self.points), self._components))
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])
         return self._problem.comm.allreduce(values, MPI.SUM)
 
     def across(self) -> tuple[np.ndarray, float]:
-        """(row, power) with stretch along the sheet = (1 + row . x)^power, of two points on the axis, lower first."""
+        r"""Return the row that measures the in-plane stretch between two points on the axis, lower first.
+
+        .. math::
+            \lambda = (1 + \text{row} \cdot x)^{\text{power}}
+
+        For incompressible material the thickness stretch between the points gives the in-plane stretch.
+
+        Returns:
+            Row, locally owned entries, shape (n,); power, -1/2 if axisymmetric, -1 in plane strain.
+        """
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row with row . x = sum of factors, shape (n, components), times u over length; owned unknowns."""
+        """Return the row of a weighted sum of displacements.
+
+        Args:
+            factors: weights, shape (n, components).
+
+        Returns:
+            Row with row . x = sum of weights times displacements over length, locally owned entries.
+        """
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
-        """u over length at this rank's points, shape (m, 2), from the unknowns of their cells, shape (m, 2, dim)."""
+        """Return u over length at this rank's points, shape (m, 2), from unknowns of their cells, shape (m, 2, dim)."""
         return np.einsum("kj,kij->ki", self._weights, values)
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
+        """Return the row of weighted unknowns, owned entries; factors: (n, components), point_weights: (m, dim)."""
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
         triples: list[list] = [[], []]
@@ -101,7 +134,10 @@ class Probe:
 
 
 class MidSurfaceProbe(Probe):
-    """A `Probe` on a membrane: points off the mid-surface move with it, and their distance changes as the thickness."""
+    """Probe of a membrane; points off the mid-surface keep their material normal.
+
+    Their distance from the mid-surface changes in proportion to the thickness.
+    """
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
@@ -145,12 +181,28 @@ class MidSurfaceProbe(Probe):
         return self._problem.comm.allreduce(total, MPI.SUM)
 
     def across(self) -> tuple[np.ndarray, float]:
-        """See `Probe.across`: at the pole the membrane stays normal to the axis, and is stretched by 1 + du_r/dR."""
+        """Return the row that measures the stretch 1 + du_r/dR at the pole.
+
+        At the pole a membrane is normal to the axis.
+
+        Returns:
+            Row, locally owned entries, shape (n,); power, 1.
+        """
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """See `Probe.row`; only points of the mid-surface."""
+        """Return the row of a weighted sum of displacements of points on the mid-surface.
+
+        Args:
+            factors: weights, shape (n, components).
+
+        Returns:
+            Row with row . x = sum of weights times displacements over length, locally owned entries.
+
+        Raises:
+            InputError: a point is not on the mid-surface.
+        """
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(outside):
@@ -180,18 +232,25 @@ class MidSurfaceProbe(Probe):
 
 
 def _normal(tangents: np.ndarray) -> np.ndarray:
-    """Vectors turned by a right angle, upwards, shape (m, 2)."""
+    """Return vectors rotated by a right angle, upwards, shape (m, 2)."""
     return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
-    """Return the scalar basis of an element, or its derivative on an interval, at m points of its cell, shape (m,
-    dim)."""
+    """Return the basis of an element, or its derivative on an interval, at m points of its cell, shape (m, dim)."""
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)
 
 
 def probe(problem: Any, points: Any) -> Probe:
-    """Return the `Probe` of the displacement at fixed reference points, for every model of the body."""
+    """Return the probe of the displacement at fixed reference points, for every model of the body.
+
+    Args:
+        problem: the `Problem`.
+        points: reference positions (R, Z), shape (n, 2), length.
+
+    Returns:
+        The `Probe`.
+    """
     return problem.forms.probe(problem, points)

@@ -8,12 +8,12 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Setting:
+class StepData:
     """amplitude = base + rate * control of every item of a scene (`Scene.items`), dimensionless; last, process time.
 
     Attributes:
         base, rate: one number for each item (0 unless it can be controlled), then the process time.
-        off: numbers of the items that take no part.
+        inactive: numbers of the items that take no part.
         fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
         stage, piece: number of the stage in its process, and of the piece of it that has one control.
         changed: numbers of the items that leave or come in while it fades.
@@ -22,7 +22,7 @@ class Setting:
 
     base: list[float]
     rate: list[float]
-    off: list[int]
+    inactive: list[int]
     fading: bool = False
     stage: int = 0
     piece: int = 0
@@ -30,7 +30,7 @@ class Setting:
     mesh: int = 0
 
     @classmethod
-    def first(cls, scene: Any) -> Setting:
+    def first(cls, scene: Any) -> StepData:
         """Return the setting of the unloaded scene with all its items; a single controlled item follows the control."""
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
@@ -53,16 +53,16 @@ class Setting:
 
     def acting(self, number: int, control: float) -> float:
         """Return the active part of a load's amplitude: 0 if the load is inactive; it fades in or out in a change."""
-        share = float(number not in self.off)
+        share = float(number not in self.inactive)
         if self.fading and number in self.changed:
             share = control if share else 1 - control
         return share * self.amplitude(number, control)
 
-    def standing(self, control: float) -> list[float]:
+    def amplitudes(self, control: float) -> list[float]:
         """Return the amplitudes of the items and the process time at a control."""
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
-    def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[Setting, float]:
+    def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
         """Return (the same setting, the same control) where the user's values over the amplitudes are `now`."""
         ratio = [b / n for b, n in zip(before, now, strict=True)]
         of_control = 1.0 if self.leading is None else ratio[self.leading]

@@ -1,4 +1,4 @@
-"""A scene as an incompressible solid of finite thickness."""
+"""Scene as an incompressible solid of finite thickness."""
 
 from __future__ import annotations
 
@@ -20,15 +20,23 @@ _FIRST_STRETCH = 1e-4      # u = _FIRST_STRETCH X, at which the first direction 
 
 
 class Solid(Formulation):
-    """A scene as an incompressible solid; the fields are displacement and, if the model has them, pressures.
+    """Forms of a scene as an incompressible solid; the fields are displacement and, in mixed models, pressures.
 
     Attributes:
-        bodies: [(material, its layers)]: layers of one material object are one body.
-        pressure_of: {layer: number of its pressure field}; empty without pressures as unknowns.
+        bodies: list of (material, its layers); layers that share one material object form one body.
+        pressure_of: {layer: number of its pressure field}; empty without pressure unknowns.
     """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """Return the measure of a named boundary."""
+        """Return the measure of a boundary.
+
+        Args:
+            name: name of the boundary.
+            quadrature_degree: degree of the quadrature on it.
+
+        Returns:
+            The measure.
+        """
         return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -48,23 +56,34 @@ class Solid(Formulation):
         dx = self.dx if len(tags) == len(self.mesh.layers) else self.dx(tags)
         return density * self.weight * (dx(metadata=metadata) if metadata else dx)
 
-    def mean_row(self, held: Any) -> Any:
-        ds, weight = self.boundary(held.on, 3), self.weight
-        if held.by_stiffness:
+    def mean_row(self, constraint: Any) -> Any:
+        ds, weight = self.boundary(constraint.on, 3), self.weight
+        if constraint.by_stiffness:
             stiffness = fem.Function(fem.functionspace(self.domain, ("DG", 0)))
             for name, tag in self.scene.mesh.layers.items():
                 stiffness.x.array[self.scene.mesh.cells.find(tag)] = self.scene.shear_modulus(name) / self.stress
             weight = weight * stiffness
-        v = ufl.split(self.test_function())[0][held.component]
+        v = ufl.split(self.test_function())[0][constraint.component]
         return v * weight / self.constant(self.integral(weight * ds)) * ds
 
     def length_row(self, boundary: str) -> Any:
-        """Linear form whose vector is, at the first component of a node, the length of boundary that belongs to it."""
+        """Return the linear form of the tributary lengths of the nodes of a boundary.
+
+        Args:
+            boundary: name of the boundary.
+
+        Returns:
+            Linear form (UFL, rank 1); its entry at the first component of a node is the tributary length of the node.
+        """
         metadata = {"quadrature_rule": "GLL", "quadrature_degree": 3}
         return ufl.split(self.test_function())[0][0] * self.ds(self.scene.mesh.boundaries[boundary], metadata=metadata)
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
-        """[(sub space, local dofs)] of pressures that belong to no cell of their layers."""
+        """Return the pressures that belong to no cell of their layers.
+
+        Returns:
+            List of (subspace, local numbers of its unknowns).
+        """
         found, mesh, dofmap = [], self.mesh, self.space.dofmap
         for colour in sorted(set(self.pressure_of.values())):
             sub = self.space.sub(1 + colour)
@@ -79,9 +98,11 @@ class Solid(Formulation):
         return found
 
     def set_stiff(self) -> None:
-        """Set `w` to 0; of a sheet whose bending stiffness is lost to round-off, to a small stretch in all directions.
+        """Set `w` to 0, or to a small stretch u = s X if bending stiffness is below round-off.
 
-        u = s X: the stress stiffens it as a membrane. (Interpolated: unknowns of bubbles are no nodal values.)
+        The stress of the stretch stiffens a thin sheet as a membrane. The stretch is interpolated because the unknowns
+        of
+        bubbles are no nodal values.
         """
         super().set_stiff()
         if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:
@@ -98,8 +119,11 @@ class Solid(Formulation):
         return scene.mesh
 
     def mode_space(self) -> fem.FunctionSpace:
-        """Return the space of modes: displacement amplitudes, shape (3,), and pressures, on the elements of the
-        fields."""
+        """Return the space of instability modes on the elements of the fields.
+
+        Returns:
+            Space of displacement amplitudes, shape (3,), and pressures.
+        """
         return fem.functionspace(self.domain, basix.ufl.mixed_element(self._elements(self.domain.basix_cell(), 3)[1]))
 
     def _elements(self, cell: Any, components: int = 2) -> tuple[Any, list[Any]]:
@@ -126,28 +150,50 @@ class Solid(Formulation):
     def _groups(self) -> list[tuple[Any, list[str]]]:
         return self.bodies
 
-    def _energy(self, of: Any) -> Any:
+    def _energy(self, density: Any) -> Any:
         self._eps, energy = self.constant(self.scene.model.eps), 0
         self._volume_stiffness = self.constant(self.scene.model.volume_stiffness)
         for material, names in self.bodies:
-            for density, metadata in self.energy_densities(material, names, self.F, of):
-                energy += self.weighted(self._scale * density, names, metadata)
+            for term, metadata in self.energy_densities(material, names, self.F, density):
+                energy += self.weighted(self._scale * term, names, metadata)
         return energy
 
     def energy_densities(self, material: Any, names: list[str], F: Any,
-                         of: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
-        """[(energy per reference volume (UFL, stress), quadrature metadata)] of a body for F, shape (3, 3).
+                         density: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
+        r"""Return the energy densities of a body: the material's energy and the terms of incompressibility.
 
-        The energy of the material, then the terms that keep the volume: W(F) - rest_stress ln J, and p (J - 1) or a
-        penalty. `of`: see `_energy`.
+        .. math::
+            W(F) - \sigma_0 \ln J + p (J - 1)
+
+        :math:`\sigma_0` is the `rest_stress` of the material. A penalty model has a penalty in place of :math:`p (J -
+        1)`.
+
+        Args:
+            material: material of the body.
+            names: layers of the body.
+            F: deformation gradient (UFL, shape (3, 3)).
+            density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
+
+        Returns:
+            List of (energy per reference volume (UFL, stress), quadrature metadata).
         """
-        return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], of)
+        return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], density)
 
-    def elastic_densities(self, names: list[str], F: Any, pressures: Any, of: Any = MaterialTerms.step_energy
+    def elastic_densities(self, names: list[str], F: Any, pressures: Any, density: Any = MaterialTerms.step_energy
                           ) -> list[tuple[Any, dict]]:
-        """`energy_densities` of an elastic F and of pressure fields (UFL, dimensionless)."""
+        """Return the energy densities of a body for an elastic deformation gradient; see `energy_densities`.
+
+        Args:
+            names: layers of the body.
+            F: elastic deformation gradient (UFL, shape (3, 3)).
+            pressures: pressure fields (UFL, dimensionless).
+            density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
+
+        Returns:
+            List of (energy per reference volume (UFL, stress), quadrature metadata).
+        """
         model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F) / self.ratio_before
-        W = of(terms, F)
+        W = density(terms, F)
         if model.stress_free:
             W -= terms.rest_stress * ufl.ln(J)
         modulus = self.constant(max(self.scene.shear_modulus(name) for name in names))
@@ -158,7 +204,7 @@ class Solid(Formulation):
 
 
 def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
-    """[(material, its layers)]: layers of one material object are one body."""
+    """Return a list of (material, its layers); layers that share one material object form one body."""
     groups: dict[int, tuple[Any, list[str]]] = {}
     for name in scene.mesh.layers:
         material = scene.materials[name]
@@ -167,7 +213,7 @@ def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
 
 
 def _colour(scene: Any) -> dict[str, int]:
-    """{layer: number of its pressure field}: bodies of different materials that touch get different fields."""
+    """Return {layer: number of its pressure field}; adjacent bodies of different materials get different fields."""
     mesh = scene.mesh
     if not scene.model.pressure.continuous:
         return dict.fromkeys(mesh.layers, 0)

@@ -1,9 +1,8 @@
-"""Time integration error of the stress at the end of a step: against two steps of half the length.
+"""Time integration error of the stress at the end of a step, by step doubling.
 
-The history variables of materials are advanced once more, in two halves, along the displacements that the states
-before and the new one make likely, at the temperatures that the step has led to. The resulting stress at the end is
-compared with the stress of the step (step doubling: Hairer, Norsett and Wanner 1993, section II.4): point by point,
-at a given deformation, so nothing is solved for. Of a material only its step is used.
+The history variables of the materials are updated once more, in two half steps. The displacement halfway is
+extrapolated from the accepted states and the new one. The resulting stress is compared with the stress of the full
+step, point by point at a given deformation (Hairer, Norsett and Wanner 1993, section II.4). No equilibrium is solved.
 """
 
 from __future__ import annotations
@@ -17,13 +16,15 @@ from mpi4py import MPI
 
 from .. import _compat
 
-_AT_REST = 1e-6
+_NO_STRESS = 1e-6
 """Stress over the largest modulus that counts as zero."""
 
 _SYSTEMATIC = 4.0
-"""Weight of an error that has the same sign in every step, as that of a backward difference has: such errors add up
-over a run, others partly cancel. (With 1 a creeping disc of `demos/kbkz.py` is 1 % too thin at its pole, with 4 less
-than 0.5 %: tests/test_kbkz_scenes.py.)"""
+"""Weight of errors that have the same sign in every step, as the error of a backward difference.
+
+Such errors add up over a run; others partly cancel. With weight 1 a creeping disc of `demos/kbkz.py` is 1 % too thin at
+its pole, with 4 less than 0.5 % (tests/test_kbkz_scenes.py).
+"""
 
 
 class StepError:
@@ -38,14 +39,14 @@ class StepError:
         forms = self._forms
         self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
-        terms = [terms for terms in forms.terms if terms.remembers or heat and terms.follows_temperature]
+        terms = [terms for terms in forms.terms if terms.has_history or heat and terms.follows_temperature]
         self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
         systematic = any(entry.material.of_motion or entry.material.integral for entry in terms)
         self._weight = _SYSTEMATIC if systematic else 1.0
         self._relaxed = [_Stress(forms, entry, entry.equilibrium_energy) for entry in terms
-                         if entry.remembers and entry.equilibrium_energy(forms.elastic_F) is not None]
+                         if entry.has_history and entry.equilibrium_energy(forms.elastic_F) is not None]
 
-    def of(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
+    def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Return (error of the stress at the end of a step, its part that is left after another step of this length).
 
         Relative root mean squares over the body. The part that is left adds up from step to step.
@@ -60,7 +61,7 @@ class StepError:
         step = end - old.time if self._stresses else 0.0
         first, found = (self._at(old.x, old.time), self._at(x, end)) if step > 0 else ([], [])
         forms.clock = clock
-        after = self._problem.foretell(old, x, control)
+        after = self._problem.predict(old, x, control)
         for history, memory in zip(forms.histories, start):
             if history in self._materials or not step > 0:
                 history.put(memory)
@@ -72,42 +73,45 @@ class StepError:
         errors.append((self._at(x, end), found))
         if self._materials:
             self._advance(x, control, end)
-            better = self._held(x, end + step)
+            better = self._relaxing(x, end + step)
             for history, memory in zip(forms.histories, after):
                 history.put(memory)
-            errors.append((better, self._held(x, end + step)))
+            errors.append((better, self._relaxing(x, end + step)))
         for history, memory in zip(forms.histories, start):
             history.put(memory)
         self._at_time(end)
         forms.clock = clock
         relaxed = [stress.values() for stress in self._relaxed]     # branches may turn the sum through 0
-        scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _AT_REST * forms.stress)
+        scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _NO_STRESS * forms.stress)
         once, lasting = [*(self._norm([a - b for a, b in zip(*pair)]) / scale for pair in errors), 0.0][:2]
         return self._weight * once, self._weight * lasting
 
     def _at_time(self, time: float) -> None:
+        """Move the clock so that the process time has a value."""
         self._forms.clock += time - self._problem.time
 
     def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Stresses of the materials at the end of a step from the present history variables to x at a time."""
+        """Return the stresses of the materials at the end of a step from the present history variables to x at a time.
+        """
         self._at_time(time)
         self._problem.place(x)
         return [stress.values() for stress in self._stresses]
 
-    def _held(self, x: np.ndarray, time: float) -> list[np.ndarray]:
+    def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
         """Return the stresses as `_at` does, of a body whose deformation was constant before."""
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
+        """Update the history variables of the materials to x at a time."""
         self._problem.place(x)
         self._at_time(time)
         for history in self._materials:
             history.advance(x, control)
 
     def _norm(self, values: list[np.ndarray]) -> float:
-        """Root mean square over all points, all ranks."""
+        """Return the root mean square over all points of all ranks."""
         comm = self._problem.comm
         total, number = (comm.allreduce(v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))
@@ -115,7 +119,11 @@ class StepError:
 
 
 class _Stress:
-    """Deviator of the Kirchhoff stress of an energy of a material, at the quadrature points of the energy."""
+    r"""Deviatoric Kirchhoff stress of an energy of a material, at the quadrature points of the energy.
+
+    .. math::
+        \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
+    """
 
     def __init__(self, forms: Any, terms: Any, energy: Callable):
         F = ufl.variable(forms.elastic_F)
@@ -126,7 +134,11 @@ class _Stress:
         self._expression = _compat.compile_expression(ufl.as_vector(entries), terms.places)
 
     def values(self) -> np.ndarray:
-        """Return the entries 11, 22, sqrt(2) 12, 33 in locally owned cells, shape (points, 4), stress."""
+        """Return the entries 11, 22, sqrt(2) 12, 33 in the locally owned cells.
+
+        Returns:
+            Stresses, shape (points, 4), stress.
+        """
         if not len(self._cells):
             return np.zeros((0, 4))
         return self._expression.eval(self._forms.domain, self._cells).reshape(-1, 4)

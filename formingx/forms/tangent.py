@@ -1,4 +1,4 @@
-"""Derivatives of a scene's residual, but for contact: the tangent as a matrix, and by the control."""
+"""Derivatives of a scene's residual without contact: tangent matrix, and derivative with respect to the control."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,13 +12,15 @@ from .matrix import ExtendedMatrix
 
 
 class Tangent:
-    """dF/dx and dF/dcontrol of the forms and the constraints of supports.
+    """Derivatives dF/dx and dF/dcontrol of the forms and of the constraints of supports.
 
     Args:
-        forms: the `Formulation`. constraints: of its scene. symmetric: True if dF/dx is symmetric.
+        forms: the `Formulation`.
+        constraints: the `Constraints` of its scene.
+        symmetric: True if dF/dx is symmetric.
 
     Attributes:
-        matrix: an `ExtendedMatrix`.
+        matrix: the `ExtendedMatrix` of dF/dx.
     """
 
     def __init__(self, forms: Any, constraints: Constraints, symmetric: bool):
@@ -34,16 +36,31 @@ class Tangent:
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
             self._by_motion = forms.compile(ufl.action(tangent, self._lift))
 
-    def enter(self, active: Any, rate: list[float], anew: bool) -> None:
-        """Set the active constraints of a stage (anew: they have changed) and the rates of items by the control."""
-        if anew:
-            self.matrix.hold(active.bcs, active.rows)
+    def enter(self, active: Any, rate: list[float], changed: bool) -> None:
+        """Set the constraints and the rates of a stage.
+
+        Args:
+            active: the `Active` constraints.
+            rate: change of each item's amplitude per control, then of the process time.
+            changed: True if the active constraints have changed.
+        """
+        if changed:
+            self.matrix.constrain(active.bcs, active.rows)
         if self._lift is not None:
             self._lift.x.array[:] = 0
             self._lift.x.array[active.dofs] = np.append(rate, 0.0)[active.driver]
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
-        """Return the derivative of n owned fields by the control: by loads, the time, and driven supports."""
+        """Return the derivative of the residual with respect to the control, through loads, time and driven supports.
+
+        Args:
+            rate: change of each item's amplitude per control, then of the process time.
+            assemble: function that returns the locally owned entries of a compiled linear form.
+            n: number of locally owned field unknowns.
+
+        Returns:
+            dF/dcontrol, shape (n,).
+        """
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:
             values += assemble(self._by_time)

@@ -1,4 +1,4 @@
-"""The temperature of a body while it is formed: it begins as the scene gives it, and a history may change it."""
+"""Temperature of a body during forming: initially given by the scene, and changed by a heat history."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from ..scene.temperature import GivenTemperature
 
 
 class Temperature:
-    """The temperature of a problem's body at the last accepted state.
+    """Temperature of a problem's body at the last accepted state.
 
     Args:
         given: temperature of the scene.
 
     Attributes:
-        T: the DOLFINx `Function` (P2) of its values. After a change call `take_temperature` of the `Problem`.
-        before: values at an earlier time, ghosts included, or None.
-        time, time_before: process times of `T` and of `before`.
-        limits: lowest and highest temperature that there can be. Next to a face that is chilled at once quadratic
-            elements overshoot: the part beyond is cut off where temperatures are read.
+        T: DOLFINx `Function` (P2) of the temperature. After a change call `take_temperature` of the `Problem`.
+        before: values of T at an earlier time with ghosts, or None.
+        time: process time of `T`.
+        time_before: process time of `before`.
+        limits: lowest and highest possible temperature. Quadratic elements overshoot next to a suddenly chilled face;
+            values beyond the limits are cut off where temperatures are read.
     """
 
     def __init__(self, given: GivenTemperature):
@@ -30,20 +31,48 @@ class Temperature:
         self.limits = (-np.inf, np.inf)
 
     def now_and_before(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the temperatures of `GivenTemperature.in_cells`, and of the step before if there is one: (1
-        or 2, cells, q)."""
+        """Return the temperatures in cells, now and in the previous step if there is one.
+
+        Args:
+            cells: local numbers of the cells.
+            places: positions in the reference cell, shape (q, 2).
+
+        Returns:
+            Temperatures, shape (1 or 2, cells, q), cut off at `limits`.
+        """
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Return the temperatures, shape (n,), at reference points that each rank chooses, shape (n, 2); collective."""
+        """Return the temperatures at reference points that each rank chooses; collective.
+
+        Args:
+            points: reference positions, shape (n, 2), length.
+
+        Returns:
+            Temperatures, shape (n,), cut off at `limits`.
+        """
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
     def nodes(self, points: np.ndarray) -> np.ndarray:
-        """Return the local numbers, shape (...), of the nodes of T at points of this rank's cells, shape (..., 2)."""
+        """Return the nodes of T at points of this rank's cells.
+
+        Args:
+            points: reference positions of nodes, shape (..., 2), length.
+
+        Returns:
+            Local numbers of the nodes, shape (...).
+        """
         from scipy.spatial import cKDTree
         return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the temperatures at nodes of T, by their local numbers, of any shape; cut off at `limits`."""
+        """Return the temperatures at nodes of T.
+
+        Args:
+            nodes: local numbers of the nodes, any shape.
+
+        Returns:
+            Temperatures, the same shape, cut off at `limits`.
+        """
         return np.clip(self.T.x.array[nodes], *self.limits)

@@ -1,4 +1,4 @@
-"""Viscous stress in a body that moves to another equilibrium: P = eta dF, with one eta for the whole body."""
+"""Viscous stress that damps a jump to another equilibrium: P = eta dF, with one eta for the whole body."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from .. import _compat
 
 
 class Viscosity:
-    """Nodal forces eta V dx by a change dx of the unknowns; constrained unknowns neither cause nor receive any.
+    """Viscous nodal forces eta V dx for a change dx of the unknowns.
+
+    Constrained unknowns neither cause nor receive forces.
 
     Args:
-        form: compiled bilinear form of V; bcs: the constraints.
+        form: compiled bilinear form of V.
+        bcs: DirichletBCs of the constrained unknowns.
     """
 
     def __init__(self, form: Any, bcs: list):
@@ -27,7 +30,15 @@ class Viscosity:
         self._entries = self._matrix.getValuesCSR()
 
     def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
-        """eta V dx, for a change dx of the unknowns; locally owned entries of both, shape (n,)."""
+        """Return the viscous nodal forces eta V dx.
+
+        Args:
+            change: change dx of the unknowns, locally owned entries, shape (n,).
+            eta: viscosity factor.
+
+        Returns:
+            Forces, locally owned entries, shape (n,).
+        """
         found, n = np.zeros_like(change), len(self._rows)
         self._change.array_w[:] = change[:n]
         self._matrix.mult(self._change, self._forces)
@@ -35,7 +46,12 @@ class Viscosity:
         return found
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent."""
+        """Add eta V to a tangent.
+
+        Args:
+            tangent: PETSc matrix.
+            eta: viscosity factor.
+        """
         pointers, columns, values = self._entries
         tangent.setValuesIJV(pointers, columns, eta * values, PETSc.InsertMode.ADD_VALUES, self._rows)
         tangent.assemble()

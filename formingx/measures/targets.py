@@ -217,7 +217,7 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """Return the target: the change of the scene between two stages is complete (`Setting.fading`)."""
+    """Return the target: the change of the scene between two stages is complete (`StepData.fading`)."""
     return Target("change", 1.0, lambda problem: Amplitude(problem, None))
 
 

@@ -15,7 +15,7 @@ from ufl.tensors import ListTensor
 
 from ..errors import InputError
 from ..mesh.nodes import COORDINATES
-from .supports import NAMES, Held
+from .supports import NAMES, Constrained
 
 BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 """The entries of the F of a section that are not 0: in its plane, and round the axis or along the depth."""
@@ -46,7 +46,7 @@ class Kinematics:
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
-        """Return the constraints of a support (`Held`, `MeanHeld`), its components as the coordinates are numbered.
+        """Return the constraints of a support with components numbered as the coordinates.
 
         Raises:
             InputError: a component that the body does not have.
@@ -177,7 +177,8 @@ class ThreeD(Kinematics):
         """See `Kinematics`; a hinge constrains all nodes of its rim, along y too."""
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
-        return [Held(self.axes.index(NAMES[h.component].replace("r", "x")), on=h.on, driven=h.driven) for h in items]
+        return [Constrained(self.axes.index(NAMES[c.component].replace("r", "x")), on=c.on, driven=c.driven)
+                for c in items]
 
     def deformation_gradient(self, u, X):
         return ufl.Identity(3) + ufl.grad(u)

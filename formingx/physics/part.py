@@ -29,5 +29,5 @@ class Part:
     told: tuple[str, ...] = ()
 
     def constraints(self) -> list[Any]:
-        """Return the constraints: a list of `Held` or `MeanHeld`."""
+        """Return the constraints: a list of `Constrained` or `ConstrainedMean`."""
         return []

@@ -12,7 +12,7 @@ NAMES = ("r", "z", "y", "x")
 """Names of the components that supports constrain, by number; in three dimensions r of a support of a rim is x."""
 
 
-class Held(NamedTuple):
+class Constrained(NamedTuple):
     """Constraint of one displacement component to 0 at every node of a boundary, or at the node at `point`.
 
     driven: the component follows the control of the run instead.
@@ -24,7 +24,7 @@ class Held(NamedTuple):
     driven: bool = False
 
 
-class MeanHeld(NamedTuple):
+class ConstrainedMean(NamedTuple):
     """Constraint of the mean of one displacement component over a boundary to 0, by a Lagrange multiplier.
 
     by_stiffness: layers count in proportion to their shear modulus, and carry the force in this proportion.
@@ -62,9 +62,10 @@ class Support(Part):
         """
         return None
 
-    def held(self) -> list[Held | MeanHeld]:
+    def held(self) -> list[Constrained | ConstrainedMean]:
         """`constraints`, and the components that its energy resists."""
-        return [*self.constraints(), *(Held(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)]
+        resisted = (Constrained(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)
+        return [*self.constraints(), *resisted]
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.on!r})"
@@ -111,7 +112,7 @@ class Symmetry(_OneComponent):
             self.guide = True
 
     def constraints(self):
-        return [Held(self.component, on=self.on)]
+        return [Constrained(self.component, on=self.on)]
 
 
 class Clamped(Support):
@@ -126,7 +127,7 @@ class Clamped(Support):
     holds_rotation = True
 
     def constraints(self):
-        return [Held(R, on=self.on), Held(Z, on=self.on)]
+        return [Constrained(R, on=self.on), Constrained(Z, on=self.on)]
 
 
 class SimplySupported(Support):
@@ -152,7 +153,7 @@ class SimplySupported(Support):
         self.weight = weight
 
     def constraints(self):
-        return [MeanHeld(component, self.on, self.weight == "stiffness") for component in (R, Z)]
+        return [ConstrainedMean(component, self.on, self.weight == "stiffness") for component in (R, Z)]
 
 
 class PinnedNode(Support):
@@ -171,7 +172,7 @@ class PinnedNode(Support):
         self.point = (finite("PinnedNode: r", r), finite("PinnedNode: z", z))
 
     def constraints(self):
-        return [Held(R, point=self.point), Held(Z, point=self.point)]
+        return [Constrained(R, point=self.point), Constrained(Z, point=self.point)]
 
     def __repr__(self) -> str:
         return f"PinnedNode({self.point[0]!r}, {self.point[1]!r})"
@@ -200,7 +201,7 @@ class PrescribedDisplacement(_OneComponent):
         self.name = name
 
     def constraints(self):
-        return [Held(self.component, on=self.on, driven=True)]
+        return [Constrained(self.component, on=self.on, driven=True)]
 
 
 def _component(name: str, value: str) -> int:

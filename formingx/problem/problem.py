@@ -1,7 +1,7 @@
 """The discrete equations of a scene, F(x, control) = 0: the interface of `solve`. Everything in it is created once.
 
 x holds the fields (dimensionless, see `formulation`) and, at the end of the last rank's part, one Lagrange multiplier
-for each `MeanHeld` support.
+for each `ConstrainedMean` support.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ..contact.face import FaceContact
 from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
 from ..errors import InputError, together
-from ..forms.admissible import Least
+from ..forms.admissible import WorstValue
 from ..forms.constraints import Active, Constraints
 from ..forms.formulations import formulate
 from ..forms.histories import Histories
 from ..forms.history import History
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 from ..forms.step_error import StepError
 from ..forms.tangent import Tangent
 from ..forms.temperature import Temperature
@@ -40,14 +40,14 @@ class _Stage(NamedTuple):
     """Equations of a setting, from a state on.
 
     Attributes:
-        setting: the `Setting`.
+        setting: the `StepData`.
         active: the active constraints.
         place, rate: the constrained owned unknowns are place + rate * control, shape (n,) each.
         means: values of the constrained means.
         left: unbalanced forces that a fading setting removes, over 1 - control, locally owned entries of F; or None.
     """
 
-    setting: Setting
+    setting: StepData
     active: Active
     place: np.ndarray
     rate: np.ndarray
@@ -66,7 +66,7 @@ class Problem(Histories, Units):
         matrix: the tangent, refilled by `tangent`.
         contacts: the scene's contacts (`FaceContact`); present: the active contacts.
         histories: arguments of F besides x and control (`History`); limit: limits of a step (`StepLimit`).
-        setting: the present `Setting`; see `enter`.
+        setting: the present `StepData`; see `enter`.
         admissible: check of the admissibility of the body, and its volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
@@ -90,7 +90,7 @@ class Problem(Histories, Units):
         last = self.comm.rank == self.comm.size - 1             # it has the multipliers
         self.x = PETSc.Vec().createMPI((self._n + last * len(self._constraints.means), None), comm=self.comm)
         self._stage: Any = None
-        self.enter(Setting.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
+        self.enter(StepData.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self.force_scale = 0.0
 
     @cached_property
@@ -121,7 +121,7 @@ class Problem(Histories, Units):
         return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
 
     @property
-    def setting(self) -> Setting:
+    def setting(self) -> StepData:
         """Step data of the present stage."""
         return self._stage.setting
 
@@ -187,18 +187,18 @@ class Problem(Histories, Units):
         On leaving, the values before are restored.
 
         Args:
-            state: anything with x (locally owned entries), control, time, setting (a `Setting` as plain data, or empty)
+            state: object with x (locally owned entries), control, time, setting (a `StepData` as plain data, or empty)
                 and memory.
         """
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
-        stage, memory, x, foretold = self._stage, self.memory, self.x.array_r.copy(), self._foretold
+        stage, memory, x, predicted = self._stage, self.memory, self.x.array_r.copy(), self._predicted
         try:
             self.restore(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
         finally:
-            self.memory, self._foretold = memory, foretold
+            self.memory, self._predicted = memory, predicted
             self._take(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
@@ -210,7 +210,7 @@ class Problem(Histories, Units):
         if self.has_history:
             self.memory = state.memory
         if state.setting:
-            self.enter(Setting(**state.setting), state.x, state.control)
+            self.enter(StepData(**state.setting), state.x, state.control)
         if not self.setting.rate[-1]:
             self.forms.clock = state.time
 
@@ -274,7 +274,7 @@ class Problem(Histories, Units):
         self.set_state(x, control)
         return not self.admissible.holds()
 
-    def furthest_volume_ratio(self, state: Any) -> Least | None:
+    def furthest_volume_ratio(self, state: Any) -> WorstValue | None:
         """Return the place where J is furthest from 1 in a state, see `Admissible.furthest_volume_ratio`;
         collective."""
         with self.state_context(state):
@@ -322,7 +322,7 @@ class Problem(Histories, Units):
 
     def step_error(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """See `StepError.of`."""
-        return self._step_error.of(past, share, x, control)
+        return self._step_error.estimate(past, share, x, control)
 
     @cached_property
     def _viscosity(self) -> Any:
@@ -408,7 +408,7 @@ class Problem(Histories, Units):
             self._tangent.matrix.destroy()
         self.x.destroy()
 
-    def enter(self, setting: Setting, x: np.ndarray, control: float) -> None:
+    def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
         """Enter a setting: from here on F is the residual of the setting, and (x, control) is a state on its path.
 
         Constrained unknowns stay at their values in x; driven ones have these values at this control. A fading
@@ -417,8 +417,8 @@ class Problem(Histories, Units):
         before = self._stage
         if before is not None and setting == before.setting:
             return
-        same = before is not None and before.setting.off == setting.off
-        active = before.active if same else self._constraints.without(set(setting.off))
+        same = before is not None and before.setting.inactive == setting.inactive
+        active = before.active if same else self._constraints.active(set(setting.inactive))
         rate = np.append(setting.rate, 0.0)[active.driver][active.owned]
         place = x[active.dofs[active.owned]] - rate * control
         stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
@@ -440,7 +440,7 @@ class Problem(Histories, Units):
         self.forms.set_loads(setting)
         for contact in self.contacts:
             i = number[id(contact.contact)]
-            contact.enter(setting.base[i], setting.rate[i], i not in setting.off)
+            contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
         self.present = [contact for contact in self.contacts if contact.present]
         if "_tangent" in vars(self):
             self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)

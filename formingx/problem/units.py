@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 from ..scene.aims import beyond_all
 from ..scene.scene import Scene
 
@@ -19,7 +19,7 @@ class Units:
     forms: Any
 
     @property
-    def setting(self) -> Setting:
+    def setting(self) -> StepData:
         """Step data of the present stage."""
         raise NotImplementedError
 

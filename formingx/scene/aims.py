@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..mesh.triangles import Triangles
-from ..physics.supports import Held
+from ..physics.supports import Constrained
 from .scene import Scene
 
 _NEAR = 1e-5           # distance over the body's length up to which a point is on a boundary
@@ -16,34 +16,34 @@ _SQUARES = 200         # number of squares along a mould's larger side
 _ROOMY = 1.05, 1.005   # largest ratio of a volume to the one counted in squares, over a flat body and around a tube
 
 
-def check(scene: Scene, targets: Iterable[Any], off: Collection[int] | None = None) -> None:
+def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
     """Raise an InputError if one of these targets cannot be met, see `unreachable`."""
     for target in targets:
-        why = unreachable(scene, target, off)
+        why = unreachable(scene, target, inactive)
         if why is not None:
             raise InputError(f"{target}: {why}")
 
 
-def unreachable(scene: Scene, target: Any, off: Collection[int] | None = None) -> str | None:
+def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None) -> str | None:
     """Return the reason for which no run meets a target (its `name` and `value`), as text; None: no reason is known.
 
-    off: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only item
-        that can be.
+    inactive: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only
+        item that can be.
     """
     name, value, driven = target.name, target.value, scene.driven
-    active = [item for i, item in enumerate(scene.items) if i not in (off or ())]
+    active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
     moulds = [item for item in active if item in scene.contacts and not item.driven]
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])
         if value >= largest:
             return f"must be less than {largest:.6g}, where I1 comes to the limit {material.largest_I1:g} of {material}"
-    if off is None and driven is not None and name in ("pressure", "travel"):
+    if inactive is None and driven is not None and name in ("pressure", "travel"):
         if name != driven.quantity:
             return f"the run drives {driven!r}, which has no {name}"
         if value < 0 and driven in scene.contacts and driven.separates:
             return f"the travel is negative: {driven!r} would move away from the body"
-    if off is None and name == "force" and value < 0 and driven in scene.contacts and driven.separates \
+    if inactive is None and name == "force" and value < 0 and driven in scene.contacts and driven.separates \
             and not driven.friction_by_temperature and driven.mu == 0:
         return f"{driven!r} can only push: the force must not be negative"
     if name.startswith("u_") and "_at_" in name and value != 0:
@@ -83,7 +83,7 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
         for held in scene.kinematics.in_axes(support, support.constraints()):
-            if isinstance(held, Held) and not held.driven and scene.kinematics.axes[held.component] == component:
+            if isinstance(held, Constrained) and not held.driven and scene.kinematics.axes[held.component] == component:
                 nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
                 if np.hypot(*(nodes[:, : len(point)] - point).T).min() < near:
                     return support

@@ -32,7 +32,7 @@ def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None
     for plan in plans:
         if not all(map(np.isfinite, stands.values())):
             unsure.append(plan)
-        present = {i: tool for i, tool in tools.items() if i not in plan.off}
+        present = {i: tool for i, tool in tools.items() if i not in plan.inactive}
         for where in _legs(plan, stands):
             for i in (i for i in present if where[i] != stands[i] and np.isfinite(where[i])):
                 try:

@@ -20,7 +20,7 @@ from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
 from ..physics.models import Membrane, MixedPressure, Model
 from ..physics.part import Part
-from ..physics.supports import Held, Support
+from ..physics.supports import Constrained, Support
 from ..ranks import gathered
 from . import tool_width
 from .sampling import sample
@@ -350,7 +350,7 @@ class Scene:
         moves = contact.way
         for support in self.supports:
             for held in self.kinematics.in_axes(support, support.constraints()):
-                if not isinstance(held, Held) or held.on is None or moves[held.component] == 0:
+                if not isinstance(held, Constrained) or held.on is None or moves[held.component] == 0:
                     continue
                 depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
                 if depth.min() >= 0:
@@ -371,7 +371,7 @@ class Scene:
             return
         for support in supports:
             for held in support.constraints():
-                if isinstance(held, Held) and held.component == 0 and held.on is not None \
+                if isinstance(held, Constrained) and held.component == 0 and held.on is not None \
                         and np.all(self.mesh.nodes_of(held.on)[:, 0] <= 1e-12 * size):
                     return
         raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
@@ -386,7 +386,7 @@ class Scene:
             for held in self.kinematics.in_axes(support, support.held()):
                 X = (np.array([held.point]) if held.point is not None else self.mesh.nodes_of(held.on)) / size
                 rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
-                if not isinstance(held, Held):
+                if not isinstance(held, Constrained):
                     rows = rows.mean(0, keepdims=True)
                 gram += rows.T @ rows / len(rows)
         values, vectors = np.linalg.eigh(gram)
@@ -404,7 +404,7 @@ class Scene:
         """
         moduli = {name: self.shear_modulus(name) for name in self.materials}
         for held in (held for support in self.supports for held in support.constraints()):
-            if isinstance(held, Held):
+            if isinstance(held, Constrained):
                 continue
             at_rim = self._layers_at(held.on)
             hard = max(at_rim, key=moduli.__getitem__)

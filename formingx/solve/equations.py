@@ -29,7 +29,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..contact.step_limit import StepLimit
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 
 Array: TypeAlias = npt.NDArray[Any]
 
@@ -57,7 +57,7 @@ class Standing(Protocol):
         control: the control.
         time: process time.
         memory: the history variables from here on.
-        setting: plain data of a `Setting`, or empty.
+        setting: plain data of a `StepData`, or empty.
     """
 
     x: Array
@@ -323,10 +323,10 @@ class Stages(Protocol):
     """Step data between two changes of the problem."""
 
     @property
-    def setting(self) -> Setting:
+    def setting(self) -> StepData:
         """Step data: amplitudes of the controls, and inactive items."""
 
-    def enter(self, setting: Setting, x: Array, control: float) -> None:
+    def enter(self, setting: StepData, x: Array, control: float) -> None:
         """Enter other step data at a state (x, control); x: locally owned entries."""
 
     def restore(self, state: Standing) -> None:
@@ -348,7 +348,7 @@ class Units(Protocol):
 
     @property
     def scales(self) -> Sequence[float]:
-        """The user's value over the amplitude of each item that a `Setting` counts; last, 1.0 for the time."""
+        """The user's value over the amplitude of each item that a `StepData` counts; last, 1.0 for the time."""
 
     @property
     def units(self) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import count, positive
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
 from .linear import DirectSolver
 from .local_contact import LocalSolve, Update, woodbury
@@ -191,14 +191,14 @@ class _ModifiedNewton:
 
     def __init__(self, settings: Newton) -> None:
         self._settings = settings
-        self._setting: Setting | None = None                # of the tangent; None: there is none
+        self._setting: StepData | None = None                # of the tangent; None: there is none
         self._before, self._fall = 0.0, 1.0
 
-    def made(self, setting: Setting | None) -> None:
+    def made(self, setting: StepData | None) -> None:
         """Note that a new tangent was made with these step data; None: it is singular."""
         self._setting = setting
 
-    def begin(self, setting: Setting | None, allowed: bool) -> None:
+    def begin(self, setting: StepData | None, allowed: bool) -> None:
         """Begin Newton's method at a guess; `allowed`: tangents may be kept in this step."""
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0

@@ -1,6 +1,6 @@
 """A process: stages in order, each with its own control, which go on where the one before ended.
 
-Everything is created once. A stage sets how the items of the scene follow the control (`Setting`): its controls have
+Everything is created once. A stage sets how the items of the scene follow the control (`StepData`): its controls have
 the control as its amplitude; other controllable items keep the value that it has. Tables against time make the time
 the control, piece by piece between their knots. Inactive items (an open grip, a plug that
 is not there yet) leave unbalanced forces. They fade along one more path.
@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from ..forms.schedule import Setting
+from ..forms.schedule import StepData
 from ..measures.targets import Amplitude, Target, changed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose
@@ -40,7 +40,7 @@ _Targets: TypeAlias = list[tuple[Target, Measure]]
 class Execution:
     """One run of a process, stage by stage, from its last state on.
 
-    Piece 0 of a stage changes the active items. In each later piece a control varies. Each piece has one `Setting`.
+    Piece 0 of a stage changes the active items. In each later piece a control varies. Each piece has one `StepData`.
 
     Args:
         record: record of the states.
@@ -61,7 +61,7 @@ class Execution:
         self.plans, self._unsure, self._look, self._step, self._balanced = plans, unsure, look, step, balanced
         self._accuracy = accuracy
         self._rest, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
-        self._still = Setting(nothing, nothing, [])
+        self._still = StepData(nothing, nothing, [])
         self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
         problem.enter(self._still, self._rest, 0.0)
 
@@ -72,7 +72,7 @@ class Execution:
         if self.record.states:
             self.record.restore()
         for k, plan in enumerate(self.plans[last["stage"]:], last["stage"]):
-            self.record.stage, self._stage, self._off, self._k = plan.stage.name, plan.stage, plan.off, k
+            self.record.stage, self._stage, self._inactive, self._k = plan.stage.name, plan.stage, plan.inactive, k
             piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
             if piece < 1:
                 self._change(piece == 0)
@@ -95,7 +95,7 @@ class Execution:
         """Return the targets of a stage and their measures; where it drives one item, or waits, the last is `until`."""
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
-        self.problem.enter(replace(self._still, rate=rate, off=plan.off), self._rest, 0.0)
+        self.problem.enter(replace(self._still, rate=rate, inactive=plan.inactive), self._rest, 0.0)
         found = []
         for target in (*stage.intermediate, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
             try:
@@ -114,7 +114,7 @@ class Execution:
         return [(target, bound) for target, bound in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
-    def _standing(self) -> tuple[Setting, Array, float]:
+    def _standing(self) -> tuple[StepData, Array, float]:
         """Return the setting, the unknowns and the control where the process stands now."""
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
@@ -125,8 +125,8 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        changed = sorted(set(self.problem.setting.off) ^ set(self._off)) if fading else []
-        setting = Setting(base, rate, self._off, fading, self._k, piece, changed, self.problem.setting.mesh)
+        changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
+        setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:
@@ -162,12 +162,12 @@ class Execution:
         before, x, control = self._standing()
         start: float | None = None
         if not begun:
-            for i in set(before.off) - set(self._off):
+            for i in set(before.inactive) - set(self._inactive):
                 try:
                     self.problem.bring_in(i, x, control)
                 except InputError as error:
                     raise InputError(f"{self._stage.who}: {error}") from None
-            still, fading = [0.0] * len(before.base), bool(self.record.states) and before.off != self._off
+            still, fading = [0.0] * len(before.base), bool(self.record.states) and before.inactive != self._inactive
             start = 0.0 if fading else control
             self._enter(self._amplitudes(), still, 0, start, fading)
         if self.problem.setting.fading and (begun or self._out_of_balance(x)):
@@ -199,7 +199,7 @@ class Execution:
     def _amplitudes(self) -> list[float]:
         """Return the present amplitudes of all items, and the time."""
         setting, _, control = self._standing()
-        return [*setting.standing(control)[:-1], self.problem.time_at(control)]
+        return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
         """Piece 1: one item is adjusted so that a quantity follows an amplitude in time."""

@@ -177,14 +177,14 @@ class Plan(NamedTuple):
         stage: the stage.
         numbers: the controlled item and the items that move with it; empty without `Stage.control`.
         tables: [(number, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
-        off: the inactive items.
+        inactive: the inactive items.
         names: all items of the scene, as text.
     """
 
     stage: Stage
     numbers: list[int]
     tables: list[tuple[int, Array]]
-    off: list[int]
+    inactive: list[int]
     names: list[str]
 
     @property

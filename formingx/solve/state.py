@@ -25,7 +25,7 @@ class State:
         met: the target that it hits, or None.
         memory: the history variables of the problem from here on (`Problem.histories`); before: those used to
             solve for the state; empty if they are not known.
-        stage: name of the stage of a process; setting: the step data of the stage, as plain data (`Setting`).
+        stage: name of the stage of a process; setting: the step data of the stage, as plain data (`StepData`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
         time: process time.
         orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit

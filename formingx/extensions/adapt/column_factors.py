@@ -63,12 +63,12 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
-    faces = [outline.of(contact.contact.on) for contact in problem.contacts]
+    faces = [outline.mask(contact.contact.on) for contact in problem.contacts]
     column = _column_of(outline.rest[:, 2], middles[[0, -1]])
     begin = columns.place(columns.ends[:-1])[[0, -1]]
     sides = []                                               # edges column by column, mask of reversed ones
     for name, first in zip(columns.faces, begin):
-        edges = np.flatnonzero(outline.of(name))
+        edges = np.flatnonzero(outline.mask(name))
         edges = edges[np.unique(column[edges], return_index=True)[1]]               # ghosts appear twice
         a, b = (np.linalg.norm(outline.rest[edges, k] - first, axis=1) for k in (0, 1))
         sides.append((edges, a > b))

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...forms.schedule import Setting
+from ...forms.schedule import StepData
 from ...measures.targets import Target
 from ...results.path import Path
 from ...solve.newton import Failure, fixed
@@ -79,7 +79,7 @@ class _StateTransfer:
             last = k == len(states) - 1 or states[k + 1].setting != state.setting
             begins = before is None or state.setting != before.setting
             if begins and not self._single:
-                self._enter(Setting(**state.setting))
+                self._enter(StepData(**state.setting))
             if before is None:
                 self._begin(state)
             elif state.kind == "start":
@@ -105,17 +105,17 @@ class _StateTransfer:
                 constraint = fixed(state.control)
                 settle(self.curve, state, self.neighbours, constraint, [constraint] * len(self.neighbours))
 
-    def _enter(self, setting: Setting) -> None:
+    def _enter(self, setting: StepData) -> None:
         """Begin a stage in each perturbed run from its current state."""
         for entry in self.neighbours:
             problem, p = entry.problem, entry.plans[setting.stage]
             now = problem.setting
             standing = entry.x is not None
             amplitudes = [0.0] * len(now.base) if not standing else [
-                *now.standing(entry.control)[:-1], problem.time_at(entry.control)]
+                *now.amplitudes(entry.control)[:-1], problem.time_at(entry.control)]
             x = entry.x if standing else np.zeros(problem.x.getLocalSize())
             if standing:
-                for number in set(now.off) - set(setting.off):
+                for number in set(now.inactive) - set(setting.inactive):
                     problem.bring_in(number, x, entry.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
@@ -273,7 +273,7 @@ def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
 
 def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
     """Return the controls of a stage, its tables and their lengths, and its inactive items."""
-    return p.numbers, [(i, len(table)) for i, table in p.tables], p.off
+    return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 
 
 def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:

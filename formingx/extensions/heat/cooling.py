@@ -339,12 +339,12 @@ class CoolingHistory:
         return Memory(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
     def carry(self, source: CoolingHistory, memory: Memory, x: np.ndarray, control: float,
-              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
+              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`; the materials have been carried."""
         comm, before = self._problem.comm, memory.before
-        to_body = Carrier(comm, there(source._body.points), self._body.points).fitted
+        to_body = Carrier(comm, mapping(source._body.points), self._body.points).fitted
         touched = zip(source._body.touches, memory.lines, strict=True) if self._body.touches else ()
-        lines = [Carrier(comm, there(other.points), touch.points).fitted(kept)  # what is released touches nothing
+        lines = [Carrier(comm, mapping(other.points), touch.points).fitted(kept)  # what is released touches nothing
                  for touch, (other, kept) in zip(self._body.touches, touched, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return Memory(memory.time, to_body(memory.temperature), lines, memory.step, power,

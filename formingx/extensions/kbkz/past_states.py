@@ -69,8 +69,9 @@ class PastStates:
             return _compat.compile_expression(expression, terms.places)
         self._C = at_points(ufl.as_vector(isochoric(forms.elastic_F)))
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
-        rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.held.items()}
-        self._held = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name]) for name, f in terms.held.items()]
+        rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.past_integrals.items()}
+        self._held = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name])
+                      for name, f in terms.past_integrals.items()]
         self._seen: tuple[Any, Any] | None = None
         self.start()
 
@@ -129,9 +130,9 @@ class PastStates:
         self.put(Memory(time, tuple(states[k] for k in chosen), least if least is None else least[chosen]))
 
     def carry(self, source: PastStates, memory: Memory, x: np.ndarray, control: float,
-              there: Callable[[np.ndarray], np.ndarray]) -> Memory:
+              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
         """See `History`."""
-        carrier = Carrier(self._forms.comm, there(source.points), self.points)
+        carrier = Carrier(self._forms.comm, mapping(source.points), self.points)
         F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 
         def fitted(values: np.ndarray) -> np.ndarray:

@@ -108,7 +108,7 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
                          f" rank: leave it out")
     with problem.state_context(state):
         edges = outline.edges()
-    of, order = {name: outline.of(name) for name in mesh.boundaries}, outline.around("Path.deformed_mesh: size")
+    of, order = {name: outline.mask(name) for name in mesh.boundaries}, outline.ordered("Path.deformed_mesh: size")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
     return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...errors import ConvergenceError, InputError, finite, positive
 from ...forms.carry import carry, take_fields
-from ...forms.schedule import Setting
+from ...forms.schedule import StepData
 from ...mesh.mesh import Mesh
-from ...physics.supports import Held, PinnedNode, Support, Symmetry
+from ...physics.supports import Constrained, PinnedNode, Support, Symmetry
 from ...problem.problem import Problem
 from ...results.evaluate.part import strips_within
 from ...results.evaluate.profile import FACES
@@ -152,7 +152,7 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
     heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))
     x = _carried(source, state, problem)
-    problem.enter(Setting([0.0] * len(problem.scene.items) + [state.time], [0.0] * (1 + len(problem.scene.items)),
+    problem.enter(StepData([0.0] * len(problem.scene.items) + [state.time], [0.0] * (1 + len(problem.scene.items)),
                           [], fading=True), x, 0.0)
     return _run(problem, x, cools, allowed_error("Path.springback", accuracy), trimmed, units or NONE)
 
@@ -220,7 +220,7 @@ class _Still(PinnedNode):
         self._component = component
 
     def constraints(self):
-        return [Held(self._component, point=self.point)]
+        return [Constrained(self._component, point=self.point)]
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:

@@ -258,11 +258,11 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     outline = Outline(old.forms)
     with old.state_context(state):
         edges = outline.edges()
-        of = {name: outline.of(name) for name in scene.mesh.boundaries}
+        of = {name: outline.mask(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
         contacts = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
     touched = [(c.contact.on, w.position[w.touches] + travel) for c, w, travel in contacts]
-    order = outline.around("remesh")
+    order = outline.ordered("remesh")
     names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
@@ -307,7 +307,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
         why = failure.reason
     log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", why)
     time = problem.time_at(control)
-    still = replace(first, base=[*first.standing(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
+    still = replace(first, base=[*first.amplitudes(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
     record, target = Record(problem, curve), Target("change", 1.0, None)
     try:
         problem.enter(still, x, 0.0)

@@ -34,7 +34,7 @@ from ...errors import InputError
 from ...forms.loaded_body import LoadedBody
 from ...forms.matrix import ExtendedMatrix
 from ...physics.kinematics import BLOCK
-from ...physics.supports import Held, Symmetry
+from ...physics.supports import Constrained, Symmetry
 
 _AT_REST = 1e-6
 """Relative force of a rigid motion (over the forces of its single unknowns) below which it is unconstrained."""
@@ -98,7 +98,7 @@ class SecondVariation:
         self._number.value, self._turned.value = number, m
         self._held = self._find_held(number, flipped)
         own = self._held[self._held < self._own]
-        off, rows = problem.setting.off, []
+        off, rows = problem.setting.inactive, []
         for number_of_item, row, u in self._means:
             rows.append((row - m * u) * (number_of_item not in off))
             rows[-1][own] = 0
@@ -265,9 +265,9 @@ class SecondVariation:
         """
         problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
-            items = [] if i in problem.setting.off else self._forms.constraints(scene_item)
+            items = [] if i in problem.setting.inactive else self._forms.constraints(scene_item)
             for item in items:
-                if isinstance(item, Held):
+                if isinstance(item, Constrained):
                     if isinstance(scene_item, Symmetry) and scene_item.mirror and scene_item.on == flipped:
                         held += [self._dofs(c, item) for c in (1 - item.component, 2)]
                     else:
@@ -293,7 +293,8 @@ class SecondVariation:
         forms, problem = self._forms, self.problem
         n = problem.n_owned
         for number, scene_item in enumerate(problem.scene.items):
-            means = {item.component: item for item in forms.constraints(scene_item) if not isinstance(item, Held)}
+            means = {item.component: item for item in forms.constraints(scene_item)
+                     if not isinstance(item, Constrained)}
             for item in means.values():
                 row = np.zeros(self._own)
                 row[self._to_mode[:n]] = problem.assemble(forms.compile(forms.mean_row(item)))

@@ -92,7 +92,7 @@ class AdmissibilityCheck:
         self._images = problem.scene.symmetry_factor
         if self._solid:
             self._outline = Outline(problem.forms)
-            self._faces = [self._outline.of(contact.contact.on) for contact in problem.contacts]
+            self._faces = [self._outline.mask(contact.contact.on) for contact in problem.contacts]
             self._rest = _lengths(self._outline.rest)
 
     def of(self, state: State) -> str:

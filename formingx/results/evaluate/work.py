@@ -233,7 +233,7 @@ class EnergyBalance:
                 setting = at.setting
                 travel = forms.length * setting.amplitude(i, state.control)
                 by_arc = forms.length * setting.rate[i] * state.slope
-                if i in setting.off:
+                if i in setting.inactive:
                     force = slope = 0.0
                 elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.together(i)]

@@ -24,7 +24,7 @@ from dolfinx import fem
 
 from ...errors import InputError, instance, place
 from ...findings import Finding
-from ...forms.schedule import Setting
+from ...forms.schedule import StepData
 from ...measures.targets import Target
 from ...problem.problem import Problem
 from ...scene.scene import Scene
@@ -239,7 +239,7 @@ def _read_state(data: dict, problem: Any) -> State:
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
     met, setting = data.pop("met"), data["setting"]
-    data["setting"] = setting and asdict(Setting(**setting))             # fills in missing entries
+    data["setting"] = setting and asdict(StepData(**setting))             # fills in missing entries
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),

@@ -1,0 +1,97 @@
+"""Interface of the kinds of bodies: solids, membranes and sheets implement it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+import ufl
+
+
+class BodyModel(ABC):
+    """Fields, boundaries and integrals of one kind of body; the base of `Formulation`."""
+
+    @abstractmethod
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """Return the outward normal and the measure of a boundary on which a load acts.
+
+        Args:
+            name: name of the boundary.
+            quadrature_degree: degree of the quadrature on it.
+
+        Returns:
+            Outward reference normal (UFL, shape (2,)) and measure.
+        """
+
+    @abstractmethod
+    def constraints(self, support: Any) -> list[Any]:
+        """Return the constraints that a support imposes.
+
+        Args:
+            support: the `Support`.
+
+        Returns:
+            List of `Constrained` and `ConstrainedMean`.
+        """
+
+    @abstractmethod
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """Return the points of `mesh` that represent points of the body.
+
+        Args:
+            points: reference positions, shape (n, 2), length.
+
+        Returns:
+            Reference positions on `mesh`, shape (n, 2), length.
+        """
+
+    @abstractmethod
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
+        """Return the integral of a density over the reference volume of some layers.
+
+        Args:
+            density: density per reference volume (UFL scalar).
+            layers: names of the layers.
+            metadata: quadrature options of the measure.
+
+        Returns:
+            The integral (UFL).
+        """
+
+    @abstractmethod
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        """Return the heights of points of a layer that points of `mesh` represent.
+
+        Args:
+            layer: name of the layer.
+            R: radii of the points, shape (n,), length.
+            Z: heights of the points on `mesh`, shape (n,), length.
+
+        Returns:
+            Z in the layer, shape (n,), length.
+        """
+
+    @abstractmethod
+    def _make_mesh(self) -> Any:
+        """Return the `Mesh` of the fields."""
+
+    @abstractmethod
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """Return the scalar element of a displacement component, and the elements of all fields."""
+
+    @abstractmethod
+    def _groups(self) -> list[tuple[Any, list[str]]]:
+        """Return a list of (material, layers), one for each form of the energy."""
+
+    @abstractmethod
+    def _weight(self) -> Any:
+        """Return `weight`."""
+
+    @abstractmethod
+    def _deformation_gradient(self) -> Any:
+        """Return `F`."""
+
+    @abstractmethod
+    def _energy(self, density: Any) -> Any:
+        """Return `potential` or `energy`; density(terms, F) is the energy density (stress) of a `MaterialTerms`."""
