@@ -73,7 +73,7 @@ MUTANTS = [Mutant(*row) for row in [
      "return -1.002 * float(self.comm.allreduce(left, MPI.SUM))", "compression closed_forms"),
     ("problem/problem.py", "out.array_w += (control - 1) * stage.left", "out.array_w += (control - 0.5) * stage.left",
      "process"),
-    ("problem/problem.py", "self.memory, self._predicted = memory, predicted",
+    ("problem/stages.py", "self.memory, self._predicted = memory, predicted",
      "self._predicted = predicted", "details"),
     ("forms/admissible.py", "> 0))\n                   for", "> -0.5))\n                   for", "admissible"),
     ("forms/constraints.py", "active * row for (_, row), active", "row for (_, row), active", "process"),

@@ -301,7 +301,7 @@ def test_another_format_is_refused(copied, number):
     folder, scene = copied
     about = json.loads((folder / "scene.json").read_text()) | {"formingx": number}
     (folder / "scene.json").write_text(json.dumps(about))
-    with pytest.raises(fx.InputError, match=f"has the format {number}; this version of formingx reads 6"):
+    with pytest.raises(fx.InputError, match=f"has the format {number}; this version of formingx reads 7"):
         fx.load(folder, scene)
 
 

@@ -114,10 +114,17 @@ class Histories:
         self._predicted = None, []
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Advance the histories of the forms to a state; return their history variables there, for `advance`.
+        """Compute the history variables of the forms at a state, and keep them for `advance`.
 
-        The histories are left in the new state: the caller restores the old one. start: the state that the step begins
-        at; x: locally owned entries.
+        The histories are left in the new state: the caller restores the old one.
+
+        Args:
+            start: state at the beginning of the step.
+            x: unknowns at its end, locally owned entries, shape (n,).
+            control: control at its end.
+
+        Returns:
+            History variables of the forms at the end of the step.
         """
         self.look_at(x, control)
         for history in self.forms.histories:

@@ -74,9 +74,9 @@ class ExtendedMatrix:
         """Assemble the matrix for the present values of the form's functions.
 
         Args:
-            blocks: list of (local unknowns with ghosts, shape (n, m), values added to K, shape (n, m, m)); the unknowns
-                of a
-                block must share a cell.
+            blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to K, shape (n,
+                m, m).
+                The unknowns of a block must share a cell.
 
         Returns:
             The assembled matrix.

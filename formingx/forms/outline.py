@@ -59,11 +59,28 @@ class Outline:
         return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
     def mask(self, boundary: str) -> np.ndarray:
-        """Return a mask of the edges of a boundary of the mesh, shape (m,); collective."""
+        """Return the mask of the edges of a boundary; collective.
+
+        Args:
+            boundary: name of the boundary.
+
+        Returns:
+            True for each edge on it, shape (m,).
+        """
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def ordered(self, caller: str) -> list[int]:
-        """Return the edges in order round the body, by number; raise an InputError for a hole or several parts."""
+        """Return the edges in order around the body.
+
+        Args:
+            caller: name of the calling function, for the message.
+
+        Returns:
+            Edge numbers, counterclockwise.
+
+        Raises:
+            InputError: the body has a hole or several parts.
+        """
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):

@@ -9,14 +9,21 @@ from typing import Any
 
 @dataclass(frozen=True)
 class StepData:
-    """amplitude = base + rate * control of every item of a scene (`Scene.items`), dimensionless; last, process time.
+    r"""Amplitudes of the items of a scene as linear functions of the control.
+
+    .. math::
+        a_i = \mathrm{base}_i + \mathrm{rate}_i \, \lambda
+
+    :math:`\lambda` is the control; amplitudes are dimensionless. The last entry of each list is the process time.
 
     Attributes:
-        base, rate: one number for each item (0 unless it can be controlled), then the process time.
-        inactive: numbers of the items that take no part.
-        fading: the control takes away, from 0 to 1, the unbalanced forces of the change.
-        stage, piece: number of the stage in its process, and of the piece of it that has one control.
-        changed: numbers of the items that leave or come in while it fades.
+        base: one number for each item (0 for an item without control), then the process time.
+        rate: derivatives of the amplitudes and of the process time with respect to the control.
+        inactive: numbers of the inactive items.
+        fading: True if the control removes, from 0 to 1, the unbalanced forces of a change of the active items.
+        stage: number of the stage in its process.
+        piece: number of the piece of the stage; each piece has one control.
+        changed: numbers of the items that are deactivated or activated while the forces fade.
         mesh: number of remeshings before (`formingx.extensions.remeshing.remeshing`).
     """
 
@@ -31,39 +38,81 @@ class StepData:
 
     @classmethod
     def first(cls, scene: Any) -> StepData:
-        """Return the setting of the unloaded scene with all its items; a single controlled item follows the control."""
+        """Return the step data of the unloaded scene with all its items.
+
+        A single controlled item follows the control.
+
+        Args:
+            scene: the `Scene`.
+
+        Returns:
+            The step data.
+        """
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
     @property
     def leading(self) -> int | None:
-        """Number of the controlled quantity: the time if it runs, else the one item that is driven, or None."""
+        """Number of the controlled quantity: the time if it runs, else the one item that follows the control, or None.
+        """
         if self.rate[-1]:
             return len(self.rate) - 1
         return next((i for i, rate in enumerate(self.rate) if rate), None)
 
     @property
     def rests(self) -> bool:
-        """True if only the time changes, or nothing."""
+        """True if no item follows the control: only the time changes, or nothing."""
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
-        """Return the amplitude of an item, or with -1 the process time."""
+        """Return the amplitude of an item.
+
+        Args:
+            number: number of the item; -1 for the process time.
+            control: dimensionless control.
+
+        Returns:
+            Amplitude, or process time.
+        """
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:
-        """Return the active part of a load's amplitude: 0 if the load is inactive; it fades in or out in a change."""
+        """Return the active part of a load's amplitude.
+
+        Args:
+            number: number of the load.
+            control: dimensionless control.
+
+        Returns:
+            0 if the load is inactive; while forces fade, the part of a changed load increases or decreases linearly.
+        """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:
             share = control if share else 1 - control
         return share * self.amplitude(number, control)
 
     def amplitudes(self, control: float) -> list[float]:
-        """Return the amplitudes of the items and the process time at a control."""
+        """Return the amplitudes of the items and the process time.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            Amplitudes, then the process time.
+        """
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
-        """Return (the same setting, the same control) where the user's values over the amplitudes are `now`."""
+        """Return the same step data and control for the scales of another mesh.
+
+        Args:
+            before: user's values over the amplitudes on the present mesh, then 1 for the time.
+            now: the same on the next mesh.
+            control: control on the present mesh.
+
+        Returns:
+            Step data and control on the next mesh.
+        """
         ratio = [b / n for b, n in zip(before, now, strict=True)]
         of_control = 1.0 if self.leading is None else ratio[self.leading]
         return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],

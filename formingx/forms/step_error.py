@@ -47,14 +47,20 @@ class StepError:
                          if entry.has_history and entry.equilibrium_energy(forms.elastic_F) is not None]
 
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        """Return (error of the stress at the end of a step, its part that is left after another step of this length).
+        """Estimate the time integration error of a step by step doubling.
 
-        Relative root mean squares over the body. The part that is left adds up from step to step.
+        Errors are root mean squares over the body, relative to the stress.
 
         Args:
             past: k accepted states; the step begins at the last of them.
             share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
-            x, control: the state at the end of the step, locally owned entries.
+            x: unknowns at the end of the step, locally owned entries, shape (n,).
+            control: control at the end of the step.
+
+        Returns:
+            Error of the stress at the end of the step; the part that persists after another step of this length. The
+            second
+            part adds up from step to step.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
@@ -98,7 +104,7 @@ class StepError:
         return [stress.values() for stress in self._stresses]
 
     def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses as `_at` does, of a body whose deformation was constant before."""
+        """Return the stresses as `_at` does, for a body whose deformation was constant before."""
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)

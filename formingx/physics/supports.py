@@ -62,7 +62,7 @@ class Support(Part):
         """
         return None
 
-    def held(self) -> list[Constrained | ConstrainedMean]:
+    def all_constraints(self) -> list[Constrained | ConstrainedMean]:
         """`constraints`, and the components that its energy resists."""
         resisted = (Constrained(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)
         return [*self.constraints(), *resisted]

@@ -1,4 +1,4 @@
-"""Examination of the body after a failed attempt: its worst place, its distance from limits, the residual."""
+"""Examination of a body after a failed attempt: worst elements, distance from limits, residual."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Examination:
 
     Args:
         problem: the `Problem`.
-        last: the last good state; None: there is none.
-        attempt: the point where Newton's method ended, with x, control and the last corrections dx and dcontrol; None:
-            no iteration failed.
+        last: the last good state, or None.
+        attempt: point where Newton's method ended, with x, control and the last corrections dx and dcontrol; None if no
+            iteration failed.
 
     Attributes:
-        facts: {field of a `Diagnosis`: the result}.
+        facts: {field of a `Diagnosis`: its value}.
     """
 
     def __init__(self, problem: Any, last: Any, attempt: Any):
@@ -55,10 +55,10 @@ class Examination:
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
     def _take_worst(self, shape: Body) -> None:
-        """Find the smallest J, the worst shape and the place nearest to a material's limit in the last good state."""
+        """Find the smallest J, the worst shape and the point nearest to a material's limit in the last good state."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
-        facts["shape"] = float((shape.quality / shape.at_rest).min())
+        facts["shape"] = float((shape.quality / shape.initial_quality).min())
         self._marks.append((f"smallest J {facts['smallest_J']:.3g}", shape.moved[at]))
         limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in shape.layers])
         near = (shape.I1 - 3) / (limits[:, None] - 3)
@@ -88,6 +88,7 @@ class Examination:
                                        tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
     def _take_attempt(self, x: Any, attempt: Any) -> None:
+        """Find the smallest J, the residual and the changes of contact status of the failed attempt."""
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
@@ -99,12 +100,14 @@ class Examination:
         facts["flipped"] = _flips(problem, attempt)
 
     def draw(self, file: Any, title: str) -> None:
-        """Draw the last good state, deformed, its elements coloured by J, the worst places marked, and the tools.
+        """Draw the deformed last good state with J, the worst points and the tools; rank 0 draws.
 
-        Rank 0 draws.
+        Args:
+            file: name of the picture; its folder is created.
+            title: title of the picture.
 
         Raises:
-            InputError: a membrane has no elements to draw, nor has a run without a good state.
+            InputError: the body is a membrane, which has no elements to draw, or there is no good state.
         """
         if self._shape is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
@@ -115,17 +118,18 @@ class Examination:
 
 
 def _layer(problem: Any, tag: int) -> str:
+    """Return the name of the layer with a tag."""
     return next((name for name, t in problem.scene.mesh.layers.items() if t == tag), "")
 
 
 def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
+    """Return the smallest J, its place in the mesh, and its index in `shape.J`."""
     at = np.unravel_index(int(np.argmin(shape.J)), shape.J.shape)
     return float(shape.J[at]), place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]])), at
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
-    """Return the residual by field, over the support forces of the state; the place and the node of its largest
-    displacement entry."""
+    """Return the residual by field over the support forces; place and position of the largest displacement entry."""
     out, comm, space = x.duplicate(), problem.comm, problem.forms.space
     problem.residual(x, control, out)
     values, n = out.array_r.copy(), space.dofmap.index_map.size_local
@@ -151,7 +155,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
 
 
 def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
-    """Return the position in a state of the node at a reference point, shape (2,)."""
+    """Return the deformed position in a state of the node at a reference point, shape (2,), length."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
     points = of_space(vectors)[: len(dofs)]
@@ -165,7 +169,7 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
 
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
-    """Return a mask of the locally owned points in contact, shape (n,), of every active contact."""
+    """Return the masks of the locally owned points in contact, shape (n,), for every active contact."""
     return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.present]
 
 
@@ -184,6 +188,7 @@ def _flips(problem: Any, attempt: Any) -> int | None:
 
 
 def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
+    """Draw elements, marked points and tools to a file."""
     from matplotlib.collections import PolyCollection
     size = np.ptp(shape.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]

@@ -1,4 +1,4 @@
-"""Meaning of the dimensionless numbers of a problem, as text and in the user's units."""
+"""Conversion of the dimensionless numbers of a problem to text and to the user's units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,12 @@ from ..scene.scene import Scene
 
 
 class Units:
-    """Units of a problem with a scene and its forms, in its present setting."""
+    """Units of a problem for its present step data.
+
+    Attributes:
+        scene: the `Scene`.
+        forms: the `Formulation`.
+    """
 
     scene: Scene
     forms: Any
@@ -25,14 +30,21 @@ class Units:
 
     @property
     def why_not_finite(self) -> str:
-        """Reason for which a residual is infinite or not a number in this scene."""
+        """Possible reasons for a residual that is not finite, as text."""
         limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
                   for m in self.scene.materials.values() if m.largest_I1 < np.inf}
         strained = limits or ["a material was strained beyond what its law allows"]
         return ", or ".join(["an element turned inside out", *strained])
 
     def shown(self, control: float) -> tuple[str, float]:
-        """Return the name of the controlled quantity and its value in the user's units."""
+        """Return the controlled quantity at a control in the user's units.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            Name of the quantity and its value.
+        """
         number, items = self.setting.leading, self.scene.items
         if number is None:
             return "control", control
@@ -40,18 +52,25 @@ class Units:
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
-        """Return the reason for which no process reaches a control, as text, or None."""
+        """Return the reason why no process reaches a control.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            The reason as text, or None.
+        """
         return beyond_all(self.scene, self.drives, self.shown(control)[1])
 
     @property
     def drives(self) -> str | None:
-        """Kind of the control: "pressure", "travel", "time" or, if it is none of them, None."""
+        """Kind of the control: "pressure", "travel", "time", or None for another one."""
         number, items = self.setting.leading, self.scene.items
         return None if number is None else "time" if number == len(items) else items[number].quantity
 
     @property
     def fixed_loads(self) -> list[str]:
-        """The loads with a fixed value, which act from the start, as text."""
+        """Loads with a fixed value, which act from the start, as text."""
         return [repr(load) for load in self.scene.loads if not load.driven]
 
     @property
@@ -61,12 +80,12 @@ class Units:
 
     @property
     def scales(self) -> Sequence[float]:
-        """The user's value over the amplitude of each item of the scene; last, 1.0 for the time."""
+        """For each item of the scene, its value in the user's units over its amplitude; last, 1.0 for the time."""
         return self.forms.scales
 
     @property
     def units(self) -> tuple[float, float]:
-        """Units of the dimensionless energy, of the whole part (stress length^3), and of length, in user's units."""
+        """Units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units."""
         return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
 
     @property

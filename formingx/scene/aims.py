@@ -1,4 +1,4 @@
-"""Targets that a run cannot reach, found before anything is solved."""
+"""Check for targets that a run cannot reach, before anything is solved."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
@@ -17,7 +17,16 @@ _ROOMY = 1.05, 1.005   # largest ratio of a volume to the one counted in squares
 
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
-    """Raise an InputError if one of these targets cannot be met, see `unreachable`."""
+    """Check that the targets of a run can be reached, as far as is known.
+
+    Args:
+        scene: the `Scene`.
+        targets: the targets.
+        inactive: see `unreachable`.
+
+    Raises:
+        InputError: a target cannot be reached.
+    """
     for target in targets:
         why = unreachable(scene, target, inactive)
         if why is not None:
@@ -25,10 +34,15 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
 
 
 def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None) -> str | None:
-    """Return the reason for which no run meets a target (its `name` and `value`), as text; None: no reason is known.
+    """Return the reason why no run reaches a target.
 
-    inactive: numbers of the items that a stage leaves out; None: a run from the unloaded state that drives the only
-        item that can be.
+    Args:
+        scene: the `Scene`.
+        target: target with `name` and `value`.
+        inactive: numbers of the items that a stage leaves out; None for a run from the unloaded state with one control.
+
+    Returns:
+        The reason as text; None if no reason is known.
     """
     name, value, driven = target.name, target.value, scene.driven
     active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
@@ -66,7 +80,16 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
 
 
 def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
-    """Return the reason for which a pressure or a travel is absurd, as text, or None."""
+    """Return the reason why a pressure or a travel is implausibly large.
+
+    Args:
+        scene: the `Scene`.
+        quantity: "pressure", "travel", or another quantity, which is not checked.
+        value: its value, stress or length.
+
+    Returns:
+        The reason as text, or None.
+    """
     units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
              "travel": ("the length of the body", float(max(scene.extent)))}
     if quantity not in units:
@@ -82,17 +105,17 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
-        for held in scene.kinematics.in_axes(support, support.constraints()):
-            if isinstance(held, Constrained) and not held.driven and scene.kinematics.axes[held.component] == component:
-                nodes = np.array([held.point]) if held.on is None else scene.mesh.nodes_of(held.on)
+        for constraint in scene.kinematics.in_axes(support, support.constraints()):
+            if isinstance(constraint, Constrained) and not constraint.driven \
+                    and scene.kinematics.axes[constraint.component] == component:
+                nodes = np.array([constraint.point]) if constraint.on is None else scene.mesh.nodes_of(constraint.on)
                 if np.hypot(*(nodes[:, : len(point)] - point).T).min() < near:
                     return support
     return None
 
 
 def _beyond(scene: Scene, contact: Any, height: float) -> bool:
-    """Return True if the contact's face, moved to a pole height, has its pole deeper in the tool than the body is
-    thick."""
+    """Return True if at a pole height the pole would lie deeper in the tool than the thickness of the body."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
@@ -102,10 +125,10 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
-    """Return the volume between the lower face of a flat body and the mould over it, and its largest error as a factor.
+    """Return the volume between a flat body and its mould, and an upper bound of its error as a factor.
 
-    The volume, infinite if the mould is not closed, is the sum over the squares outside the tool that are connected
-    with the body in the reference configuration. For a closed tube see `_room_of_tube`.
+    Squares outside the tool are counted if they are connected with the body in the reference configuration. The volume
+    is infinite if the mould is open. `_room_of_tube` treats a closed tube.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
@@ -132,12 +155,14 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
 
 
 def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
-    """Return the volume that a tube, closed below, can sweep in its mould, up to its upper end.
+    """Return the volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if open.
 
-    It is infinite if the mould is not closed.
-
-    line: its outer face in the reference configuration, from one end to the other, shape (n, 2), length. The enclosed
-        body keeps its volume.
+    Args:
+        scene: the `Scene`.
+        contact: contact with the mould.
+        line: outer face in the reference configuration, from one end to the other, shape (n, 2), length. The volume
+            that
+            it encloses does not count.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

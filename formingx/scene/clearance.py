@@ -1,4 +1,4 @@
-"""Clearance between the tools of a process in its stages, checked before anything is solved."""
+"""Check of the clearance between the tools of a process, before anything is solved."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -9,57 +9,62 @@ from ..errors import InputError
 from ..physics.contact import Contact
 from .scene import Scene
 
-_LOOKS = 50            # number of positions of the tools that are checked in a stage
+_POSITIONS = 50            # number of positions of the tools that are checked in a stage
 _MOST = 1000           # largest number of points of a tool in three dimensions that are checked
 
 
-def check(scene: Scene, plans: list[Any], stands: dict[int, float] | None = None) -> list[Any]:
-    """Raise an InputError if tools of a stage overlap, or one goes through a constrained boundary.
+def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
+    """Check that tools do not overlap in a stage, and that none passes through a constrained boundary.
 
-    If a travel is not known before the run (a stage that ends at a pole height), its tool is not checked from there on.
+    If a travel is unknown before the run, as in a stage that ends at a pole height, its tool is not checked from there
+    on.
 
     Args:
-        plans: plans of the stages, with `stage`, the `numbers` of its controls, `tables` [(number, table)], and the
-            numbers of inactive items, `off`.
-        stands: travels at the beginning, {number: length}; default 0.
+        scene: the `Scene`.
+        plans: plans of the stages (`formingx.solve.stage.Plan`).
+        travels: travels at the beginning, {number: length}; default 0.
 
     Returns:
         The plans with an unknown travel at their beginning, to be checked again when the run reaches them.
+
+    Raises:
+        InputError: tools overlap, or a tool passes through a constrained boundary.
     """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
-    stands, unsure = stands or dict.fromkeys(tools, 0.0), []
+    travels, unsure = travels or dict.fromkeys(tools, 0.0), []
     for plan in plans:
-        if not all(map(np.isfinite, stands.values())):
+        if not all(map(np.isfinite, travels.values())):
             unsure.append(plan)
         present = {i: tool for i, tool in tools.items() if i not in plan.inactive}
-        for where in _legs(plan, stands):
-            for i in (i for i in present if where[i] != stands[i] and np.isfinite(where[i])):
+        for where in _piece_ends(plan, travels):
+            for i in (i for i in present if where[i] != travels[i] and np.isfinite(where[i])):
                 try:
                     scene.check_travel(tools[i], where[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.who}: {error}") from None
-            for part in np.linspace(0, 1, _LOOKS) if where != stands else [1.0]:
-                now = {i: stands[i] + part * (where[i] - stands[i]) for i in tools}
+            for part in np.linspace(0, 1, _POSITIONS) if where != travels else [1.0]:
+                now = {i: travels[i] + part * (where[i] - travels[i]) for i in tools}
                 _check_overlap(scene, plan.stage.who, present, outlines, now)
-            stands = where
+            travels = where
     return unsure
 
 
-def _legs(plan: Any, stands: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Yield the travels of all tools at the ends of the straight pieces of a stage, {number: length}."""
+def _piece_ends(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
+    """Yield the travels of all tools at the ends of the linear pieces of a stage, {number: length}."""
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
-            yield stands | {i: float(np.interp(time, *table.T)) for i, table in plan.tables
-                            if i in stands and time >= table[0, 0]}
+            yield travels | {i: float(np.interp(time, *table.T)) for i, table in plan.tables
+                            if i in travels and time >= table[0, 0]}
     else:
         until = plan.stage.until
         end = until.value if until is not None and until.name.endswith("travel") else np.nan
-        yield stands | {i: end for i in plan.numbers if i in stands}
+        yield travels | {i: end for i in plan.numbers if i in travels}
 
 
 def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
                    where: dict[int, float]) -> None:
+    """Raise an InputError if two active tools overlap at given travels."""
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
@@ -78,7 +83,7 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
-    """Points along a tool's profile, shape (n, 2); of one in three dimensions some of its surface, shape (n, 3)."""
+    """Return points on a tool's profile, shape (n, 2), or in three dimensions on its surface, shape (n, 3), length."""
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
         return points[:: max(1, len(points) // _MOST)]
@@ -87,4 +92,5 @@ def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
 
 
 def _at(contact: Contact, travel: float) -> str:
+    """Return a contact and its travel as text."""
     return f"{contact!r}" + (f" at travel {travel:g}" if contact.direction else "")

@@ -1,4 +1,4 @@
-"""A temperature all over a body: a number, a function, a table, a file, or the end of an earlier run."""
+"""Temperature of a body from a number, a function, a table, a file, or an earlier run."""
 
 import os
 from typing import Any
@@ -19,18 +19,27 @@ _WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what 
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """Return a field at points of a mesh, shape (n, 2), length; each rank may have points of its own. Collective.
+    """Evaluate a temperature at points of a mesh, which may differ between ranks; collective.
 
     Args:
-        field: a number; a `Table` over R; a function of arrays (R, Z), shape (n,) each; the name of a CSV file with the
-            columns R, Z, T (points all around the body), or R, T or Z, T (the same along the other);
-            the result of `fx.heat` (its last state); a scalar DOLFINx Function on this mesh.
-        name: its name in an error.
+        field: one of the following, with x and y in place of R and Z for a sheet in three dimensions:
 
-    Of a sheet in three dimensions it is x and y instead of R and Z.
+            - a number;
+            - a `Table` over R;
+            - a function of arrays (R, Z), shape (n,) each;
+            - the name of a CSV file with columns R, Z, T (points all around the body), or R, T, or Z, T (constant along
+              the other coordinate);
+            - the result of `fx.heat` (its last state);
+            - a scalar DOLFINx Function on this mesh.
+        points: reference positions, shape (n, 2), length.
+        mesh: the `Mesh`.
+        name: name of the argument, for messages.
+
+    Returns:
+        Values at the points, shape (n,).
 
     Raises:
-        InputError: something else, a value that is not finite, a point outside a table or a file.
+        InputError: another kind of field, a value that is not finite, or a point outside a table or a file.
     """
     comm: Any = mesh.comm
     first = comm.scan(len(points)) - len(points)
@@ -61,7 +70,11 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
 
 
 class PointReader:
-    """Reads functions of a space at fixed points, shape (n, 2), the same on all ranks.
+    """Values of functions of a space at fixed points.
+
+    Args:
+        space: the function space.
+        points: reference positions, shape (n, 2), length, the same on all ranks.
 
     Raises:
         InputError: a point outside the mesh.
@@ -78,15 +91,21 @@ class PointReader:
                          else np.zeros((0, element.dim)))
 
     def read(self, array: np.ndarray) -> np.ndarray:
-        """Return the values of a function with these coefficients (ghosts included), shape (n,), all ranks;
-        collective."""
+        """Return the values of a function at the points, on all ranks; collective.
+
+        Args:
+            array: coefficients of the function with ghosts.
+
+        Returns:
+            Values, shape (n,).
+        """
         values = np.zeros(self._n)
         values[self._mine] = (self._weights * array[self._dofs]).sum(1)
         return self._comm.allreduce(values)
 
 
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
-    """Return the linear interpolation of the points of a CSV file over one axis or both, by its columns, shape (n,)."""
+    """Return the linear interpolation of the points of a CSV file along one or both axes, shape (n,)."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)
@@ -128,11 +147,12 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
 
 
 def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
+    """Raise an InputError unless all points lie inside the points of a file."""
     if not np.all(inside):
         raise InputError(f"{name}: point {_at(points, inside, axes)} of the body lies outside the points of the file")
 
 
 def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """Return the first point that is not fine, as text."""
+    """Return the first point that is not fine as text."""
     first, second = points[np.argmin(fine)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -1,4 +1,4 @@
-"""Quadrature points of a layer in the mesh: where constants that vary over the body are looked at."""
+"""Quadrature points of a layer in the mesh, where spatially varying constants are evaluated."""
 
 from typing import Any
 
@@ -14,7 +14,17 @@ from .temperature import GivenTemperature
 
 
 def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
-    """Return the quadrature points of this degree in the locally owned cells of a layer, in the order of the cells."""
+    """Return the quadrature points in the locally owned cells of a layer, cell by cell.
+
+    Args:
+        mesh: the `Mesh`.
+        layer: name of the layer.
+        degree: degree of the quadrature.
+        temperature: temperature of the scene, or None.
+
+    Returns:
+        The points with their cells and temperatures.
+    """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
     cells = np.sort(cells[cells < len(own_cells(domain))])

@@ -14,51 +14,69 @@ from ..errors import InputError, count, known, several, together
 from ..materials.constants import Sample
 from ..materials.hyperelastic import Material
 from ..mesh.mesh import Mesh
-from ..mesh.nodes import of_mesh, span
+from ..mesh.nodes import span
 from ..physics.contact import Contact
 from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
 from ..physics.models import Membrane, MixedPressure, Model
 from ..physics.part import Part
-from ..physics.supports import Constrained, Support
-from ..ranks import gathered
-from . import tool_width
+from ..physics.supports import Support
+from . import contact_checks, support_checks
 from .sampling import sample
 from .summary import summary
 from .symmetry import NO_PLANES, MirrorPlanes, mirror_planes
 from .temperature import Expansion, GivenTemperature
 
 _HIGHEST = 30
-"""Largest degree of a quadrature: a higher one is a mistake, and its points would fill the memory."""
-
-
-_LARGER = 4.0
-"""Ratio of sizes from which on a body that starts inside a tool is probably in another unit of length."""
+"""Largest degree of a quadrature: higher degrees are mistakes, and their points would fill the memory."""
 
 
 class Scene:
-    """A body with its materials, supports, loads and contacts.
+    """Body with its materials, supports, loads and contacts.
 
     Args:
-        mesh: from `formingx.mesh`.
+        mesh: mesh from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
-        supports: see `formingx.physics.supports`.
-        loads: see `formingx.physics.loads`. A run controls one load, support or tool; a `formingx.Process` controls
-            several. Contacts of one tool with several faces, of the same `direction` and name, count as one.
-        contacts: contacts of faces with rigid tools, see `formingx.Contact`.
-        model: `MixedPressure()` (default) or `DisplacementPenalty()`, a solid; `Membrane()`.
-        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; of a sheet in three dimensions `ThreeD()`.
-        quadrature_degree: of the energy, at most 30; default 5 (seven points), the thesis' rule; in three dimensions 1.
-        thickness: of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either of them}.
-        temperature: of the body, which constants of materials may depend on: a number, a `table` over R, a function of
-            arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx Function.
-        heat: `Cooling(...)`: the temperature changes as time goes by.
-        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}: free strain by the temperature.
+        supports: list of supports, see `formingx.physics.supports`.
+        loads: list of loads, see `formingx.physics.loads`. A run controls one load, support or tool; a
+            `formingx.Process` controls several. Contacts of one tool with several faces, of the same `direction` and
+            name,
+            count as one.
+        contacts: list of contacts of faces with rigid tools, see `formingx.Contact`.
+        model: `MixedPressure()` (default) or `DisplacementPenalty()` for a solid; `Membrane()`.
+        kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; for a sheet in three dimensions `ThreeD()`.
+        quadrature_degree: degree of the quadrature of the energy, at most 30; default 5 (seven points), the thesis'
+            rule;
+            in three dimensions 1.
+        temperature: temperature of the body, on which material constants may depend: a number, a `table` over R, a
+            function of arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx
+            Function.
+        heat: `Cooling(...)` for a temperature that changes with time.
+        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}.
+        thickness: thickness of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either}.
         preformed: deformation transferred from another mesh (`trace(remesh=)`).
 
+    Attributes:
+        mesh: the mesh.
+        materials: {layer name: material}.
+        supports: list of supports.
+        loads: list of loads.
+        contacts: list of contacts.
+        model: the model of the body.
+        kinematics: the kinematics.
+        quadrature_degree: degree of the quadrature of the energy.
+        temperature: initial temperature (`GivenTemperature`), or None.
+        heat: the `Cooling`, or None.
+        expansion: {layer: law of thermal expansion}.
+        thickness: {layer: thickness} of a sheet in three dimensions, else empty.
+        symmetry: mirror planes of the body (`MirrorPlanes`).
+        preformed: deformation transferred from another mesh, or None.
+
     Raises:
-        InputError: an unknown or empty tag, a layer without material, too little support, a mesh with R < 0, or whose
-            elements lie over each other or are inside out, two driven objects that no name tells apart.
+        InputError: an unknown or empty tag; a layer without material; insufficient support; a mesh with R < 0,
+            overlapping
+            or inverted elements; two controlled items with the same name or without names.
+
 
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top
@@ -120,12 +138,12 @@ class Scene:
         self._check_boundaries()
         if (planes := mirror_planes(self)).planes:
             self.symmetry = planes
-        self.check_held(self.supports)
+        self.check_constrained(self.supports)
         self.model.check(self)
         if self.model.solid:
-            self._check_hinges()
+            support_checks.check_hinges(self)
         for contact in self.contacts if preformed is None else ():      # else tools have moved already
-            self._check_contact(contact)
+            contact_checks.check_start(self, contact)
         if heat is not None:
             if not hasattr(heat, "check") or isinstance(heat, type):
                 raise InputError(f"Scene: heat = {heat!r}: must be a Cooling(...)")
@@ -133,7 +151,7 @@ class Scene:
             self.heat = heat
 
     one_by_one = False
-    """True: one node comes into contact in a step, for contacts with nodes_per_step=None."""
+    """True if one node comes into contact in a step, for contacts with nodes_per_step=None."""
 
     temperature: GivenTemperature | None = None
     heat: Any = None
@@ -143,18 +161,24 @@ class Scene:
 
     @property
     def symmetry_factor(self) -> int:
-        """Number of images of the body that make the whole part: 4 for a quarter (`Symmetry`)."""
+        """Number of images of the body in the whole part, such as 4 for a quarter (`Symmetry`)."""
         return self.symmetry.factor
 
     @property
     def first(self) -> Scene:
-        """The scene on the mesh that its run began with."""
+        """Scene on the first mesh of its run."""
         return self if self.preformed is None else self.preformed.before[0].scene.first
 
     def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
-        """Return the same scene on another mesh of the body, with the same names of layers and boundaries.
+        """Return the scene on another mesh of the body with the same names of layers and boundaries.
 
-        temperature: temperature on the new mesh; None: the temperature of this scene.
+        Args:
+            mesh: the mesh.
+            preformed: deformation transferred from the present mesh, or None.
+            temperature: temperature on the new mesh; None for the temperature of this scene.
+
+        Returns:
+            The new scene.
         """
         if temperature is None and self.temperature is not None:
             temperature = self.temperature.given
@@ -171,12 +195,19 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """Items that can be controlled; of a tool that meets several faces its first contact."""
+        """Items that can be controlled; for a tool that meets several faces, its first contact."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
-        """Return the numbers of the contacts of one tool: those with the same `direction` and name."""
+        """Return the contacts of the same tool, which have the same `direction` and name.
+
+        Args:
+            number: number of an item in `items`.
+
+        Returns:
+            Numbers of these contacts in `items`, ascending; the number itself for other items.
+        """
         item = self.items[number]
         if item.direction is None:
             return [number]
@@ -185,12 +216,23 @@ class Scene:
 
     @property
     def driven(self) -> Any:
-        """Controlled item of a run with one control: the only one that can be controlled, or None."""
+        """The only item that can be controlled; None if there is none or several."""
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, caller: str) -> Any:
-        """Return `driven`; raise an InputError unless exactly one item can be driven."""
+        """Return the controlled item of a run with one control.
+
+        Args:
+            caller: name of the calling function, for messages.
+
+        Returns:
+            `driven`.
+
+        Raises:
+            InputError: no item or several items can be controlled, or the controlled support drives a constrained
+                component.
+        """
         if not self.drivable:
             raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a PrescribedDisplacement support")
@@ -202,7 +244,18 @@ class Scene:
         return self.driven
 
     def number(self, caller: str, item: Any) -> int:
-        """Return the number in `items` of an item, given itself or by name; raise an InputError if it is not there."""
+        """Return the number of an item in `items`.
+
+        Args:
+            caller: name of the calling function, for the message.
+            item: the item, or its name.
+
+        Returns:
+            The number.
+
+        Raises:
+            InputError: the item is not in the scene.
+        """
         for i, own in enumerate(self.items):
             if item is own or isinstance(item, str) and item == own.name:
                 return i
@@ -211,25 +264,44 @@ class Scene:
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, item: Any) -> str:
-        """Name of the column of a controllable item: "pressure" or "travel", its name in front if there are several."""
+        """Return the name of the column of a controllable item.
+
+        Args:
+            item: the item.
+
+        Returns:
+            "pressure" or "travel", preceded by the item's name if several items can be controlled.
+        """
         alone = len(self.drivable) == 1 or not item.name
         return item.quantity if alone else f"{item.name}_{item.quantity}"
 
-    def check_held(self, supports: Sequence[Any], touched: bool = False) -> None:
-        """Raise an InputError unless these supports constrain the axis and, if no tool touches, every rigid motion."""
-        self._check_axis(supports)
+    def check_constrained(self, supports: Sequence[Any], touched: bool = False) -> None:
+        """Check that supports constrain the axis and prevent rigid motions.
+
+        Args:
+            supports: the active supports.
+            touched: True if a tool may prevent rigid motions; then only the axis is checked.
+
+        Raises:
+            InputError: the axis is unconstrained, or the body can move as a rigid body.
+        """
+        support_checks.check_axis(self, supports)
         if not touched:
-            self._check_rigid_body(supports)
+            support_checks.check_rigid_body(self, supports)
 
     def check_driven(self, supports: Sequence[Any]) -> None:
-        """Raise an InputError if one of these supports drives a component that another one constrains."""
-        held = [(support, h) for support in supports for h in support.constraints()]
-        for mine, driven in held:
-            for other, h in held if driven.driven else ():
-                if other is not mine and (h.on, h.component) == (driven.on, driven.component):
-                    raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
+        """Check that no support drives a component that another one constrains.
+
+        Args:
+            supports: the active supports.
+
+        Raises:
+            InputError: two supports act on the same component of the same boundary.
+        """
+        support_checks.check_driven(supports)
 
     def _check_names(self) -> None:
+        """Raise an InputError unless the names of items and controls are unique."""
         names = [item.name for item in self.items if item.name is not None]
         for name in names:
             if not isinstance(name, str) or not name:
@@ -245,6 +317,7 @@ class Scene:
                                  f" value, or each a name=... and drive them in stages with formingx.Process")
 
     def _check_materials(self) -> None:
+        """Raise an InputError unless each layer has a valid material; store the shear moduli."""
         layers = self.mesh.layers
         for name, material in self.materials.items():
             known("Scene: materials: layer", name, layers)
@@ -274,7 +347,7 @@ class Scene:
         return max(modulus for _, modulus in found)
 
     def _checked_expansion(self, given: Any) -> dict[str, Expansion]:
-        """Return {layer: its law of expansion}, checked at the temperature of every point."""
+        """Return {layer: its law of expansion}, checked at the temperature of every quadrature point."""
         laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, Expansion) else given
         if not isinstance(laws, Mapping) or not all(isinstance(law, Expansion) for law in laws.values()):
             raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
@@ -287,17 +360,32 @@ class Scene:
         return dict(laws)
 
     def sample(self, layer: str) -> Sample:
-        """Return the quadrature points of the energy in a layer, as they are on the first mesh."""
+        """Return the quadrature points of the energy in a layer, positions on the first mesh.
+
+        Args:
+            layer: name of the layer.
+
+        Returns:
+            The points with their cells and temperatures.
+        """
         known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         return found if self.preformed is None else found._replace(points=self.preformed.first_places(found.points))
 
     def shear_modulus(self, layer: str) -> float:
-        """Modulus of small shear of a layer, stress; of constants that vary the largest in it, all ranks."""
+        """Return the small-strain shear modulus of a layer.
+
+        Args:
+            layer: name of the layer.
+
+        Returns:
+            Modulus, stress; for spatially varying constants the largest one of all ranks.
+        """
         known("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
+        """Raise an InputError unless all boundaries of items exist and have facets."""
         for item in self.items:
             on = item.on
             if on is None:
@@ -306,133 +394,21 @@ class Scene:
             if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
-    def _check_contact(self, contact: Contact) -> None:
-        """Raise an InputError unless the body starts outside the tool and its face is the nearest one to the tool.
-
-        Its friction must have a value at the temperatures of the face, and no driven pressure may act on the face.
-        """
-        contact.friction_at(None if self.temperature is None else self.temperature.on(contact.on))
-        mesh, near = self.mesh, 1e-6 * max(self.extent)
-        if self.kinematics.components != contact.tool.components:
-            raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in space those of"
-                             f" fx.tools.solid, box, revolved or extruded")
-        if contact.tool.components == 3:
-            self.kinematics.scene_checks.check_contact(self, contact)
-            return
-        if self.kinematics.axisymmetric and contact.direction and contact.direction[0] \
-                and contact.tool.bounds[0, 0] <= near:
-            raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
-                             f" does that; must be direction=(0, ...), or PlaneStrain()")
-        face = mesh.nodes_of(contact.on)
-        comm = mesh.comm
-        points = gathered(comm, of_mesh(mesh.domain))
-        depth = contact.tool.signed_distance(points)
-        worst = int(np.argmax(depth))
-        if depth[worst] > near:
-            free = contact.tool.reversed().signed_distance(points).max() <= near
-            size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(self.extent)
-            why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
-            if not length < _LARGER * size:
-                why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
-                       f" and cm)?")
-            raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
-                             f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g}){why}")
-        if depth[worst] > contact.tool.signed_distance(face).max() + near:
-            raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
-                             f" boundaries are {list(mesh.boundaries)}")
-        if any(load is self.driven and load.on == contact.on for load in self.loads):
-            raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
-                             f" no tool faces the pressure")
-        tool_width.check(mesh, contact, self.kinematics.axisymmetric)
-
     def check_travel(self, contact: Contact, travel: float) -> None:
-        """Raise an InputError if a tool's travel (length) would put a held boundary as a whole inside the tool."""
-        moves = contact.way
-        for support in self.supports:
-            for held in self.kinematics.in_axes(support, support.constraints()):
-                if not isinstance(held, Constrained) or held.on is None or moves[held.component] == 0:
-                    continue
-                depth = contact.tool.signed_distance(self.mesh.nodes_of(held.on) - travel * moves)
-                if depth.min() >= 0:
-                    raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
-                                     f" body to {held.on!r}, which is held: the travel must be less than"
-                                     f" {travel - depth.max() / np.linalg.norm(moves):.6g}")
+        """Check that a tool does not pass through a constrained boundary.
 
-    def _check_axis(self, supports: Sequence[Any]) -> None:
-        if not self.kinematics.axisymmetric:
-            return
-        geometry = self.mesh.domain.geometry
-        comm = self.mesh.comm
-        low = comm.allreduce(geometry.x[:, 0].min(initial=np.inf), MPI.MIN)
-        size = comm.allreduce(np.abs(geometry.x).max(initial=0.0), MPI.MAX)
-        if low < -1e-12 * size:
-            raise InputError(f"Scene: the mesh crosses the axis: its smallest R is {low:.6g}, must be at least 0")
-        if low > 1e-12 * size:
-            return
-        for support in supports:
-            for held in support.constraints():
-                if isinstance(held, Constrained) and held.component == 0 and held.on is not None \
-                        and np.all(self.mesh.nodes_of(held.on)[:, 0] <= 1e-12 * size):
-                    return
-        raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
-                         f" Symmetry of one of {list(self.mesh.boundaries)}")
+        Args:
+            contact: contact of the tool.
+            travel: its travel, length.
 
-    def _check_rigid_body(self, supports: Sequence[Any]) -> None:
-        """Raise an InputError unless the supports prevent every rigid motion of the kinematics."""
-        names, modes = zip(*self.kinematics.rigid_motions().items())
-        gram = np.zeros((len(modes), len(modes)))
-        size = max(self.extent)
-        for support in supports:
-            for held in self.kinematics.in_axes(support, support.held()):
-                X = (np.array([held.point]) if held.point is not None else self.mesh.nodes_of(held.on)) / size
-                rows = np.stack([mode(X)[:, held.component] for mode in modes], 1)
-                if not isinstance(held, Constrained):
-                    rows = rows.mean(0, keepdims=True)
-                gram += rows.T @ rows / len(rows)
-        values, vectors = np.linalg.eigh(gram)
-        if values[0] < 1e-12:
-            free = names[int(np.argmax(np.abs(vectors[:, 0])))]
-            raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
-                             f" supports are {supports!r}; hold that motion, with Clamped or SimplySupported"
-                             f" for one")
-
-    def _check_hinges(self) -> None:
-        """Raise an InputError if a hinge or a pressure would overload a layer much softer than another at the same rim.
-
-        With weight="area" a hinge pulls all layers with one traction: refused if they differ by more than 100 times in
-        stiffness. A hinged rim face is free, so a pressure on a layer 50 times softer would squeeze it out there.
+        Raises:
+            InputError: a constrained boundary would lie inside the tool as a whole.
         """
-        moduli = {name: self.shear_modulus(name) for name in self.materials}
-        for held in (held for support in self.supports for held in support.constraints()):
-            if isinstance(held, Constrained):
-                continue
-            at_rim = self._layers_at(held.on)
-            hard = max(at_rim, key=moduli.__getitem__)
-            soft = min(at_rim, key=moduli.__getitem__)
-            if not held.by_stiffness and moduli[hard] > 100 * moduli[soft]:
-                raise InputError(f"Scene: SimplySupported({held.on!r}) pulls all layers with the same traction, but"
-                                 f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
-                                 f" SimplySupported({held.on!r}, weight='stiffness')")
-            pressed = {name for load in self.loads if load.on is not None
-                       for name in self._layers_at(load.on)} & at_rim
-            for name in pressed:
-                if moduli[hard] > 50 * moduli[name]:
-                    raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
-                                     f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
-                                     f" hinge SimplySupported({held.on!r}): use Clamped({held.on!r})")
-
-    def _layers_at(self, boundary: str) -> set[str]:
-        """Names of the layers whose cells have a facet on a boundary, all ranks."""
-        topology, cells = self.mesh.domain.topology, self.mesh.cells
-        topology.create_connectivity(1, 2)
-        touching = {topology.connectivity(1, 2).links(f)[0] for f in self.mesh.facets_of(boundary)}
-        mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
-        tags = set().union(*self.mesh.comm.allgather(mine))
-        return {name for name, tag in self.mesh.layers.items() if tag in tags}
+        contact_checks.check_travel(self, contact, travel)
 
     @property
     def extent(self) -> np.ndarray:
-        """Size of the mesh along R and Z, shape (2,), all ranks."""
+        """Extent of the mesh along R and Z, shape (2,), length, all ranks."""
         return self._extent
 
     def __str__(self) -> str:

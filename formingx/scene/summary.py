@@ -1,4 +1,4 @@
-"""A scene as text."""
+"""Description of a scene as text."""
 
 import contextlib
 import re
@@ -12,7 +12,14 @@ from ..values.temperature import FunctionOfTemperature
 
 
 def summary(scene: Any) -> dict[str, str]:
-    """{part: one line for people} of a scene; not collective."""
+    """Describe the parts of a scene in a line each; not collective.
+
+    Args:
+        scene: the `Scene`.
+
+    Returns:
+        {part: its description}.
+    """
     mesh, extent = scene.mesh, scene.extent
     kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y)")
     lines = {"mesh": f"{mesh.domain.topology.index_map(2).size_global} {kind}triangles, {extent[0]:.6g} by"
@@ -34,7 +41,7 @@ def summary(scene: Any) -> dict[str, str]:
 
 
 def _temperatures(scene: Any) -> list[float]:
-    """Return the temperatures that a scene gives as numbers: of its tools, and of the body at first."""
+    """Return the temperatures that a scene gives as numbers: those for its tools, and the initial one of the body."""
     tools = [given.tool for given in scene.heat.tools.values()] if hasattr(scene.heat, "tools") else []
     first = scene.temperature.T.x.array if scene.temperature is not None else []
     even = len(first) and np.ptp(first) == 0
@@ -43,7 +50,7 @@ def _temperatures(scene: Any) -> list[float]:
 
 
 def _material(item: Any, temperatures: list[float]) -> str:
-    """`text` of a material, with values in place of functions of the temperature that have no name."""
+    """Return `text` of a material, with values in place of unnamed functions of the temperature."""
     found = text(item)
     for value in getattr(item, "parameters", {}).values():
         if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):
@@ -56,7 +63,14 @@ def _material(item: Any, temperatures: list[float]) -> str:
 
 
 def text(item: Any) -> str:
-    """repr without memory addresses; of an object that has none of its own, its kind and its public attributes."""
+    """Describe an object without memory addresses.
+
+    Args:
+        item: the object.
+
+    Returns:
+        Its repr or, if its class defines none, its class and public attributes.
+    """
     if type(item).__repr__ is object.__repr__:
         inside = ", ".join(f"{k}={v!r}" for k, v in vars(item).items() if not k.startswith("_"))
         return f"{type(item).__name__}({inside})"

@@ -1,4 +1,4 @@
-"""Planes of symmetry of a scene: how many images of the body that is modelled make the whole part."""
+"""Planes of symmetry of a scene, and the number of images of the modelled body that form the whole part."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PARTS = {1: "half", 2: "quarter", 3: "eighth"}
 
 
 class MirrorPlane(NamedTuple):
-    """A plane across which the part goes on as the image of the body.
+    """Plane across which the part continues as the mirror image of the body.
 
     Attributes:
         axis: number of the coordinate that is constant in the plane.
@@ -32,14 +32,18 @@ class MirrorPlane(NamedTuple):
 
 
 class MirrorPlanes:
-    """The planes of symmetry that cut the body: the whole part is `factor` images of the body.
+    """Planes of symmetry that cut the body; the whole part consists of `factor` images of the body.
 
     A `Symmetry` is such a plane if its boundary is flat, lies at an end of the body, and is no guide. The axis of an
-    axisymmetric body is none: results belong to the whole ring. Two parallel planes are none: the body is a strip of
-    an endless one, and results belong to the strip.
+    axisymmetric body does not count: results belong to the whole ring. Two parallel planes do not count: the body is a
+    strip of an endless one, and results belong to the strip.
+
+    Args:
+        planes: planes with different normals.
+        near: tolerance of positions, length.
 
     Attributes:
-        planes: of different normals.
+        planes: planes with different normals.
         near: tolerance of positions, length.
     """
 
@@ -48,39 +52,53 @@ class MirrorPlanes:
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> MirrorPlanes:
-        """Return the mirror planes of a scene as plain data (`description.describe`)."""
+        """Return the mirror planes of a scene that is given as plain data.
+
+        Args:
+            scene: result of `description.describe`.
+
+        Returns:
+            The mirror planes.
+        """
         found = scene.get("symmetry")
         return cls(tuple(MirrorPlane(*plane) for plane in found["planes"]), found["near"]) if found else cls()
 
     @property
     def factor(self) -> int:
-        """Number of images of the body in the whole part: 2 for every plane."""
+        """Number of images of the body in the whole part, a factor of 2 for every plane."""
         return 2 ** len(self.planes)
 
     @property
     def words(self) -> str:
-        """The part of the body that is modelled: "half", "quarter" or "eighth"; "" without a plane."""
+        """Name of the modelled part: "half", "quarter" or "eighth"; "" without a plane."""
         return _PARTS.get(len(self.planes), "")
 
     def basis(self, depth: str | None) -> str:
-        """Return the basis of results as text; "" for a body that is modelled as a whole, in three dimensions.
+        """Return the basis of results as text.
 
         Args:
-            depth: in plane strain the unit of depth, such as "mm", or "unit"; else None.
+            depth: unit of depth in plane strain, such as "mm", or "unit"; else None.
+
+        Returns:
+            The basis; "" for a body without planes in three dimensions.
         """
         part = f"the whole part (a {self.words} was modelled)" if self.planes else "the part"
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
 
     def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:
-        """Return the ratio of the force on a whole tool or support to the force on the part of it that is modelled.
+        """Return the ratio of the force on a whole tool or support to the force on its modelled part.
 
-        A plane counts if the tool reaches it: the other half of the tool is then on the other side. It does not count
-        if the force has a component across it, since the images of this component cancel: then the force on one side is
-        taken.
+        A plane counts if the tool reaches it, because the tool then continues on the other side. It does not count if
+        the
+        force has a component across it: the images of this component cancel, and the force on one side is meant.
 
         Args:
-            extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components).
-            direction: along which the force counts, shape (components,).
+            extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),
+                length.
+            direction: direction of the force, shape (components,).
+
+        Returns:
+            The ratio, a power of 2.
         """
         low, high = extent
         cut = [plane for plane in self.planes if abs(direction[plane.axis]) < 1e-9 and (
@@ -89,12 +107,16 @@ class MirrorPlanes:
         return int(2 ** len(cut))
 
     def images(self, components: int, extent: np.ndarray | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(scale, shift), shapes (components,), of the maps x -> scale x + shift that make the whole part.
+        """Return the maps x -> scale x + shift from the body to its images in the whole part.
 
         Args:
-            components: of x.
-            extent: lowest and highest coordinates of a tool, shape (2, components): planes that the tool crosses are
+            components: number of components of x.
+            extent: lowest and highest coordinates of a tool, shape (2, components), length; planes that the tool
+                crosses are
                 left out.
+
+        Returns:
+            List of (scale, shift), shape (components,) each; the first is the identity.
         """
         found = [(np.ones(components), np.zeros(components))]
         for plane in self.planes:
@@ -108,11 +130,18 @@ class MirrorPlanes:
 
 
 NO_PLANES = MirrorPlanes()
-"""Mirror planes of a body that is modelled as a whole: there are none."""
+"""Mirror planes of a body that is modelled as a whole: an empty set."""
 
 
 def mirror_planes(scene: Any) -> MirrorPlanes:
-    """Return the planes of symmetry that cut the body of a scene; collective."""
+    """Return the planes of symmetry that cut the body of a scene; collective.
+
+    Args:
+        scene: the `Scene`.
+
+    Returns:
+        The mirror planes.
+    """
     if scene.preformed is not None:
         return scene.first.symmetry
     mesh, kinematics, found = scene.mesh, scene.kinematics, []
@@ -120,8 +149,8 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
     for support in scene.supports:
         if not isinstance(support, Symmetry) or support.guide:
             continue
-        (held,) = kinematics.in_axes(support, support.constraints())
-        axis = held.component
+        (constraint,) = kinematics.in_axes(support, support.constraints())
+        axis = constraint.component
         if kinematics.axisymmetric and axis == 0 or axis >= COORDINATES:      # a flat sheet lies in z = 0
             continue
         low, high = body[:, axis]

@@ -1,4 +1,4 @@
-"""The temperature of a body as a scene gives it: a field on the mesh that constants may depend on."""
+"""Temperature of a body as the scene gives it: a field on the mesh."""
 
 from typing import Any, Protocol, runtime_checkable
 
@@ -14,29 +14,36 @@ from . import fields
 
 @runtime_checkable
 class Expansion(Protocol):
-    """A law of thermal expansion."""
+    """Law of thermal expansion."""
 
     def stretch(self, temperature: ArrayLike) -> np.ndarray:
-        """Return the stretch without stress at temperatures, of their shape.
+        """Return the stress-free stretch.
+
+        Args:
+            temperature: temperatures.
+
+        Returns:
+            Stretches, the same shape.
 
         Raises:
-            InputError: it is not above 0, or not known there.
+            InputError: a stretch is not positive or not known.
         """
 
 
 class GivenTemperature:
-    """A temperature on the scene's own mesh, quadratic in each element.
+    """Temperature on the mesh of a scene, quadratic in each element.
 
     Args:
-        given: an argument of `fields.values_at`.
-        mesh: of the scene.
+        given: field as in `fields.values_at`.
+        mesh: mesh of the scene.
 
     Attributes:
         given: the argument `given`.
-        T: the DOLFINx `Function` (P2). It never changes; `formingx.forms.temperature.Temperature` does.
+        mesh: the argument `mesh`.
+        T: DOLFINx `Function` (P2), constant in time; `formingx.forms.temperature.Temperature` changes.
 
     Raises:
-        InputError: it is not given all over the body.
+        InputError: the temperature is not defined all over the body.
     """
 
     def __init__(self, given: Any, mesh: Mesh):
@@ -47,18 +54,29 @@ class GivenTemperature:
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures in some cells (local numbers) at points of the reference cell, shape (cells, q).
+        """Return the temperatures in some cells at points of the reference cell.
 
         Args:
-            places: the points, shape (q, 2).
-            values: coefficients in place of T.x.array, ghosts included, shape (..., n): the result is (..., cells, q).
+            cells: local numbers of the cells.
+            places: positions in the reference cell, shape (q, 2).
+            values: coefficients in place of T.x.array, with ghosts, shape (..., n).
+
+        Returns:
+            Temperatures, shape (..., cells, q).
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def on(self, boundary: str) -> np.ndarray:
-        """Return the temperatures at the nodes of T on a boundary, shape (n,), all ranks; collective."""
+        """Return the temperatures at the nodes of T on a boundary, on all ranks; collective.
+
+        Args:
+            boundary: name of the boundary.
+
+        Returns:
+            Temperatures, shape (n,).
+        """
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
         return gathered(self.mesh.comm, self.T.x.array[nodes])
 

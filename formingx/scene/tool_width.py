@@ -13,7 +13,7 @@ from ..ranks import gathered
 _DIRECTIONS = 90           # in which a closed tool's width is measured
 
 CUT = 0.1
-"""Penetration between contact points over the thickness from which on a tool counts as cutting the face."""
+"""Penetration between contact points over the thickness above which a tool counts as cutting the face."""
 
 _PLACES = 33
 """Number of points of an edge that are checked."""
@@ -23,7 +23,16 @@ _MOVES = 200
 
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
-    """Raise an InputError if a tool would not be felt, or only when it is deep in the face."""
+    """Check that the contact points of a face are dense enough to detect a tool.
+
+    Args:
+        mesh: the `Mesh`.
+        contact: contact of the tool with the face.
+        axisymmetric: True for an axisymmetric body.
+
+    Raises:
+        InputError: the tool could pass between contact points, or penetrate the face deeply before it meets one.
+    """
     ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
         _check_width(contact, ends, axisymmetric)
@@ -31,7 +40,9 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
-    """Raise an InputError if a closed tool next to the face is narrower than the distance of contact points."""
+    """Raise an InputError if a closed tool is narrower than the distance of contact points on the nearest part of the
+    face.
+    """
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])
@@ -49,8 +60,8 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
     """Raise an InputError if a tool is deep in the undeformed face before it meets a contact point.
 
-    The tool moves by its distance to the nearest point, repeatedly (sphere tracing), so it passes no point. A fixed
-    tool is assumed to approach the middle of an edge along the normal.
+    The tool moves repeatedly by its distance to the nearest point (sphere tracing), so it passes no point. A fixed tool
+    is assumed to approach the middle of an edge along the normal.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))

@@ -221,7 +221,7 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     there = [item for i, item in enumerate(scene.items) if i not in off]
     try:
         supports = [t for t in there if t in scene.supports]
-        scene.check_held(supports, any(t in there for t in scene.contacts))
+        scene.check_constrained(supports, any(t in there for t in scene.contacts))
         scene.check_driven(supports)
         aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], off)
     except InputError as error:

@@ -102,7 +102,7 @@ class SecondVariation:
         for number_of_item, row, u in self._means:
             rows.append((row - m * u) * (number_of_item not in off))
             rows[-1][own] = 0
-        self._matrix.hold([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
+        self._matrix.constrain([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
         self._rows = rows
         self.negative = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
         fields = problem.x.array_r[: problem.n_owned]

@@ -17,7 +17,7 @@ from .arrays import unpack
 from .description import differences
 from .progress import progress
 
-FORMAT = 6  # format of the files
+FORMAT = 7  # format of the files
 FIELDS = ("x", "direction")
 ARRAYS = "arrays.bin"
 END = "end.json"

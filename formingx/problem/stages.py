@@ -1,0 +1,216 @@
+"""Step data of a problem: active items, constrained unknowns, and the equations of a state."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..contact.face import FaceContact
+from ..forms.constraints import Active, Constraints
+from ..forms.schedule import StepData
+from ..forms.tangent import Tangent
+from ..scene.scene import Scene
+from .vectors import Vectors
+
+
+class _Stage(NamedTuple):
+    """Equations of one set of step data, from a state on.
+
+    Attributes:
+        setting: the `StepData`.
+        active: the active constraints.
+        place: values of the constrained owned unknowns at control 0, shape (n,).
+        rate: their derivative with respect to the control, shape (n,).
+        means: values of the constrained means.
+        left: unbalanced forces that fading removes, over 1 - control, locally owned entries of F; or None.
+    """
+
+    setting: StepData
+    active: Active
+    place: np.ndarray
+    rate: np.ndarray
+    means: list[float]
+    left: np.ndarray | None = None
+
+
+class Stages(Vectors):
+    """Equations of a problem for changing step data.
+
+    Attributes:
+        scene: the `Scene`.
+        x: vector of unknowns; inside `state_context` the unknowns of the state.
+        contacts: contacts of the scene.
+        present: the active contacts.
+        matrix: the tangent.
+    """
+
+    scene: Scene
+    x: PETSc.Vec
+    contacts: list[FaceContact]
+    present: list[FaceContact]
+    _constraints: Constraints
+    _stage: Any
+
+    def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
+        """Compute the residual F(x, control)."""
+        raise NotImplementedError
+
+    @cached_property
+    def _tangent(self) -> Tangent:
+        """Tangent of the scene with the constraints of the present stage."""
+        made, stage = Tangent(self.forms, self._constraints, self.symmetric), self._stage
+        made.enter(stage.active, stage.setting.rate, True)
+        return made
+
+    matrix: PETSc.Mat = cached_property(lambda self: self._tangent.matrix.mat)  # type: ignore[assignment]
+
+    @property
+    def symmetric(self) -> bool:
+        """True if the tangent is symmetric, that is if all loads, contacts and materials are."""
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
+
+    @property
+    def setting(self) -> StepData:
+        """Step data of the present stage."""
+        return self._stage.setting
+
+    @property
+    def control(self) -> float:
+        """Present control of the forms; inside `state_context` the control of the state."""
+        return float(self.forms.control.value)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Local numbers of the locally owned unknowns that are constrained in the present stage."""
+        return self._stage.active.dofs[self._stage.active.owned]
+
+    @property
+    def held_rate(self) -> np.ndarray:
+        """Derivative of the constrained unknowns with respect to the control, in the order of `held`."""
+        return self._stage.rate
+
+    @contextlib.contextmanager
+    def state_context(self, state: Any) -> Iterator[Self]:
+        """Set the problem to a state inside the context, and restore the previous values at its end.
+
+        Step data, history variables, unknowns (`x`, `forms.w`) and control are set.
+
+        Args:
+            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
+                and
+                memory.
+
+        Yields:
+            The problem.
+        """
+        fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
+        stage, memory, x, predicted = self._stage, self.memory, self.x.array_r.copy(), self._predicted
+        try:
+            self.restore(state)
+            self.x.array_w[:] = state.x
+            self.set_state(self.x, state.control)
+            yield self
+        finally:
+            self.memory, self._predicted = memory, predicted
+            self._take(stage)
+            self.forms.clock = clock
+            self.x.array_w[:] = x
+            self.forms.w.x.array[:] = fields
+            self.forms.control.value = control
+
+    def restore(self, state: Any) -> None:
+        """Restore the step data and history variables of an accepted state, to start a step from it.
+
+        Args:
+            state: the state, see `state_context`.
+        """
+        if self.has_history:
+            self.memory = state.memory
+        if state.setting:
+            self.enter(StepData(**state.setting), state.x, state.control)
+        if not self.setting.rate[-1]:
+            self.forms.clock = state.time
+
+    @property
+    def fading_forces(self) -> np.ndarray | None:
+        """Forces on the body that vanish as the control goes from 0 to 1 in a fading piece, shape (n,), or None."""
+        return None if self._stage.left is None else self._stage.left[: self._n]
+
+    def motion(self, control: float) -> np.ndarray:
+        """Return the values of the constrained unknowns for a control.
+
+        Args:
+            control: dimensionless control.
+
+        Returns:
+            Vector with these values and 0 elsewhere, locally owned entries of x.
+        """
+        values = np.zeros(self.x.getLocalSize())
+        values[self.held] = self._stage.place + self._stage.rate * control
+        return values
+
+    def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
+        """Set the fields and the control of the forms from a vector of unknowns.
+
+        Args:
+            x: unknowns.
+            control: dimensionless control.
+
+        Returns:
+            The multipliers, on all ranks.
+        """
+        self.forms.control.value = control
+        self.place(x.array_r)
+        multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
+        if self.comm.rank == last:
+            multipliers[:] = x.array_r[self._n:]
+        if last and len(multipliers):
+            self.comm.Bcast(multipliers, root=last)
+        return multipliers
+
+    def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
+        """Set the step data: the equations then have (x, control) on their path.
+
+        Constrained unknowns keep their values in x; driven ones have these values at this control. Fading removes the
+        unbalanced forces at (x, control).
+
+        Args:
+            setting: the step data.
+            x: unknowns, locally owned entries, shape (n,).
+            control: dimensionless control.
+        """
+        before = self._stage
+        if before is not None and setting == before.setting:
+            return
+        same = before is not None and before.setting.inactive == setting.inactive
+        active = before.active if same else self._constraints.active(set(setting.inactive))
+        rate = np.append(setting.rate, 0.0)[active.driver][active.owned]
+        place = x[active.dofs[active.owned]] - rate * control
+        stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
+        self._take(stage)
+        if setting.fading and control < 1:
+            at, left = self.x.duplicate(), self.x.duplicate()
+            at.array_w[:] = x
+            self.residual(at, control, left)
+            self._stage = stage._replace(left=left.array_r / (1 - control))
+            at.destroy()
+            left.destroy()
+
+    def _take(self, stage: _Stage) -> None:
+        """Set the forms, the contacts and the matrix to a stage."""
+        before, self._stage = self._stage, stage
+        if before is stage:
+            return
+        setting, number = stage.setting, {id(item): i for i, item in enumerate(self.scene.items)}
+        self.forms.set_loads(setting)
+        for contact in self.contacts:
+            i = number[id(contact.contact)]
+            contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
+        self.present = [contact for contact in self.contacts if contact.present]
+        if "_tangent" in vars(self):
+            self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)

@@ -1,0 +1,122 @@
+"""Vectors of a problem: assembly of forms, fields of the forms, inner product."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem, la
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from .. import _compat
+from ..forms.histories import Histories
+
+
+class Vectors(Histories):
+    """Vectors of unknowns of a problem, and its fields.
+
+    Attributes:
+        comm: MPI communicator.
+    """
+
+    comm: Any
+    _n: int
+    _buffer: la.Vector
+
+    @property
+    def n_owned(self) -> int:
+        """Number of fields' unknowns that this rank owns."""
+        return int(self._n)
+
+    @cached_property
+    def _metric(self) -> np.ndarray:
+        """Lumped mass of the displacement over the volume, locally owned entries, shape (n,)."""
+        return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
+
+    def look_at(self, x: np.ndarray, control: float) -> None:
+        """Set the fields of the forms to x, locally owned entries, and their control."""
+        self.forms.control.value = control
+        self.place(x)
+
+    def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
+        """Return the mean over the reference volume of the product of two displacement fields.
+
+        Args:
+            a: first vector of unknowns.
+            b: second vector of unknowns.
+
+        Returns:
+            Inner product (dimensionless).
+        """
+        return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
+
+    def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Compute the vector out with out . b = inner(a, b) for all b.
+
+        Args:
+            a: vector of unknowns.
+            out: vector that receives the product.
+        """
+        self.fill(out, self._metric * a.array_r[: self._n])
+
+    def place(self, x: np.ndarray) -> None:
+        """Set the fields of the forms, and update the coefficients that depend on them.
+
+        Args:
+            x: unknowns, locally owned entries, shape (n,).
+        """
+        w = self.forms.w.x
+        w.array[: self._n] = x[: self._n]
+        w.scatter_forward()
+        self.forms.refresh()
+
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        """Set a vector to a state near the reference configuration with a regular tangent, for the first direction of a
+        path.
+
+        Args:
+            out: vector that receives the state.
+        """
+        self.forms.set_stiff()
+        self.fill(out, self.forms.w.x.array[: self._n])
+
+    def assemble(self, form: Any) -> np.ndarray:
+        """Assemble a compiled linear form at the state last set.
+
+        Args:
+            form: compiled form of rank 1.
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
+        return _compat.assemble_vector(self._buffer, form).copy()
+
+    def assemble_scalar(self, form: Any) -> float:
+        """Assemble a compiled scalar form at the state last set, over all ranks.
+
+        Args:
+            form: compiled form of rank 0.
+
+        Returns:
+            Value of the form.
+        """
+        return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
+
+    def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
+        """Set a vector from locally owned field values and multipliers.
+
+        Args:
+            out: vector that receives the values.
+            values: values of the fields, shape (n,).
+            tail: values of the multipliers; default 0.
+        """
+        array = out.array_w
+        array[: self._n] = values
+        array[self._n:] = 0.0 if tail is None or self.comm.rank < self.comm.size - 1 else tail
+
+    def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
+        """Return the dot product of two vectors of locally owned entries over all ranks."""
+        own = float(np.dot(a, b))
+        return own if self.comm.size == 1 else float(self.comm.allreduce(own, MPI.SUM))

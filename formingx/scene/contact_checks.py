@@ -1,0 +1,85 @@
+"""Checks of the contacts of a scene."""
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..mesh.nodes import of_mesh
+from ..physics.contact import Contact
+from ..physics.supports import Constrained
+from ..ranks import gathered
+from . import tool_width
+
+_LARGER = 4.0
+"""Ratio of sizes above which a body that starts inside a tool probably has another unit of length."""
+
+
+def check_start(scene: Any, contact: Contact) -> None:
+    """Check that the body starts outside a tool, and that its contact face is the nearest one to the tool.
+
+    The friction must have a value at the temperatures of the face, and no controlled pressure may act on the face.
+
+    Args:
+        scene: the `Scene`.
+        contact: contact of the tool.
+
+    Raises:
+        InputError: one of these conditions is violated.
+    """
+    contact.friction_at(None if scene.temperature is None else scene.temperature.on(contact.on))
+    mesh, near = scene.mesh, 1e-6 * max(scene.extent)
+    if scene.kinematics.components != contact.tool.components:
+        raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in space those of"
+                         f" fx.tools.solid, box, revolved or extruded")
+    if contact.tool.components == 3:
+        scene.kinematics.scene_checks.check_contact(scene, contact)
+        return
+    if scene.kinematics.axisymmetric and contact.direction and contact.direction[0] \
+            and contact.tool.bounds[0, 0] <= near:
+        raise InputError(f"{contact!r}: it moves along R, but its tool covers the axis: no rigid tool of revolution"
+                         f" does that; must be direction=(0, ...), or PlaneStrain()")
+    face = mesh.nodes_of(contact.on)
+    comm = mesh.comm
+    points = gathered(comm, of_mesh(mesh.domain))
+    depth = contact.tool.signed_distance(points)
+    worst = int(np.argmax(depth))
+    if depth[worst] > near:
+        free = contact.tool.reversed().signed_distance(points).max() <= near
+        size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(scene.extent)
+        why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
+        if not length < _LARGER * size:
+            why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
+                   f" and cm)?")
+        raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
+                         f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g}){why}")
+    if depth[worst] > contact.tool.signed_distance(face).max() + near:
+        raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
+                         f" boundaries are {list(mesh.boundaries)}")
+    if any(load is scene.driven and load.on == contact.on for load in scene.loads):
+        raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
+                         f" no tool faces the pressure")
+    tool_width.check(mesh, contact, scene.kinematics.axisymmetric)
+
+
+def check_travel(scene: Any, contact: Contact, travel: float) -> None:
+    """Check that a tool does not pass through a constrained boundary.
+
+    Args:
+        scene: the `Scene`.
+        contact: contact of the tool.
+        travel: its travel, length.
+
+    Raises:
+        InputError: a constrained boundary would lie inside the tool as a whole.
+    """
+    moves = contact.way
+    for support in scene.supports:
+        for constraint in scene.kinematics.in_axes(support, support.constraints()):
+            if not isinstance(constraint, Constrained) or constraint.on is None or moves[constraint.component] == 0:
+                continue
+            depth = contact.tool.signed_distance(scene.mesh.nodes_of(constraint.on) - travel * moves)
+            if depth.min() >= 0:
+                raise InputError(f"travel = {travel:g}: {contact!r} would go through the whole height of the"
+                                 f" body to {constraint.on!r}, which is held: the travel must be less than"
+                                 f" {travel - depth.max() / np.linalg.norm(moves):.6g}")

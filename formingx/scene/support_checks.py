@@ -1,0 +1,126 @@
+"""Checks of the supports of a scene."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ..errors import InputError
+from ..physics.supports import Constrained
+
+
+def check_driven(supports: Sequence[Any]) -> None:
+    """Check that no support drives a component that another one constrains.
+
+    Args:
+        supports: the active supports.
+
+    Raises:
+        InputError: two supports act on the same component of the same boundary.
+    """
+    constraint = [(support, h) for support in supports for h in support.constraints()]
+    for mine, driven in constraint:
+        for other, h in constraint if driven.driven else ():
+            if other is not mine and (h.on, h.component) == (driven.on, driven.component):
+                raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
+
+
+def check_axis(scene: Any, supports: Sequence[Any]) -> None:
+    """Check that the mesh does not cross the axis, and that u_r = 0 on the axis.
+
+    Args:
+        scene: the `Scene`.
+        supports: the active supports.
+
+    Raises:
+        InputError: the mesh crosses the axis, or the axis is unconstrained.
+    """
+    if not scene.kinematics.axisymmetric:
+        return
+    geometry = scene.mesh.domain.geometry
+    comm = scene.mesh.comm
+    low = comm.allreduce(geometry.x[:, 0].min(initial=np.inf), MPI.MIN)
+    size = comm.allreduce(np.abs(geometry.x).max(initial=0.0), MPI.MAX)
+    if low < -1e-12 * size:
+        raise InputError(f"Scene: the mesh crosses the axis: its smallest R is {low:.6g}, must be at least 0")
+    if low > 1e-12 * size:
+        return
+    for support in supports:
+        for constraint in support.constraints():
+            if isinstance(constraint, Constrained) and constraint.component == 0 and constraint.on is not None \
+                    and np.all(scene.mesh.nodes_of(constraint.on)[:, 0] <= 1e-12 * size):
+                return
+    raise InputError(f"Scene: the mesh touches the axis R = 0, but no support holds u_r there: add"
+                     f" Symmetry of one of {list(scene.mesh.boundaries)}")
+
+
+def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
+    """Check that the supports prevent every rigid motion of the kinematics.
+
+    Args:
+        scene: the `Scene`.
+        supports: the active supports.
+
+    Raises:
+        InputError: the body can move as a rigid body.
+    """
+    names, modes = zip(*scene.kinematics.rigid_motions().items())
+    gram = np.zeros((len(modes), len(modes)))
+    size = max(scene.extent)
+    for support in supports:
+        for constraint in scene.kinematics.in_axes(support, support.all_constraints()):
+            at_node = constraint.point is not None
+            X = (np.array([constraint.point]) if at_node else scene.mesh.nodes_of(constraint.on)) / size
+            rows = np.stack([mode(X)[:, constraint.component] for mode in modes], 1)
+            if not isinstance(constraint, Constrained):
+                rows = rows.mean(0, keepdims=True)
+            gram += rows.T @ rows / len(rows)
+    values, vectors = np.linalg.eigh(gram)
+    if values[0] < 1e-12:
+        free = names[int(np.argmax(np.abs(vectors[:, 0])))]
+        raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
+                         f" supports are {supports!r}; hold that motion, with Clamped or SimplySupported"
+                         f" for one")
+
+
+def check_hinges(scene: Any) -> None:
+    """Check that a hinge or a pressure does not overload a layer much softer than another one at the same rim.
+
+    With weight="area" a hinge pulls all layers with one traction, so stiffnesses may differ at most 100 times. A hinged
+    rim face is free, so a pressure would squeeze a layer out that is 50 times softer.
+
+    Args:
+        scene: the `Scene`.
+
+    Raises:
+        InputError: a layer at a hinge is too soft.
+    """
+    moduli = {name: scene.shear_modulus(name) for name in scene.materials}
+    for constraint in (constraint for support in scene.supports for constraint in support.constraints()):
+        if isinstance(constraint, Constrained):
+            continue
+        at_rim = _layers_at(scene, constraint.on)
+        hard = max(at_rim, key=moduli.__getitem__)
+        soft = min(at_rim, key=moduli.__getitem__)
+        if not constraint.by_stiffness and moduli[hard] > 100 * moduli[soft]:
+            raise InputError(f"Scene: SimplySupported({constraint.on!r}) pulls all layers with the same traction, but"
+                             f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                             f" SimplySupported({constraint.on!r}, weight='stiffness')")
+        pressed = {name for load in scene.loads if load.on is not None
+                   for name in _layers_at(scene, load.on)} & at_rim
+        for name in pressed:
+            if moduli[hard] > 50 * moduli[name]:
+                raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
+                                 f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
+                                 f" hinge SimplySupported({constraint.on!r}): use Clamped({constraint.on!r})")
+
+
+def _layers_at(scene: Any, boundary: str) -> set[str]:
+    """Return the names of the layers with cells on a boundary, all ranks."""
+    topology, cells = scene.mesh.domain.topology, scene.mesh.cells
+    topology.create_connectivity(1, 2)
+    touching = {topology.connectivity(1, 2).links(f)[0] for f in scene.mesh.facets_of(boundary)}
+    mine = set(cells.values[np.isin(cells.indices, sorted(touching))].tolist())
+    tags = set().union(*scene.mesh.comm.allgather(mine))
+    return {name for name, tag in scene.mesh.layers.items() if tag in tags}
