@@ -1,4 +1,4 @@
-"""The page validation.md is what its script writes from stored numbers, and those are what the code gives today."""
+"""Pages with templates are what their script writes from stored numbers; those are what the code gives today."""
 
 import json
 import sys
@@ -8,7 +8,8 @@ from conftest import ROOT, run
 
 sys.path[:0] = [str(ROOT / "demos"), str(ROOT / "benchmarks"), str(ROOT / "docs")]
 import compression_roll_over  # noqa: E402
-import make_validation  # noqa: E402
+import kbkz_branches  # noqa: E402
+import make_pages  # noqa: E402
 import thick_cylinder  # noqa: E402
 import treloar_mesh  # noqa: E402
 from all_demos import differs  # noqa: E402
@@ -16,17 +17,19 @@ from validation_rows import Row  # noqa: E402
 
 import formingx as fx  # noqa: E402
 
-TEMPLATE, STORED = make_validation.TEMPLATE.read_text(), json.loads(make_validation.STORED.read_text())
+STORED = json.loads(make_pages.STORED.read_text())
 
 
-def test_page_is_what_the_script_writes():
-    assert make_validation.PAGE.read_text() == make_validation.page(TEMPLATE, STORED), \
-        "run docs/make_validation.py: the page, its template, its rows or the stored numbers have changed"
+@pytest.mark.parametrize("name", make_pages.TEMPLATES)
+def test_page_is_what_the_script_writes(name):
+    template = make_pages.TEMPLATES[name].read_text()
+    assert (make_pages.DOCS / f"{name}.md").read_text() == make_pages.page(name, template, STORED), \
+        "run docs/make_pages.py: the page, its template, its rows or the stored numbers have changed"
 
 
-def test_stored_numbers_are_those_of_the_page():
+def test_stored_numbers_are_those_of_the_pages():
     """None is missing, none is left over."""
-    assert sorted(STORED) == sorted(set(make_validation.paths(TEMPLATE)))
+    assert sorted(STORED) == sorted(make_pages.wanted())
 
 
 def test_scripts_of_all_numbers_are_there():
@@ -41,30 +44,30 @@ def test_a_page_from_summaries(tmp_path, monkeypatch):
             Row("ratio", "run/a/p OVER run/a/q", "run/a/q", "exact"),
             Row("near", "run/a/q", lambda: 2.0 * (1 - 1e-5), "x"),
             Row("alone", "run/a/q", None, "a figure", note="undecided")]
-    monkeypatch.setattr(make_validation, "TABLES", {"all": rows})
+    monkeypatch.setattr(make_pages, "TABLES", {"all": rows})
     template = "{{run/a/p .2f}} {{run/a/p OVER run/a/q +.1%}} {{run/none d}}\n\n{{TABLE all}}\n"
     (tmp_path / "run").mkdir()
     summary = {"a": {"p": 2.2, "q": 2.0}, "list": [1, -1e-3], "none": None}
     (tmp_path / "run" / "summary.json").write_text(json.dumps(summary))
-    wanted = set(make_validation.paths(template))
-    numbers = make_validation.collect(tmp_path, wanted, {})
-    text = make_validation.page(template, numbers).splitlines()
+    wanted = set(make_pages.paths(template))
+    numbers = make_pages.collect(tmp_path, wanted, {})
+    text = make_pages.page("validation", template, numbers).splitlines()
     assert text[1] == "2.20 +10.0 % none"
     assert [line.split(" | ")[1:4] for line in text[5:]] == [
         ["2.200 MPa", "2.000 MPa", "+10.0 %"], ["-1.0e-03", "0", "-1.0e-03"], ["1.1", "2", "-45.0 %"],
         ["2", "2", "+1.0e-05"], ["2", "", "undecided"]]
-    assert make_validation.collect(tmp_path / "no", wanted, numbers) == numbers
+    assert make_pages.collect(tmp_path / "no", wanted, numbers) == numbers
     with pytest.raises(KeyError, match="no number for run/a/p"):
-        make_validation.collect(tmp_path / "no", wanted, {})
+        make_pages.collect(tmp_path / "no", wanted, {})
 
 
 def test_paragraphs_are_filled():
     """Items keep their marks, tables and headings their lines."""
     text = "# A heading\n\nOne two\nthree.\n\n* An item\n  of two lines\n* more\n\n| a |\n|---|\n| " + "b " * 99 + "|"
-    lines = make_validation.wrapped(text + "\n\n" + "word " * 60).splitlines()
+    lines = make_pages.wrapped(text + "\n\n" + "word " * 60).splitlines()
     assert lines[:6] == ["# A heading", "", "One two three.", "", "* An item of two lines", "* more"]
     assert lines[7:9] == ["| a |", "|---|"] and len(lines[9]) > 200
-    assert all(len(line) <= make_validation.WIDTH for line in lines[10:]) and len(lines) == 14
+    assert all(len(line) <= make_pages.WIDTH for line in lines[10:]) and len(lines) == 14
 
 
 @pytest.mark.parametrize("elements", [(20, 1), pytest.param((40, 2), marks=pytest.mark.slow)])
@@ -94,6 +97,20 @@ def test_thick_cylinder_and_sphere():
         stored("sphere", "inner_displacement_cm_at_limit"), rel=1e-4)
 
 
+def test_branches_against_kbkz():
+    """Branches with the same spectrum, work along another path, few past states; the fits are slow."""
+    def stored(path):
+        return {key: value for key, value in STORED.items() if key.startswith(f"kbkz_branches/{path}/")}
+    same = kbkz_branches.misfits(fx.Viscoelastic(None, kbkz_branches.SPECTRUM), kbkz_branches.MELT)
+    found = {f"kbkz_branches/same spectrum/{mode}/{rate}/{stretch}": value for mode, rates in same.items()
+             for rate, row in rates.items() for stretch, value in row.items()}
+    assert found == pytest.approx(stored("same spectrum"), rel=1e-6) and len(found) == 24
+    work = [kbkz_branches.no_potential(kbkz_branches.DAMPING)[k] for k in (1, 0)]
+    assert work == pytest.approx([*stored("no potential: PSM(alpha=10.0, beta=0.05)").values()], rel=1e-6)
+    kept = [kbkz_branches.kept(mode, rate, 8) for mode in ("equibiaxial", "uniaxial") for rate in (0.1, 1.0, 10.0)]
+    assert kept == pytest.approx([*stored("kept 8").values()], rel=1e-6)
+
+
 def check_roll_over(elements):
     name = f"compression_roll_over/grids/{elements[0]}x{elements[1]}/force_N_at_ratio"
     _, met, end = compression_roll_over.compress(elements)
@@ -114,12 +131,13 @@ def test_roll_over_on_finer_grids(elements):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("demo", ["clamp_ring", "compression_homogeneous", "measured_ellipse", "other_programs",
-                                  "plug_stress", "thick_plate", "treloar", "two_layer"])
-def test_stored_numbers_are_those_of_today(demo, tmp_path):
-    run(f"demos/{demo}.py", "--out", tmp_path)
+@pytest.mark.parametrize("name", ["clamp_ring", "compression_homogeneous", "kbkz", "kbkz_branches", "measured_ellipse",
+                                  "other_programs", "plug_stress", "thick_plate", "treloar", "two_layer"])
+def test_stored_numbers_are_those_of_today(name, tmp_path):
+    folder = "demos" if (ROOT / "demos" / f"{name}.py").is_file() else "benchmarks"
+    run(f"{folder}/{name}.py", "--out", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
-    stored = {path: value for path, value in STORED.items() if path.startswith(f"{demo}/")}
-    today = {path: make_validation.found(summary, path.partition("/")[2]) for path in stored}
+    stored = {path: value for path, value in STORED.items() if path.startswith(f"{name}/")}
+    today = {path: make_pages.found(summary, path.partition("/")[2]) for path in stored}
     assert today and not {path: (stored[path], now) for path, now in today.items()
                           if differs(path, stored[path], now, 1e-3)}

@@ -1,10 +1,11 @@
-"""Write the page validation.md from the numbers of the demos' and benchmarks' summaries.
+"""Write the pages of data/*.template with the numbers of the demos' and benchmarks' summaries.
 
-    ./fx python3 docs/make_validation.py [--collect FOLDER] [--check]
+    ./fx python3 docs/make_pages.py [--collect FOLDER] [--check]
 
-The text stands in `data/validation.template`, the comparisons in `validation_rows.py`; the numbers come from
-`data/summaries.json`. `--collect results` renews those numbers from the files FOLDER/NAME/summary.json that are there.
-`--check` writes nothing; the exit status is 1 if the page is not what it would write.
+The text of NAME.md stands in `data/NAME.template`, the comparisons of `validation.md` in `validation_rows.py`; the
+numbers come from `data/summaries.json`. `--collect results` renews those numbers from the files
+FOLDER/NAME/summary.json that are there. `--check` writes nothing; the exit status is 1 if a page is not what it would
+write.
 
 In the template `{{NAME/KEY/KEY FORMAT}}` is a number of results/NAME/summary.json in Python's format, and
 `{{A OVER B FORMAT}}` a quotient of two, less 1 if the format is a percentage (`+.1%`). `{{TABLE NAME}}` is a table of
@@ -26,20 +27,27 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 from validation_rows import TABLES, Row  # noqa: E402
 
-TEMPLATE, STORED, PAGE = DOCS / "data" / "validation.template", DOCS / "data" / "summaries.json", DOCS / "validation.md"
+STORED = DOCS / "data" / "summaries.json"
+TEMPLATES = {file.stem: file for file in sorted((DOCS / "data").glob("*.template"))}
 PLACE, OVER = re.compile(r"\{\{(.+?)\}\}"), " OVER "
-HEAD = "<!-- Written by docs/make_validation.py from data/validation.template: do not change this page. -->\n"
-WIDTH, DIGITS = 140, 12                                      # columns of the page, digits of a stored number
+HEAD = "<!-- Written by docs/make_pages.py from data/{}.template: do not change this page. -->\n"
+WIDTH, DIGITS = 140, 12                                      # columns of a filled page, digits of a stored number
+FILLED = {"validation"}                                      # pages whose paragraphs are filled anew
 
 
 def paths(template: str) -> Iterator[str]:
-    """Yield NAME/KEY/... of every number that the page needs."""
+    """Yield NAME/KEY/... of every number that a page needs."""
     for place in PLACE.findall(template):
         if not place.startswith("TABLE "):
             yield from place.rsplit(" ", 1)[0].split(OVER)
-    for table in TABLES.values():
-        for row in table:
+            continue
+        for row in TABLES[place.removeprefix("TABLE ")]:
             yield from (path for key in (row.ours, row.reference) if isinstance(key, str) for path in key.split(OVER))
+
+
+def wanted() -> set[str]:
+    """Return NAME/KEY/... of every number of all pages."""
+    return {path for template in TEMPLATES.values() for path in paths(template.read_text())}
 
 
 def found(summary: Any, path: str) -> Any:
@@ -49,19 +57,19 @@ def found(summary: Any, path: str) -> Any:
     return summary
 
 
-def collect(folder: Path, wanted: set[str], stored: dict[str, Any]) -> dict[str, Any]:
-    """Return {path: number} of all wanted paths: those of the folder's summaries, else the stored ones.
+def collect(folder: Path, needed: set[str], stored: dict[str, Any]) -> dict[str, Any]:
+    """Return {path: number} of all needed paths: those of the folder's summaries, else the stored ones.
 
     Raises:
         KeyError: paths that neither has.
     """
     summaries: dict[str, Any] = {}
-    for name in {path.split("/")[0] for path in wanted}:
+    for name in {path.split("/")[0] for path in needed}:
         file = folder / name / "summary.json"
         if file.is_file():
             summaries[name] = json.loads(file.read_text())
     result, missing = {}, []
-    for path in sorted(wanted):
+    for path in sorted(needed):
         name, _, rest = path.partition("/")
         try:
             value = found(summaries[name], rest) if name in summaries else stored[path]
@@ -84,7 +92,8 @@ def cell(text: str, style: str, numbers: dict[str, Any]) -> str:
     """Return `number(text)` in a format; a quotient as a percentage is less 1."""
     value = number(text, numbers)
     if style.endswith("%"):
-        return f"{100 * (value - (OVER in text)):{style.removesuffix('%')}f} %"
+        digits = style.removesuffix("%")
+        return f"{100 * (value - (OVER in text)):{digits if digits.endswith('g') else digits + 'f'}} %"
     return "none" if value is None else format(value, style)
 
 
@@ -122,31 +131,32 @@ def wrapped(text: str) -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def page(template: str, numbers: dict[str, Any]) -> str:
-    """Return the whole page."""
+def page(name: str, template: str, numbers: dict[str, Any]) -> str:
+    """Return the whole page of a template."""
     def put(match: re.Match[str]) -> str:
         place = match[1]
         if place.startswith("TABLE "):
             return table(TABLES[place.removeprefix("TABLE ")], numbers)
         return cell(*place.rsplit(" ", 1), numbers)
-    return HEAD + wrapped(PLACE.sub(put, template))
+    text = PLACE.sub(put, template)
+    return HEAD.format(name) + (wrapped(text) if name in FILLED else text)
 
 
 def main() -> int:
     """Run the command; return its exit status."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--collect", type=Path, metavar="FOLDER", help="renew the stored numbers from it")
-    options.add_argument("--check", action="store_true", help="write nothing; status 1 if the page is not up to date")
+    options.add_argument("--check", action="store_true", help="write nothing; status 1 if a page is not up to date")
     args = options.parse_args()
-    template = TEMPLATE.read_text()
     numbers = json.loads(STORED.read_text()) if STORED.is_file() else {}
     if args.collect:
-        numbers = collect(args.collect, set(paths(template)), numbers)
+        numbers = collect(args.collect, wanted(), numbers)
         STORED.write_text(json.dumps(numbers, indent=1) + "\n")
-    text = page(template, numbers)
+    pages = {DOCS / f"{name}.md": page(name, file.read_text(), numbers) for name, file in TEMPLATES.items()}
     if args.check:
-        return int(not PAGE.is_file() or PAGE.read_text() != text)
-    PAGE.write_text(text)
+        return int(any(not file.is_file() or file.read_text() != text for file, text in pages.items()))
+    for file, text in pages.items():
+        file.write_text(text)
     return 0
 
 
