@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import fcntl
 import functools
+import hashlib
 import os
 import re
 import shlex
@@ -28,6 +29,7 @@ import ffcx
 import ffcx.compiler
 import numpy as np
 import ufl
+from dolfinx import jit
 from ffcx.codegeneration import get_include_path
 from ffcx.codegeneration import jit as ffcx_jit
 from ffcx.naming import compute_signature, expression_name, form_name
@@ -136,13 +138,36 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
         other.unlink(missing_ok=True)
 
 
+def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
+    """Return the file of a library of functions in C, compiled if the cache has none.
+
+    Raises:
+        RuntimeError: there is no compiler, or it failed.
+    """
+    command = [*(_compiler() or ("cc",)), *flags, "-shared", "-fPIC", "-x", "c", "-", "-lm"]
+    digest = hashlib.sha1(f"{code}{command}{_program() if _compiler() else ''}".encode()).hexdigest()
+    file = Path(jit.get_options()["cache_dir"]) / "formingx" / f"{name}_{digest}.so"
+    if not file.exists():
+        file = _writable(file.parent) / file.name
+        made = file.with_name(f"unfinished_{os.urandom(8).hex()}.so")
+        try:
+            compile_c([*command, "-o", str(made)], code)
+            os.replace(made, file)
+        finally:
+            made.unlink(missing_ok=True)
+    return file
+
+
 def compile_c(command: list[str], code: str) -> None:
     """Run the compiler on C code.
 
     Raises:
-        RuntimeError: it failed.
+        RuntimeError: it failed, or is not there.
     """
-    done = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise RuntimeError(f"the C compiler cannot be run: {error}") from None
     if done.returncode:
         raise RuntimeError(f"the C compiler failed, with status {done.returncode}: {shlex.join(command)}\n"
                            f"{done.stderr[-2000:]}")

@@ -303,9 +303,14 @@ class TestNearest:
 
 def test_no_compiler(tmp_path, monkeypatch):
     """A compiler that fails says so; nothing is left behind for the next run."""
+    from formingx import _jit
     from formingx.tools import nearest
-    monkeypatch.setattr(nearest.sysconfig, "get_config_var", lambda name: "false")
+    monkeypatch.setattr(_jit, "_compiler", lambda: ("false",))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.raises(RuntimeError, match="false cannot compile"):
+    with pytest.raises(RuntimeError, match="the C compiler failed, with status 1: false"):
         nearest._compiled.__wrapped__()
-    assert not list((tmp_path / "fenics").glob("*"))
+    monkeypatch.setattr(_jit, "_compiler", lambda: None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(RuntimeError, match="the C compiler cannot be run"):
+        nearest._compiled.__wrapped__()
+    assert not list((tmp_path / "fenics").rglob("*.so"))

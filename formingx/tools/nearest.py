@@ -7,15 +7,12 @@ more than the arithmetic.
 from __future__ import annotations
 
 import functools
-import hashlib
-import os
-import subprocess
-import sysconfig
-import tempfile
-from pathlib import Path
 from typing import Any
 
+import cffi
 import numpy as np
+
+from .._jit import library
 
 _HEADER = "void nearest(long, const double *, long, long, const double *, double *, double *, double *);"
 
@@ -64,8 +61,6 @@ void nearest(long points, const double *x, long pieces, long lines, const double
 }
 """
 
-_FLAGS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
-
 
 def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the signed distance of points, its gradient and its curvature, shapes (n,), (n, 2) and (n,).
@@ -90,24 +85,9 @@ def _compiled() -> tuple[Any, Any, Any]:
     """Return cffi's interface, its type of an array, and the function in C, compiled if no run before has done it.
 
     Raises:
-        RuntimeError: the C compiler fails, with its message. Forms could not be compiled either.
+        RuntimeError: the C compiler failed. It could not compile forms, either.
     """
-    from cffi import FFI
-    from dolfinx import jit
-    ffi = FFI()
+    ffi = cffi.FFI()
     ffi.cdef(_HEADER)
-    compiler = (sysconfig.get_config_var("CC") or "cc").split()
-    key = hashlib.sha1("\n".join([_SOURCE, *compiler, *_FLAGS, sysconfig.get_platform()]).encode()).hexdigest()
-    file = Path(jit.get_options()["cache_dir"]) / f"formingx_nearest_{key}.so"
-    if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=file.parent) as folder:        # then renamed: never half-written
-            source, made = Path(folder) / "nearest.c", Path(folder) / "nearest.so"
-            source.write_text(_SOURCE)
-            done = subprocess.run([*compiler, *_FLAGS, str(source), "-o", str(made), "-lm"], capture_output=True,
-                                  text=True)
-            if done.returncode:
-                raise RuntimeError(f"{' '.join(compiler)} cannot compile formingx/tools/nearest.py: {done.stderr}")
-            os.replace(made, file)
-    library: Any = ffi.dlopen(str(file))
-    return ffi, ffi.typeof("double[]"), library.nearest
+    functions: Any = ffi.dlopen(str(library("nearest", _SOURCE, ("-O2", "-ffp-contract=off"))))
+    return ffi, ffi.typeof("double[]"), functions.nearest
