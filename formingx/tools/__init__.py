@@ -1,4 +1,4 @@
-"""Rigid tools as profiles of lines and arcs: shapes, and what other programs have drawn; tools in three dimensions."""
+"""Rigid tools: profiles of lines and arcs, ready-made shapes, files of other programs, tools in three dimensions."""
 
 from .files import read
 from .profile import Tool

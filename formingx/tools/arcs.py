@@ -1,4 +1,4 @@
-"""A smooth curve as circular arcs that touch it at their ends, with its tangents there (biarcs), to a tolerance."""
+"""Approximation of a smooth curve by circular arcs that have its points and tangents at their ends (biarcs)."""
 
 import math
 from collections.abc import Callable
@@ -8,26 +8,27 @@ import numpy as np
 from ..errors import InputError
 from .profile import Arc, Line
 
-_DEEPEST = 14              # halvings of a curve
-_MOST = 2000               # arcs for one curve
-_FINEST = 1e-7             # of a curve's size: the finest tolerance
+_MAX_HALVINGS = 14     # largest number of halvings of a curve
+_MAX_ARCS = 2000       # largest number of arcs for one curve
+_MIN_TOLERANCE = 1e-7  # smallest tolerance over the size of a curve
 
 
 def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
                name: str) -> list[Line | Arc]:
-    """Arcs (and lines) within `tolerance` (length) of a curve.
+    """Return arcs and lines that approximate a curve.
 
     Args:
-        curve: gives points and derivatives, both of shape (n, 2), at parameters from 0 to 1, shape (n,).
-        name: begins the message.
+        curve: function of parameters from 0 to 1, shape (n,), that returns points and derivatives, shape (n, 2) each.
+        tolerance: largest distance from the curve, length.
+        name: beginning of the error message.
 
     Raises:
-        InputError: the curve is not smooth enough for it, or the tolerance is too fine.
+        InputError: the curve is not smooth enough, or the tolerance is too small.
     """
     size = float(np.ptp(curve(np.linspace(0, 1, 17))[0], axis=0).max())
-    if tolerance < _FINEST * size:
-        raise InputError(f"{name}: tolerance = {tolerance:g}: must be at least {_FINEST:g} of the curve's size,"
-                         f" {_FINEST * size:.3g}")
+    if tolerance < _MIN_TOLERANCE * size:
+        raise InputError(f"{name}: tolerance = {tolerance:g}: must be at least {_MIN_TOLERANCE:g} of the curve's size,"
+                         f" {_MIN_TOLERANCE * size:.3g}")
     made = 0
 
     def between(low: float, high: float, depth: int) -> list[Line | Arc]:
@@ -37,43 +38,59 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
         if not np.all(np.isfinite(points)) or not lengths[[0, -1]].min() > 0:
             raise InputError(f"{name}: it has a corner or no direction near ({points[0, 0]:.6g}, {points[0, 1]:.6g})")
         found = _biarc(points[0], along[0] / lengths[0], points[-1], along[-1] / lengths[-1])
-        if found and np.min([_away(points, piece) for piece in found], axis=0).max() <= tolerance:
+        if found and np.min([_distance_to(points, piece) for piece in found], axis=0).max() <= tolerance:
             made += len(found)
             return found
-        if depth == _DEEPEST or made > _MOST:
-            raise InputError(f"{name}: {_MOST} arcs, or one 2^{_DEEPEST} times shorter, are not within tolerance ="
-                             f" {tolerance:g} of it")
+        if depth == _MAX_HALVINGS or made > _MAX_ARCS:
+            raise InputError(f"{name}: {_MAX_ARCS} arcs, or one 2^{_MAX_HALVINGS} times shorter, are not within"
+                             f" tolerance = {tolerance:g} of it")
         middle = (low + high) / 2
         return between(low, middle, depth + 1) + between(middle, high, depth + 1)
     return between(0.0, 1.0, 0)
 
 
 def in_plane(points: np.ndarray, name: str) -> np.ndarray:
-    """(x, y) of points, shape (n, 3), as shape (n, 2); an InputError unless z is 0, to round-off."""
+    """Return the coordinates (x, y) of points in the plane z = 0, shape (n, 2).
+
+    Args:
+        points: shape (n, 3), length.
+        name: beginning of the error message.
+
+    Raises:
+        InputError: a point lies outside the plane.
+    """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
-    off = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
-    if np.any(off):
-        x, y, z = points[np.argmax(off)]
+    outside = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
+    if np.any(outside):
+        x, y, z = points[np.argmax(outside)]
         raise InputError(f"{name} has the point ({x:.6g}, {y:.6g}, {z:.6g}): z must be 0: a profile is drawn in the"
                          f" x-y plane, x for R and y for Z")
     return points[:, :2]
 
 
 def piece_through(points: np.ndarray, name: str) -> Line | Arc:
-    """Return the line or the arc on which all points lie, in their order, shape (n, 2)."""
+    """Return the line or the arc through given points.
+
+    Args:
+        points: in their order on the piece, shape (n, 2), length.
+        name: beginning of the error message.
+
+    Raises:
+        InputError: the points lie on no line or circle, or not in their order. Fewer than four do not define an arc.
+    """
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")
-    n, near = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
+    n, tolerance = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
     a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
     chord = b - a
-    off = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), near)
-    if n > 1 and math.hypot(*chord) > near and np.abs(off).max() <= near:
+    distance = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), tolerance)
+    if n > 1 and math.hypot(*chord) > tolerance and np.abs(distance).max() <= tolerance:
         return Line(a, b)
     if n > 3:                                              # three points always lie on a circle
         p, q, r = points[[0, n // 3, 2 * n // 3]]
         centre = p + np.linalg.lstsq(2 * np.array([q - p, r - p]), [(q - p) @ (q - p), (r - p) @ (r - p)])[0]
         radius = math.dist(p, centre)
-        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= near:
+        if np.abs(np.hypot(*(points - centre).T) - radius).max() <= tolerance:
             angles = np.unwrap([math.atan2(*(x - centre)[::-1]) for x in points])
             if np.all(np.diff(angles) * (angles[-1] - angles[0]) > 0):
                 return Arc(centre, radius, float(angles[0]), float(angles[-1] - angles[0]))
@@ -83,9 +100,9 @@ def piece_through(points: np.ndarray, name: str) -> Line | Arc:
 
 
 def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[Line | Arc]:
-    """Two arcs from p with the unit tangent t to q with s, with one tangent where they meet; [] if there are none.
+    """Return two tangent arcs from p with the unit tangent t to q with the unit tangent s; [] if there are none.
 
-    The joint is midway between p + d t and q - d s, the control points at one distance d from the ends.
+    The joint is the midpoint of the control points p + d t and q - d s.
     """
     v, both = q - p, t + s
     a, b, c = 2 * (1 - t @ s), 2 * (v @ both), v @ v
@@ -101,7 +118,7 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 
 
 def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
-    """Return the arc from p with the unit tangent t to q; a line if it is one; None if it is neither."""
+    """Return the arc or the line from p with the unit tangent t to q, or None."""
     w = q - p
     across, ahead, length = t[0] * w[1] - t[1] * w[0], float(t @ w), math.hypot(*w)
     if not length > 0:
@@ -113,8 +130,8 @@ def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
     return Arc(centre, abs(radius), math.atan2(*(p - centre)[::-1]), 2 * math.atan2(across, ahead))
 
 
-def _away(points: np.ndarray, piece: Line | Arc) -> np.ndarray:
-    """Distance of points, shape (n, 2), from the line or circle of a piece, shape (n,)."""
+def _distance_to(points: np.ndarray, piece: Line | Arc) -> np.ndarray:
+    """Return the distances of points, shape (n, 2), from the line or circle of a piece, shape (n,)."""
     if isinstance(piece, Arc):
         return np.abs(np.hypot(*(points - piece.centre).T) - piece.radius)
     way = (piece.b - piece.a) / math.dist(piece.a, piece.b)

@@ -1,4 +1,4 @@
-"""The curves of a STEP or BREP file, as a process of its own reads them (`cad_process`)."""
+"""Curves of a STEP or BREP file, read by a separate process (`cad_process`)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,21 @@ from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
 from .profile import Arc, Line
 
-_SECONDS = 10                   # of a processor's time to read a file and to follow its curves
-_BYTES = 50_000                 # as much again for so much of it
-_BUSY = 20                      # times as long by the clock: the machine may be busy
+_SECONDS = 10               # computing time allowed for a file, s
+_BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
+_CLOCK_FACTOR = 20          # allowed elapsed over computing time: the machine may be busy
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return {number: function that returns the pieces of a curve, or raises its error}; `kind`: "step" or "brep".
+    """Return the curves of a STEP or BREP file.
+
+    Args:
+        file: name of the file.
+        kind: "step" or "brep".
+        tolerance: tolerance of arcs along splines and ellipses, length.
+
+    Returns:
+        {number: function that returns the pieces of the curve, or raises its error}.
 
     Raises:
         InputError: the file cannot be read.
@@ -35,24 +43,25 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
     if kind == "step":
         _check_references(file)
     with _Reader(file, kind) as reader:
-        return {tag: _of_curve(partial(reader.at, tag), bounds, tolerance, f"tool file {file!r}: curve {tag}")
+        return {tag: _of_curve(partial(reader.evaluate, tag), bounds, tolerance, f"tool file {file!r}: curve {tag}")
                 for tag, bounds in reader.bounds.items()}
 
 
 class _Reader:
-    """The process that reads a file."""
+    """Process that reads one file."""
 
     def __init__(self, file: str, kind: str):
-        self._file, self._seconds = file, _SECONDS + os.path.getsize(file) // _BYTES
+        self._file, self._seconds = file, _SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
         # not a rank of a run under mpirun
         apart = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
         self._process = subprocess.Popen(
             [sys.executable, "-P", cad_process.__file__, file, kind, str(self._seconds)], env=apart, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        self._timer = Timer(_BUSY * self._seconds, self._process.kill)
+        self._timer = Timer(_CLOCK_FACTOR * self._seconds, self._process.kill)
         self._timer.start()
 
     def __enter__(self) -> _Reader:
+        """Return the reader after it has read the file."""
         try:
             self.bounds = {int(tag): ends for tag, ends in self._answer()["curves"].items()}
         except BaseException:
@@ -61,16 +70,22 @@ class _Reader:
         return self
 
     def __exit__(self, *_: Any) -> None:
+        """End the process."""
         self._timer.cancel()
         self._process.kill()
         self._process.communicate()
 
-    def at(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points of a curve and its derivatives, shape (n, 3) each, at parameters, shape (n,)."""
+    def evaluate(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return points of a curve and its derivatives at parameters, shape (n,); shape (n, 3) each."""
         points, along = self._answer([tag, parameters.tolist()])
         return np.array(points).reshape(-1, 3), np.array(along).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
+        """Return the answer of the process to a question.
+
+        Raises:
+            InputError: the process reports an error, crashes, or takes too long.
+        """
         process, line = self._process, ""
         assert process.stdin is not None and process.stdout is not None
         try:
@@ -93,6 +108,11 @@ class _Reader:
 
 def _of_curve(at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
+    """Return the function that returns the pieces of a curve.
+
+    Raises:
+        InputError: the curve needs a tolerance.
+    """
     low, high = bounds
 
     def curve(t):
@@ -111,12 +131,18 @@ def _of_curve(at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds:
 
 
 def _raise(error: InputError) -> list[Line | Arc]:
+    """Raise an error in place of returning pieces."""
     raise error
 
 
 def _check_references(file: str) -> None:
-    """Raise an InputError unless a STEP file ends, and defines once every item that it refers to: else parts are
-    left out."""
+    """Check that a STEP file is complete: it has its end, and defines every referenced item once.
+
+    The reader would leave out such parts without an error.
+
+    Raises:
+        InputError: the file is incomplete.
+    """
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")
@@ -139,9 +165,9 @@ def _check_references(file: str) -> None:
 
 
 def _names_twice(record: str) -> bool:
-    """Return True if a record of several parts, #1 = ( A(...) B(...) ), has one of them twice."""
+    """Return True if a record of several parts, #1 = ( A(...) B(...) ), contains a part twice."""
     parts = re.search(r"=\s*\((.*)\)\s*$", record, re.DOTALL)
-    names, more = (parts[1] if parts else ""), 1
-    while more:
-        names, more = re.subn(r"\([^()]*\)", " ", names)
+    names, count = (parts[1] if parts else ""), 1
+    while count:
+        names, count = re.subn(r"\([^()]*\)", " ", names)
     return len(set(names.split())) < len(names.split())

@@ -1,9 +1,9 @@
-"""Curves of a STEP or BREP file, read by Open CASCADE in a process of its own, which a damaged file may end.
+"""Curves of a STEP or BREP file, read by Open CASCADE in a separate process, which a damaged file may crash.
 
     python3 cad_process.py FILE step|brep SECONDS
 
-It imports nothing of formingx. It prints one line of JSON, {"curves": {number: [lowest, highest parameter]}} or
-{"error": words}; then, for each line [number, [parameters]] that it gets, [points, derivatives] there or an error.
+It imports nothing of formingx. It prints one line of JSON: {"curves": {number: [lowest, highest parameter]}} or
+{"error": message}. Then it reads lines [number, [parameters]] and answers each by [points, derivatives] or an error.
 """
 
 import json
@@ -13,11 +13,11 @@ import sys
 
 
 def main(file: str, kind: str, seconds: int) -> None:
-    """Read the file, then answer until the input ends."""
+    """Read the file, then answer questions until the input ends."""
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     out = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)                                           # what the libraries print goes nowhere
+    os.dup2(2, 1)                                           # hides the output of the libraries
     import gmsh
     gmsh.initialize([], readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)

@@ -1,4 +1,4 @@
-"""The curves of a DXF drawing: lines, arcs, circles, polylines with bulges, ellipses and splines."""
+"""Curves of a DXF drawing: lines, arcs, circles, polylines with bulges, ellipses and splines."""
 
 import math
 import os
@@ -16,14 +16,20 @@ from .profile import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return {number: function that returns the pieces} of the curves of a drawing's model space, numbered from 1.
+    """Return the curves in the model space of a drawing, numbered from 1.
 
-    Texts, dimensions, hatches and points count as nothing, nor does what cannot be seen. Ellipses and splines become
-    arcs within `tolerance` (length).
+    Texts, dimensions, hatches, points and invisible entities are skipped.
+
+    Args:
+        file: name of the file.
+        tolerance: tolerance of arcs along splines and ellipses, length.
+
+    Returns:
+        {number: function that returns the pieces of the curve}.
 
     Raises:
-        InputError: ezdxf is not there, the file cannot be read, a curve of another kind or outside the plane, a spline
-            without tolerance.
+        InputError: ezdxf is not installed, or the file cannot be read. A curve is of another kind or outside the plane,
+            or there is a spline without a tolerance.
     """
     try:
         import ezdxf
@@ -32,14 +38,11 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
     file = os.fspath(file)
     found: dict[int, Callable[[], list[Line | Arc]]] = {}
     try:
-        there = dxf_tags.check(file, _NO_TOOL)
+        expected = dxf_tags.check(file, _SKIPPED)
         drawing = ezdxf.readfile(file)
-        read = Counter(e.dxftype() for layout in drawing.layouts for e in layout)
-        lost = [kind for kind in _READERS if read[kind] != there[kind]]
-        if lost:
-            raise ValueError(f"{there[lost[0]]} {lost[0]} stand in it, {read[lost[0]]} can be read")
+        _check_counts(expected, Counter(e.dxftype() for layout in drawing.layouts for e in layout))
         for entity in drawing.modelspace():
-            if (entity.dxftype() in _READERS or entity.dxftype() in _NO_TOOL) and _is_seen(entity, drawing):
+            if (entity.dxftype() in _READERS or entity.dxftype() in _SKIPPED) and _is_visible(entity, drawing):
                 number = len(found) + 1
                 found[number] = partial(_pieces, entity, tolerance, f"tool file {file!r}: curve {number}")
     except Exception as error:      # any error of the reader on a damaged file
@@ -47,7 +50,23 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
     return found
 
 
+def _check_counts(expected: Counter, found: Counter) -> None:
+    """Check that ezdxf found all curves of a drawing.
+
+    Raises:
+        ValueError: a curve is missing.
+    """
+    for kind in _READERS:
+        if found[kind] != expected[kind]:
+            raise ValueError(f"{expected[kind]} {kind} stand in it, {found[kind]} can be read")
+
+
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
+    """Return the pieces of a curve.
+
+    Raises:
+        InputError: the curve is damaged or unsupported; the message names it.
+    """
     try:
         return _read(entity, tolerance, name)
     except InputError:
@@ -57,8 +76,13 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
+    """Return the pieces of a curve of any kind.
+
+    Raises:
+        InputError: the kind is not supported.
+    """
     kind = entity.dxftype()
-    if kind in _NO_TOOL:
+    if kind in _SKIPPED:
         raise InputError(f"{name} is a {kind}, which is no curve of a section: draw it as lines, arcs, polylines or"
                          f" splines")
     if tuple(entity.dxf.get("extrusion", (0, 0, 1))) != (0, 0, 1):
@@ -67,29 +91,38 @@ def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _line(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    return [Line(_flat(entity.dxf.start, name), _flat(entity.dxf.end, name))]
+    """Return the line of an entity."""
+    return [Line(_in_plane(entity.dxf.start, name), _in_plane(entity.dxf.end, name))]
 
 
 def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
+    """Return the arc of an entity."""
     start, end = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
-    return [Arc(_flat(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
+    return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    return [Arc(_flat(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
+    """Return the circle of an entity."""
+    return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Bulges (the tangent of a quarter of the angle) become arcs; one with a negative bulge runs clockwise."""
+    """Return lines and arcs of a polyline.
+
+    A bulge is the tangent of a quarter of the arc's angle, negative if clockwise.
+
+    Raises:
+        InputError: the polyline is three-dimensional, a mesh, or fitted by a spline.
+    """
     if entity.dxftype() == "POLYLINE" and not entity.is_2d_polyline:
-        raise InputError(f"{name} is a polyline in space or a mesh: draw it as a plane polyline")
+        raise InputError(f"{name} is a three-dimensional polyline or a mesh: draw it as a plane polyline")
     if entity.dxftype() == "POLYLINE":
         if entity.dxf.flags & 4:
             raise InputError(f"{name} is a polyline that was fitted with a spline: draw it as a spline")
-        rows = [(*_flat(v.dxf.location, name), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
+        rows = [(*_in_plane(v.dxf.location, name), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
     else:
         elevation = entity.dxf.get("elevation", 0.0)
-        rows = [(*_flat((x, y, elevation), name), bulge) for x, y, bulge in entity.get_points("xyb")]
+        rows = [(*_in_plane((x, y, elevation), name), bulge) for x, y, bulge in entity.get_points("xyb")]
     closed = entity.is_closed if entity.dxftype() == "POLYLINE" else entity.closed
     pieces: list[Line | Arc] = []
     for (x, y, bulge), (x1, y1, _) in zip(rows, rows[1:] + (rows[:1] if closed else [])):
@@ -107,7 +140,12 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    _flat(entity.dxf.center, name), _flat(entity.dxf.major_axis, name)
+    """Return arcs along an ellipse.
+
+    Raises:
+        InputError: the ratio of its axes is not between 0 and 1.
+    """
+    _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
         raise InputError(f"{name}: its axes have the ratio {entity.dxf.ratio:g}: must be above 0, at most 1")
     tool = entity.construction_tool()
@@ -117,13 +155,13 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
     def curve(t):
         at = (low + (high - low) * t).tolist()
         return _rows(tool.vertices(at)), _rows(tool.tangents(at))
-    return arcs_along(curve, _needed(tolerance, name), name)
+    return arcs_along(curve, _required(tolerance, name), name)
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Arcs along the smooth part between each two of its knots."""
+    """Return arcs along the smooth parts of a spline between its knots."""
     for point in (*entity.control_points, *entity.fit_points):
-        _flat(point, name)
+        _in_plane(point, name)
     tool = entity.construction_tool()
     knots = sorted({float(k) for k in tool.knots() if tool.knots()[tool.order - 1] <= k <= tool.max_t})
     pieces: list[Line | Arc] = []
@@ -132,23 +170,28 @@ def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
             inner = np.clip(low + (high - low) * t, low, high - 1e-12 * (high - low))
             both = [tool.derivative(at, 1) for at in inner.tolist()]
             return _rows(b[0] for b in both), _rows(b[1] for b in both)
-        pieces += arcs_along(curve, _needed(tolerance, name), name)
+        pieces += arcs_along(curve, _required(tolerance, name), name)
     return pieces
 
 
 _READERS = {"LINE": _line, "ARC": _arc, "CIRCLE": _circle, "LWPOLYLINE": _polyline, "POLYLINE": _polyline,
             "ELLIPSE": _ellipse, "SPLINE": _spline}
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"}
-_NO_TOOL = ("3DFACE", "3DSOLID", "BODY", "HELIX", "INSERT", "MESH", "MLINE", "RAY", "REGION", "SURFACE", "XLINE")
+_SKIPPED = ("3DFACE", "3DSOLID", "BODY", "HELIX", "INSERT", "MESH", "MLINE", "RAY", "REGION", "SURFACE", "XLINE")
 
 
-def _is_seen(entity: Any, drawing: Any) -> bool:
+def _is_visible(entity: Any, drawing: Any) -> bool:
+    """Return True if an entity is visible."""
     layer = drawing.layers.get(entity.dxf.layer) if entity.dxf.layer in drawing.layers else None
     return not (entity.dxf.get("invisible", 0) or layer is not None and (layer.is_off() or layer.is_frozen()))
 
 
 def unit(file: str) -> str | None:
-    """Return the unit of length that a drawing states, $INSUNITS; None if it states none."""
+    """Return the unit of length of a drawing ($INSUNITS), or None.
+
+    Raises:
+        InputError: the file cannot be read, or the unit is not supported.
+    """
     import ezdxf
     try:
         code = ezdxf.readfile(file).header.get("$INSUNITS", 0)
@@ -160,15 +203,22 @@ def unit(file: str) -> str | None:
     return _UNITS.get(code)
 
 
-def _flat(point: Any, name: str) -> np.ndarray:
+def _in_plane(point: Any, name: str) -> np.ndarray:
+    """Return (x, y) of a point in the plane z = 0."""
     return in_plane(np.array([tuple(point)]), name)[0]
 
 
 def _rows(points: Any) -> np.ndarray:
+    """Return points as an array, shape (n, 3)."""
     return np.array([(p[0], p[1]) for p in points], float)
 
 
-def _needed(tolerance: float | None, name: str) -> float:
+def _required(tolerance: float | None, name: str) -> float:
+    """Return the tolerance.
+
+    Raises:
+        InputError: it is None.
+    """
     if tolerance is None:
         raise InputError(f"{name} is neither a straight line nor a circular arc: give tolerance=..., a length, and it"
                          f" is taken for arcs that close to it")

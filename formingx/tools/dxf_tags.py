@@ -1,6 +1,7 @@
-"""The tags of a DXF drawing as they stand: whether its curves are whole.
+"""Check of the tags of a DXF drawing: are its curves complete?
 
-ezdxf gives what a damaged curve lacks a usual value, such as (0, 0) for an end, and leaves out what it does not know.
+In place of a missing tag ezdxf assumes a default, such as (0, 0) for an end point. It also skips unknown tags. So a
+damaged curve would be read without an error.
 """
 
 from collections import Counter
@@ -10,10 +11,10 @@ from ..io.numerals import number, whole
 
 _NEEDED = {"LINE": (10, 20, 11, 21), "ARC": (10, 20, 40, 50, 51), "CIRCLE": (10, 20, 40), "VERTEX": (10, 20),
            "ELLIPSE": (10, 20, 11, 21, 40, 41, 42), "LWPOLYLINE": (), "POLYLINE": (), "SPLINE": (), "SEQEND": ()}
-"""{curve: group codes that it has once}."""
+"""{curve: group codes that occur once}."""
 _COUNTED: dict[str, dict[int, tuple[int, ...]]] = {
     "LWPOLYLINE": {90: (10, 20)}, "SPLINE": {72: (40,), 73: (10, 20), 74: (11, 21)}}
-"""{curve: {group code of a count: the codes that follow this number of times}}."""
+"""{curve: {group code of a count: codes whose occurrences it counts}}."""
 _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "CAMERA", "DGNUNDERLAY",
               "DIMENSION", "DWFUNDERLAY", "GEOPOSITIONMARKER", "HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER",
               "LIGHT", "MPOLYGON", "MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SHAPE",
@@ -22,10 +23,17 @@ _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATT
 
 
 def check(file: str, others: tuple[str, ...]) -> Counter:
-    """Return {kind: number of the curves of it} of a drawing; `others`: kinds that are not checked.
+    """Check the curves of a drawing.
+
+    Args:
+        file: name of the file.
+        others: kinds of entities that are not checked.
+
+    Returns:
+        {kind: number of its curves}.
 
     Raises:
-        ValueError: what is wrong, and in which line.
+        ValueError: the drawing is damaged; the message names the line.
     """
     data = Path(file).read_bytes()
     if data.startswith(b"AutoCAD Binary DXF"):
@@ -61,6 +69,11 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
 
 
 def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tuple[str, ...]) -> None:
+    """Check the tags of one entity.
+
+    Raises:
+        ValueError: its kind is unknown, or a tag is missing or occurs twice; the message names the line.
+    """
     where = f"the {kind} that ends before line {line + 1}"
     if kind not in _NEEDED:
         if kind not in _LETTERING and kind not in others:

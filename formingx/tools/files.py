@@ -1,4 +1,4 @@
-"""Profiles of tools from files: drawings and meshes, read as data, so that nothing in a file runs."""
+"""Profiles of tools from drawings and meshes. The files are read as data: nothing in them is executed."""
 
 import math
 import os
@@ -19,33 +19,34 @@ _HEADERS = {"step": (b"ISO-10303-21",), "brep": (b"DBRep_DrawableShape", b"CASCA
 _KINDS = {".geo": "geo", ".msh": "msh", ".dxf": "dxf", ".step": "step", ".stp": "step", ".brep": "brep"}
 
 _Curves = dict[int, Callable[[], list[Line | Arc]]]
-"""{number of a curve: what makes its pieces, or raises the error of one that is no tool's}."""
+"""{number of a curve: function that returns its pieces, or raises its error}."""
 
 
 def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
          tolerance: float | None = None, body: Any = None, units: str | float | Units | None = None) -> Tool:
     """Return a tool from curves of a file.
 
-    A curve is taken for the line or the arc that it is, exactly; the curves of a mesh (.msh) by their nodes. The ending
-    says what a file is: .step or .stp, .brep, .dxf, .msh, or .geo. A .geo file is a script, which is not run: it may
-    hold points, lines, circles, numbers with a name, and what a tool does not need (loops, surfaces, physical groups).
-    Curves lie in the plane z = 0. Of a .dxf file what cannot be seen (layers off or frozen, invisible) is no curve.
+    Lines and circular arcs are exact; curves of a mesh (.msh) are polygons through its nodes. The ending of the name
+    gives the format: .step or .stp, .brep, .dxf, .msh or .geo. The curves lie in the plane z = 0.
+
+    A .geo file is a script, but it is not run. It may contain points, lines, circles and named numbers; loops, surfaces
+    and physical groups are skipped. Invisible curves of a .dxf file are skipped, too.
 
     Args:
-        curves: numbers of the curves in order; a negative one runs a curve backwards (in a .dxf file curves are counted
-            from 1 in the order of the file). None: all curves of the file, put end to end.
-        closed: the last point is joined to the first.
-        tolerance: length; splines and ellipses (.step, .brep, .dxf) become arcs no farther away than this.
-        body: a point (R, Z) outside the tool, or the mesh of the body: the solid is then put on the other side of the
-            profile. None: it is to the left of the profile.
-        units: the script's unit of length ("mm", "cm", "m", "um", "in", "ft"), or its `formingx.Units`: curves of a
-            file that states its own (a .dxf file's $INSUNITS; a .step file always comes in mm) are turned into it; or
-            a factor. None: numbers as they come.
+        file: name of the file.
+        curves: numbers of the curves in order; a negative one reverses a curve. In a .dxf file curves are counted from
+            1. Default: all curves of the file, joined at their ends.
+        closed: True to join the last point to the first.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length.
+        body: a point (R, Z) outside the tool, or the mesh of the body. It selects the side of the solid. Default: the
+            solid lies to the left of the profile.
+        units: unit of length of the script ("mm", "cm", "m", "um", "in", "ft"), its `formingx.Units`, or a factor.
+            Lengths of a file with a unit are converted: .step in mm, .dxf by its $INSUNITS. Default: no conversion.
 
     Raises:
-        InputError: the file is not what its ending says or cannot be read, a statement that a .geo file may not hold,
-            a unit that the file does not state, a curve outside the plane, one that is neither a line nor a circular
-            arc where no tolerance is given, curves that do not follow one another, a body on both sides of the profile.
+        InputError: the file cannot be read, or its content does not fit its ending. A .geo file contains another
+            statement, or the file states no unit. A curve lies outside the plane, or needs a tolerance. The curves do
+            not follow one another, or the body lies on both sides of the profile.
 
     >>> with open("plug.geo", "w") as file:
     ...     print("Point(1) = {9, 0, 0}; Point(2) = {4, 0, 0}; Point(3) = {0, 2, 0};"
@@ -70,7 +71,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
         raise InputError(f"tool file {name!r} cannot be read: it does not begin as a {kind.upper()} file does")
     factor = 1.0 if units is None else _factor(units, kind, name)
     own = None if tolerance is None else tolerance / factor
-    found = ({"geo": _of_geo, "msh": _of_mesh}[kind](name) if kind in ("geo", "msh") else
+    found = ({"geo": _geo_curves, "msh": _mesh_curves}[kind](name) if kind in ("geo", "msh") else
              dxf.curves(name, own) if kind == "dxf" else cad.curves(name, kind, own))
     for tag in tags or []:
         if abs(tag) not in found:
@@ -78,13 +79,17 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
     if tags is None:
         pieces, closed = _end_to_end([found[tag]() for tag in sorted(found)], name)
     else:
-        pieces = [piece for tag in tags for piece in _along(found[abs(tag)](), tag)]
+        pieces = [piece for tag in tags for piece in _directed(found[abs(tag)](), tag)]
     tool = Tool.of_pieces([_scaled(piece, factor) for piece in pieces], closed)
-    return tool if body is None else _beside(tool, body, name)
+    return tool if body is None else _outside_body(tool, body, name)
 
 
-def _beside(tool: Tool, body: Any, file: str) -> Tool:
-    """Return the tool, or the tool reversed: the one that the body is outside of."""
+def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
+    """Return the tool, reversed if necessary, so that the body lies outside.
+
+    Raises:
+        InputError: the body lies on both sides.
+    """
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
     else:
@@ -96,12 +101,17 @@ def _beside(tool: Tool, body: Any, file: str) -> Tool:
     return tool.reversed() if depth.max() > near else tool
 
 
-def _along(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
+def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
+    """Return the pieces of a curve, reversed for a negative number."""
     return pieces if tag > 0 else [piece.backwards for piece in reversed(pieces)]
 
 
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
-    """All curves one after the other, each turned as it must be, from a free end; and whether they close."""
+    """Return all curves in order from a free end, reversed where necessary, and True if they are closed.
+
+    Raises:
+        InputError: the curves do not form one line.
+    """
     from scipy.spatial import cKDTree
     curves = [pieces for pieces in curves if pieces]
     if not curves:
@@ -110,12 +120,12 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
     if not np.abs(ends).max() < 1e50:                       # squares and products are still numbers
         raise InputError(f"tool file {file!r}: a curve ends {np.abs(ends).max():.3g} away: must be below 1e50")
     near = 1e-6 * max(float(np.ptp(ends, axis=0).max()), 1e-300)
-    meets: list[list[int]] = [[] for _ in ends]             # other ends at an end
+    neighbours: list[list[int]] = [[] for _ in ends]             # other ends at the same point
     for a, b in cKDTree(ends).query_pairs(near, output_type="ndarray").tolist():
-        meets[a].append(b)
-        meets[b].append(a)
-    number = np.array([1 + len(others) for others in meets])
-    if number.max() > 2 or len(curves) > 1 and any(k ^ 1 in others for k, others in enumerate(meets)):
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    number = np.array([1 + len(others) for others in neighbours])
+    if number.max() > 2 or len(curves) > 1 and any(k ^ 1 in others for k, others in enumerate(neighbours)):
         at = ends[np.argmax(number)]
         raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({at[0]:.6g}, {at[1]:.6g}), or a"
                          f" curve closes in itself: name the curves of the profile, curves=[...]")
@@ -127,9 +137,9 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
         return curves[0], not len(free)
     at, found = int(free[0]) if len(free) else 0, list[Line | Arc]()
     for k in range(len(curves)):
-        found += _along(curves[at // 2], -1 if at % 2 else 1)
+        found += _directed(curves[at // 2], -1 if at % 2 else 1)
         last = at ^ 1
-        following = meets[last]
+        following = neighbours[last]
         if k < len(curves) - 1 and (not following or not len(free) and following[0] == 0):
             raise InputError(f"tool file {file!r}: its curves are in several parts: name those of the profile,"
                              f" curves=[...]")
@@ -138,12 +148,17 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
 
 
 def _tag(tag: Any) -> int:
+    """Return the number of a curve, checked."""
     number = finite("tools.read: number of a curve", tag)
     return int(math.copysign(count("tools.read: number of a curve", abs(number)), number))
 
 
 def _factor(units: Any, kind: str, file: str) -> float:
-    """Return the factor for the lengths of the file."""
+    """Return the factor for the lengths of a file.
+
+    Raises:
+        InputError: the unit is unknown, or the file states none.
+    """
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)
@@ -155,11 +170,13 @@ def _factor(units: Any, kind: str, file: str) -> float:
 
 
 def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
+    """Return a piece with its lengths times a factor."""
     return (Line(piece.a * factor, piece.b * factor) if isinstance(piece, Line)
             else piece._replace(centre=piece.centre * factor, radius=piece.radius * factor))
 
 
-def _of_geo(file: str) -> _Curves:
+def _geo_curves(file: str) -> _Curves:
+    """Return the curves of a .geo file."""
     def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
         if isinstance(piece, str):
             raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"
@@ -168,7 +185,8 @@ def _of_geo(file: str) -> _Curves:
     return {tag: partial(pieces, tag, piece) for tag, piece in geo.curves(file).items()}
 
 
-def _of_mesh(file: str) -> _Curves:
+def _mesh_curves(file: str) -> _Curves:
+    """Return the curves of a .msh file."""
     found = msh.content(file)
     points = dict(zip(map(int, found.numbers), found.points))
     lines: dict[int, list[tuple[int, int]]] = {}
@@ -177,7 +195,7 @@ def _of_mesh(file: str) -> _Curves:
             lines.setdefault(block.entity, []).extend((int(a), int(b)) for a, b in block.nodes[:, :2])
 
     def piece(tag: int) -> list[Line | Arc]:
-        ends = list(dict.fromkeys(lines[tag]))           # an element of two groups is there twice
+        ends = list(dict.fromkeys(lines[tag]))           # an element of two groups occurs twice
         nodes = [ends[0][0], *(end for _, end in ends)]
         if any(a[1] != b[0] for a, b in zip(ends, ends[1:])) or not all(n in points for n in nodes):
             raise InputError(f"tool file {file!r}: the elements of curve {tag} do not follow one another")

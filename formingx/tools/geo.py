@@ -1,8 +1,8 @@
-"""The curves in a gmsh script (.geo), as far as a script is a drawing.
+"""Curves in a gmsh script (.geo) that is a plain drawing.
 
-A .geo file is a program: gmsh would run it, commands of the system included. So it is not given to gmsh. Read here are
-points, lines, circles, and numbers given a name; loops, surfaces, physical groups and mesh sizes are passed over, for a
-tool needs none of them; any other statement is refused.
+gmsh would execute a .geo file, system commands included. So the script is not passed to gmsh. This module reads points,
+lines, circles and named numbers. Loops, surfaces, physical groups and mesh sizes are skipped, because a tool does not
+need them. Any other statement is refused.
 """
 
 import ast
@@ -35,10 +35,13 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 
 
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
-    """Return {number: the line or the arc, or the kind of another curve} of the curves of a .geo file.
+    """Return the curves of a .geo file.
+
+    Returns:
+        {number: a line or an arc, or the kind of another curve}.
 
     Raises:
-        InputError: it cannot be read, or holds a statement that is not a drawing's; the message names the line.
+        InputError: the file cannot be read, or contains another statement; the message names the line.
     """
     file = os.fspath(file)
     try:
@@ -58,7 +61,7 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
 
 
 class _Drawing:
-    """Drawing as the statements have made it so far."""
+    """Points, curves and numbers defined by the statements so far."""
 
     def __init__(self) -> None:
         self.values: dict[str, float] = {"Pi": math.pi}
@@ -66,13 +69,17 @@ class _Drawing:
         self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
-        """Add one statement; raise a ValueError that names its fault."""
+        """Add the content of one statement.
+
+        Raises:
+            ValueError: the statement is not supported.
+        """
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
             if kind in ("Point", "Line", "Circle"):
                 getattr(self, f"_add_{kind.lower()}")(self._tag(tag), numbers)
             else:
-                self._keep(self._tag(tag), kind)
+                self._add_curve(self._tag(tag), kind)
         elif _PASSED_OVER.fullmatch(statement):
             return
         else:
@@ -82,6 +89,11 @@ class _Drawing:
             self.values[name.strip()] = self._number(value)
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
+        """Add a point.
+
+        Raises:
+            ValueError: it lies outside the plane, or its number is used already.
+        """
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
         if tag in self.points:
@@ -89,33 +101,55 @@ class _Drawing:
         self.points[tag] = np.array(numbers[:2])
 
     def _add_line(self, tag: int, numbers: list[float]) -> None:
+        """Add a line.
+
+        Raises:
+            ValueError: it has not two points.
+        """
         if len(numbers) != 2:
             raise ValueError("a line must be {first point, last point}")
-        self._keep(tag, Line(*(self._point(n) for n in numbers)))
+        self._add_curve(tag, Line(*(self._point(n) for n in numbers)))
 
     def _add_circle(self, tag: int, numbers: list[float]) -> None:
-        """{first point, centre, last point}, the shorter way round; or {x, y, 0, radius[, first angle, last angle]}."""
+        """Add a circular arc.
+
+        It is given by {first point, centre, last point} if below 180 degrees, or by {x, y, 0, radius[, first angle,
+        last angle]}.
+
+        Raises:
+            ValueError: the two ends differ in their distance from the centre, or the numbers do not define an arc.
+        """
         if len(numbers) == 3:
             first, centre, last = (self._point(n) for n in numbers)
             (a, begin), (b, end) = ((math.dist(p, centre), math.atan2(*(p - centre)[::-1])) for p in (first, last))
             if not a > 0 or abs(a - b) > 1e-9 * a:
                 raise ValueError(f"the ends are {a:.6g} and {b:.6g} away from the centre: must be the same")
             sweep = math.remainder(end - begin, 2 * math.pi)
-            self._keep(tag, Arc(centre, a, begin, sweep))
+            self._add_curve(tag, Arc(centre, a, begin, sweep))
         elif len(numbers) in (4, 6):
             x, y, z, radius, begin, end = [*numbers, 0.0, 2 * math.pi][:6] if len(numbers) == 4 else numbers
             if z != 0 or not radius > 0:
                 raise ValueError("a circle must be {x, y, 0, radius > 0, first angle, last angle}")
-            self._keep(tag, Arc(np.array([x, y]), radius, begin, end - begin))
+            self._add_curve(tag, Arc(np.array([x, y]), radius, begin, end - begin))
         else:
             raise ValueError("a circle must be {first point, centre, last point}")
 
-    def _keep(self, tag: int, piece: Line | Arc | str) -> None:
+    def _add_curve(self, tag: int, piece: Line | Arc | str) -> None:
+        """Store a curve under its number.
+
+        Raises:
+            ValueError: the number is used already.
+        """
         if tag in self.curves:
             raise ValueError(f"a second curve {tag}")
         self.curves[tag] = piece
 
     def _point(self, number: float) -> np.ndarray:
+        """Return a point by its number.
+
+        Raises:
+            ValueError: there is no such point.
+        """
         tag = self._tag(number)
         if tag not in self.points:
             raise ValueError(f"there is no point {tag}")
@@ -123,12 +157,21 @@ class _Drawing:
 
     @staticmethod
     def _tag(number: float) -> int:
+        """Return a number as an integer.
+
+        Raises:
+            ValueError: it is not a positive integer.
+        """
         if number != int(number) or number < 1:
             raise ValueError(f"{number:g} is no number of a point or curve")
         return int(number)
 
     def _number(self, text: str) -> float:
-        """Return the value of an expression of numbers, names and + - * / ^."""
+        """Return the value of an expression of numbers, names and + - * / ^.
+
+        Raises:
+            ValueError: the expression contains anything else.
+        """
         words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
         if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
                 is_number(word.removesuffix("e").removesuffix("E")) for word in words):
@@ -136,6 +179,11 @@ class _Drawing:
         return float(self._value(ast.parse(text.strip().replace("^", "**"), mode="eval").body))
 
     def _value(self, node: ast.expr) -> float:
+        """Return the value of a node of the syntax tree.
+
+        Raises:
+            ValueError: the node is not a number, a known name or an operation.
+        """
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
             return float(node.value)
         if isinstance(node, ast.Name) and node.id in self.values:
@@ -151,17 +199,23 @@ class _Drawing:
 
 
 def _real(value: Any) -> float:
+    """Return a float.
+
+    Raises:
+        ValueError: it is not a finite real number.
+    """
     if isinstance(value, complex):
         raise ValueError("a root of a negative number")
     return value
 
 
 def _without_remarks(text: str) -> str:
+    """Return the script without comments."""
     return re.sub(r"//[^\n]*|/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """(line, statement without its semicolon) of a script without remarks."""
+    """Yield (line, statement without its semicolon) of a script without comments."""
     line = 1
     for part in text.split(";"):
         begin = line + part[: len(part) - len(part.lstrip())].count("\n")

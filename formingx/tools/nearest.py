@@ -1,7 +1,7 @@
-"""Closest points of a profile of lines and arcs, in C: compiled once, into the folder of compiled forms.
+"""Closest points of a profile of lines and arcs, computed in C.
 
-Contact looks at its tools thousands of times in a run, each time at a few points: an array operation on each would cost
-more than the arithmetic.
+Contact queries its tools thousands of times in a run, for few points each time. Array operations would cost more than
+the arithmetic. The function is compiled once, into the cache folder of compiled forms.
 """
 
 from __future__ import annotations
@@ -63,13 +63,17 @@ void nearest(long points, const double *x, long pieces, long lines, const double
 
 
 def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the signed distance of points, its gradient and its curvature, shapes (n,), (n, 2) and (n,).
+    """Return the signed distance of points, its gradient and its curvature.
 
     Args:
         x: points, shape (n, 2), length.
-        table: pieces of the profile, lines first, shape (m, 9). Columns: origin (R, Z), direction (R, Z; 0 of arcs),
-            sense (0 of lines), lowest and highest coordinate along the piece, radius and first angle of an arc.
+        table: pieces of the profile, lines first, shape (m, 9). The columns are: origin (R, Z), direction (R, Z; 0 for
+            arcs), sense (0 for lines), lowest and highest coordinate along the piece. The last two belong to arcs:
+            radius and first angle.
         lines: number of lines.
+
+    Returns:
+        Distances, shape (n,), gradients, shape (n, 2), and curvatures, shape (n,).
     """
     ffi, doubles, function = _compiled()
     n = len(x)
@@ -82,7 +86,7 @@ def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, n
 
 @functools.cache
 def _compiled() -> tuple[Any, Any, Any]:
-    """Return cffi's interface, its type of an array, and the function in C, compiled if no run before has done it.
+    """Return the cffi interface, the array type and the C function, compiled at the first call.
 
     Raises:
         RuntimeError: the C compiler failed. It could not compile forms, either.

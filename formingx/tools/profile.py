@@ -1,8 +1,7 @@
-"""Rigid tools: profiles of straight lines and circular arcs with a signed distance.
+"""Rigid tools with a profile of straight lines and circular arcs.
 
-The solid of a tool lies to the left of its profile, seen along the order of the points. Curved edges stay curved: a
-fillet is an arc, a sharp corner an arc of radius 0, so a profile is smooth up to its corners and the distance to it
-is exact.
+The solid of a tool lies to the left of its profile, in the order of the points. A fillet is an arc, a sharp corner an
+arc of radius 0. So the profile is smooth between corners, and the distance to it is exact.
 """
 
 from __future__ import annotations
@@ -17,35 +16,47 @@ from ..errors import InputError, as_points, finite, instance, non_negative, pair
 from ..mesh.boxes import overlapping
 from .nearest import nearest
 
-_FLAT = 1e-9          # radians: a joint that turns less is smooth
+_FLAT = 1e-9  # radians: a joint that turns less is smooth
 TURN = 2 * math.pi
 
 
 class Line(NamedTuple):
-    """A straight piece from `a` to `b`."""
+    """Straight piece of a profile.
+
+    Attributes:
+        a: first point (R, Z), length.
+        b: last point (R, Z), length.
+    """
 
     a: np.ndarray
     b: np.ndarray
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """First and last point."""
+        """First and last point (R, Z), length."""
         return self.a, self.b
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Direction of travel at both ends, radians."""
+        """Directions of travel at both ends, radians."""
         angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
         return angle, angle
 
     @property
     def backwards(self) -> Line:
-        """The same from its last point to its first."""
+        """The line from its last point to its first."""
         return Line(self.b, self.a)
 
 
 class Arc(NamedTuple):
-    """A circular piece about `centre` from polar angle `start`, `sweep` radians long, to the left if positive."""
+    """Circular piece of a profile.
+
+    Attributes:
+        centre: centre (R, Z), length.
+        radius: radius, length; 0 for a sharp corner.
+        start: polar angle of the first point, radians.
+        sweep: angle of the arc, positive if it turns left, radians.
+    """
 
     centre: np.ndarray
     radius: float
@@ -54,28 +65,31 @@ class Arc(NamedTuple):
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """First and last point."""
+        """First and last point (R, Z), length."""
         first, last = (self.centre + self.radius * np.array([math.cos(a), math.sin(a)])
                        for a in (self.start, self.start + self.sweep))
         return first, last
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Direction of travel at both ends, radians."""
+        """Directions of travel at both ends, radians."""
         quarter = math.copysign(math.pi / 2, self.sweep)
         return self.start + quarter, self.start + self.sweep + quarter
 
     @property
     def backwards(self) -> Arc:
-        """The same from its last point to its first."""
+        """The arc from its last point to its first."""
         return self._replace(start=self.start + self.sweep, sweep=-self.sweep)
 
 
 class Nearest(NamedTuple):
-    """Surface of a profile at the closest points to n given points.
+    """Geometry of a profile at the closest points to n given points.
 
-    distance: signed, positive inside the tool, shape (n,), length; normal: its gradient, into the tool, shape (n, 2);
-    curvature: its second derivative is curvature t t^T, t the tangent (`tangent`), shape (n,), 1/length.
+    Attributes:
+        distance: signed distance, positive inside the tool, shape (n,), length.
+        normal: its gradient, pointing into the tool, shape (n, 2).
+        curvature: curvature of the level line; the second derivative is curvature t t^T with the tangent t, shape (n,),
+            1/length.
     """
 
     distance: np.ndarray
@@ -84,23 +98,23 @@ class Nearest(NamedTuple):
 
     @property
     def tangent(self) -> np.ndarray:
-        """The normal turned left by a right angle, shape (n, 2)."""
+        """Tangent: the normal rotated left by 90 degrees, shape (n, 2)."""
         return self.normal[:, ::-1] * (-1.0, 1.0)
 
 
 class Tool:
-    """A rigid tool, given by its profile in the (R, Z) plane.
+    """Rigid tool defined by its profile in the (R, Z) plane.
 
-    An open profile goes on beyond its ends as its end pieces do; an end on R = 0 is mirrored there instead.
+    Beyond its ends, an open profile continues along its end pieces. At an end on R = 0 it is mirrored instead.
 
     Args:
-        points: corners (R, Z), shape (n, 2), in the mesh's unit of length, the solid to their left.
-        fillets: radius at each point, 0 leaves it sharp; or one for all corners. Ends of an open profile have none,
-            but an end on R = 0 may (the tip of a cone).
-        closed: the last point is joined to the first.
+        points: corners (R, Z), shape (n, 2), length; the solid lies to their left.
+        fillets: fillet radius of each corner, 0 for a sharp one, or one radius for all corners, length. Ends of an open
+            profile have none, except on R = 0 (the tip of a cone).
+        closed: True to join the last point to the first.
 
     Raises:
-        InputError: fewer than two different points, a fillet without a corner or too large for it, a profile that
+        InputError: fewer than two different points, a fillet without a corner or too large for it, or a profile that
             crosses itself.
 
     >>> step = fx.Tool([(0, 2), (3, 2), (4, 0), (9, 0)], fillets=[0, 0.5, 0.2, 0])
@@ -127,22 +141,31 @@ class Tool:
         if not each and non_negative("Tool: fillets", fillets) > 0 and not any(isinstance(p, Arc) for p in pieces):
             raise InputError(f"Tool: fillets = {fillets!r}: the profile has no corner to round (an end on R = 0 is"
                              f" rounded by a list with a radius for each point)")
-        self._set(pieces, closed)
+        self._set_pieces(pieces, closed)
 
     @classmethod
     def of_pieces(cls, pieces: Sequence[Line | Arc], closed: bool = False) -> Tool:
-        """Return a tool from lines and arcs that follow one another; joints need not be smooth.
+        """Return a tool from successive lines and arcs; their joints may be corners.
+
+        Args:
+            pieces: the lines and arcs.
+            closed: True if the last point is the first.
 
         Raises:
-            InputError: a piece that is neither, is not finite or has no length, pieces that do not follow one another,
-                a profile that doubles back or crosses itself.
+            InputError: a piece is of another type, not finite or of no length. The pieces do not follow one another, or
+                the profile doubles back or crosses itself.
         """
         tool = cls.__new__(cls)
         instance("Tool.of_pieces: closed", closed, bool, "True or False")
-        tool._set(several("Tool.of_pieces: pieces", pieces, "Line(...) and Arc(...)"), closed)
+        tool._set_pieces(several("Tool.of_pieces: pieces", pieces, "Line(...) and Arc(...)"), closed)
         return tool
 
-    def _set(self, pieces: list[Line | Arc], closed: bool) -> None:
+    def _set_pieces(self, pieces: list[Line | Arc], closed: bool) -> None:
+        """Store the pieces, and check that the profile does not cross itself.
+
+        Raises:
+            InputError: there is no piece, the pieces do not follow one another, or the profile doubles back.
+        """
         pieces = [_checked(piece, i) for i, piece in enumerate(pieces)]
         if not pieces:
             raise InputError("Tool: a profile needs at least one piece, a Line or an Arc")
@@ -160,51 +183,66 @@ class Tool:
         self._tabulate()
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
-        """Distance of points x, shape (n, 2), to the profile, positive inside the tool, shape (n,)."""
+        """Return the signed distance of points from the profile.
+
+        Args:
+            x: points, shape (n, 2), length.
+
+        Returns:
+            Distances, positive inside the tool, shape (n,), length.
+        """
         return self.nearest(x).distance
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Signed distance of points x, shape (n, 2), its gradient and its curvature."""
+        """Return the signed distance of points x, shape (n, 2), its gradient and its curvature."""
         return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
-        """Return the tool shifted by (r, z), lengths."""
-        by = np.array([finite("Tool.moved: r", r), finite("Tool.moved: z", z)])
-        return self._with([Line(p.a + by, p.b + by) if isinstance(p, Line) else p._replace(centre=p.centre + by)
-                           for p in self.pieces])
+        """Return the tool shifted by (r, z), length."""
+        shift = np.array([finite("Tool.moved: r", r), finite("Tool.moved: z", z)])
+        return self._with_pieces([Line(p.a + shift, p.b + shift) if isinstance(p, Line)
+                                  else p._replace(centre=p.centre + shift) for p in self.pieces])
 
     def turned(self, angle: float) -> Tool:
-        """Return the tool turned about the origin, counter-clockwise, degrees (plane strain)."""
+        """Return the tool rotated counter-clockwise about the origin by an angle in degrees (plane strain)."""
         a = math.radians(finite("Tool.turned: angle", angle))
         Q = np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]])
-        return self._with([Line(Q @ p.a, Q @ p.b) if isinstance(p, Line)
-                           else p._replace(centre=Q @ p.centre, start=p.start + a) for p in self.pieces])
+        return self._with_pieces([Line(Q @ p.a, Q @ p.b) if isinstance(p, Line)
+                                  else p._replace(centre=Q @ p.centre, start=p.start + a) for p in self.pieces])
 
     def mirrored(self) -> Tool:
         """Return the tool upside down: Z becomes -Z."""
         flip = np.array([1.0, -1.0])
-        return self._with([Line(p.b * flip, p.a * flip) if isinstance(p, Line)
+        return self._with_pieces([Line(p.b * flip, p.a * flip) if isinstance(p, Line)
                            else Arc(p.centre * flip, p.radius, -p.start - p.sweep, p.sweep)
                            for p in reversed(self.pieces)])
 
     def reversed(self) -> Tool:
-        """Return the tool whose solid is on the other side of the profile."""
-        return self._with([p.backwards for p in reversed(self.pieces)])
+        """Return the tool with its solid on the other side of the profile."""
+        return self._with_pieces([p.backwards for p in reversed(self.pieces)])
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
-        """Points along the profile for drawing, shape (n, 2)."""
+        """Return points along the profile for drawing, shape (n, 2), length.
+
+        Args:
+            per_arc: number of straight pieces per arc.
+        """
         parts = [_sampled(p, per_arc) for p in self.pieces]
         return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `RigidTool.surface`: the points of `outline`, and the numbers of the ends of each of its pieces."""
+        """Return points of the profile and its straight pieces (`RigidTool.surface`).
+
+        Returns:
+            Points of `outline`, shape (n, 2), length, and numbers of the ends of each piece, shape (m, 2).
+        """
         points = self.outline()
         numbers = np.arange(len(points))
         return points, np.stack([numbers[:-1], numbers[1:]], 1)
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest (R, Z) of the outline, shape (2, 2)."""
+        """Lowest and highest (R, Z) of the outline, shape (2, 2), length."""
         points = self.outline()
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
@@ -216,11 +254,12 @@ class Tool:
         first, last = np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends)
         return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {_show(first)} to {_show(last)})"
 
-    def _with(self, pieces: list) -> Tool:
+    def _with_pieces(self, pieces: list) -> Tool:
+        """Return a tool of the same kind from other pieces."""
         return Tool.of_pieces(pieces, self.closed)
 
     def _tabulate(self) -> None:
-        """One row per piece and per sharp corner, for `nearest`: lines, then arcs and corners, arcs of no radius."""
+        """Fill the table for `nearest`: lines, then arcs and sharp corners (arcs of radius 0)."""
         rows, arcs = [], []     # origin, travel, sign (0: line), low, high; of arcs radius, start
         tol = 1e-9 * self.size
         ends = self._ends()
@@ -244,7 +283,7 @@ class Tool:
         self._table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
-        """For both ends: (point, turn of the mirrored corner) on R = 0, else None: the profile goes on."""
+        """Return for both ends (point, turn of the mirrored corner) on R = 0, or None if the profile continues."""
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)
         found = []
@@ -256,6 +295,11 @@ class Tool:
         return tuple(found)
 
     def _check_crossing(self) -> None:
+        """Check that the profile does not cross itself.
+
+        Raises:
+            InputError: two pieces cross.
+        """
         parts = [_sampled(p, _straight_pieces(p)) for p in self.pieces]
         a = np.concatenate([part[:-1] for part in parts])
         b = np.concatenate([part[1:] for part in parts])
@@ -274,7 +318,7 @@ class Tool:
                 k = int(np.argmax(hit))
                 raise InputError(f"Tool: the profile crosses itself near (R, Z) = {_show(a[i[k]] + s[k] * u[k])}")
             length = np.maximum(np.hypot(*u.T), 1e-300)
-            both = np.stack([w, b[j] - a[i]])                                # parallel: one along the other
+            both = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
             across, lies = np.abs(_cross(u, both)) / length, (u * both).sum(-1) / length
             over = (across.max(0) < near) & (lies.max(0) > near) & (lies.min(0) < length - near)
             if over.any():
@@ -282,7 +326,14 @@ class Tool:
 
 
 def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
-    """Lines and tangent arcs through corners with fillets; each: a point with a fillet must be a corner."""
+    """Return lines and tangent arcs through corners with fillets.
+
+    Args:
+        each: True if every point with a fillet must be a corner.
+
+    Raises:
+        InputError: a fillet has no corner, or is too large.
+    """
     n, size = len(points), float(np.ptp(points, axis=0).max())
     edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
@@ -322,7 +373,7 @@ def _rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -
 
 
 def _fillet(corner: np.ndarray, radius: float, cut: float, come: float, turn: float, first: bool, second: bool) -> Arc:
-    """Return the arc that rounds a corner, which takes `cut` of its edges; at an open end only one half of it."""
+    """Return the arc that rounds a corner and shortens its edges by `cut`; only half of it at an open end."""
     left = math.copysign(1.0, turn)
     start = corner - cut * np.array([math.cos(come), math.sin(come)])
     centre = start + left * radius * np.array([-math.sin(come), math.cos(come)])
@@ -331,7 +382,11 @@ def _fillet(corner: np.ndarray, radius: float, cut: float, come: float, turn: fl
 
 
 def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[float]) -> None:
-    """Raise an InputError if two fillets take more of an edge than there is."""
+    """Check the fillets at the two ends of each edge.
+
+    Raises:
+        InputError: together they are longer than the edge.
+    """
     for (i, j), length in lengths.items():
         if cut[i] + cut[j] > length * (1 + 1e-9):
             k = i if cut[i] >= cut[j] else j
@@ -342,7 +397,11 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 
 
 def _checked(piece: Line | Arc, i: int) -> Line | Arc:
-    """Return a piece of a profile, its numbers as floats."""
+    """Return a piece of a profile with its numbers as floats.
+
+    Raises:
+        InputError: it is neither a line nor an arc, is not finite, or has no length.
+    """
     caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)
@@ -360,11 +419,12 @@ def _checked(piece: Line | Arc, i: int) -> Line | Arc:
 
 
 def _turn(come: float, out: float) -> float:
-    """Angle from one direction of travel to the next, in (-pi, pi]."""
+    """Return the angle from one direction of travel to the next, in (-pi, pi]."""
     return math.pi - (math.pi - (out - come)) % TURN
 
 
 def _sampled(piece: Line | Arc, n: int) -> np.ndarray:
+    """Return n + 1 points on a piece."""
     if isinstance(piece, Line):
         return np.array([piece.a, piece.b])
     angles = piece.start + piece.sweep * np.linspace(0, 1, n + 1)
@@ -372,13 +432,15 @@ def _sampled(piece: Line | Arc, n: int) -> np.ndarray:
 
 
 def _straight_pieces(piece: Line | Arc) -> int:
-    """Return the number of straight pieces in a search for crossings: 64 for a quarter of a turn, at least 4."""
+    """Return the number of straight pieces in a search for crossings: 64 per quarter turn, and 4 or more."""
     return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return the cross products of vectors in the plane."""
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def _show(point: np.ndarray) -> str:
+    """Return a point as text."""
     return f"({point[0]:.6g}, {point[1]:.6g})"

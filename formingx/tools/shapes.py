@@ -1,4 +1,4 @@
-"""Ready-made shapes of rigid tools; `read` takes a tool's profile from a file."""
+"""Ready-made shapes of rigid tools. The function `read` makes tools from files."""
 
 import math
 from typing import NamedTuple
@@ -14,7 +14,10 @@ __all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "con
 
 
 def plane(z: float = 0.0) -> Tool:
-    """Everything above Z = z.
+    """Return the half-space above Z = z as a tool.
+
+    Args:
+        z: position of its surface, length.
 
     >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()
     [-1.0, 2.0]
@@ -25,15 +28,20 @@ def plane(z: float = 0.0) -> Tool:
 
 def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, fillet: float = 0.0,
         lip: float = 0.0) -> Tool:
-    """Return a female mould that opens downwards: a round cup, or half of a box section in plane strain.
+    """Return a female mould that opens downwards: an axisymmetric cup, in plane strain half of a box section.
 
     Args:
-        radius: of the mouth (half the width of a box section), length; depth: from the mouth up to the floor.
-        mouth: Z of the mouth and of the flange around it.
-        draft: angle between the wall and the Z axis, degrees; the floor is narrower than the mouth.
-        fillet, lip: radii of the edge between wall and floor, and of that between wall and flange.
+        radius: radius of the mouth, or half width of a box section, length.
+        depth: height of the floor above the mouth, length.
+        mouth: Z of the mouth and of the flange around it, length.
+        draft: draft angle between the wall and the Z axis, degrees; the floor is narrower than the mouth.
+        fillet: radius of the edge between wall and floor, length.
+        lip: radius of the edge between wall and flange, length.
 
-    >>> mould = fx.tools.cup(radius=30.0, depth=20.0, draft=np.radians(5), fillet=3.0, lip=2.0)
+    Raises:
+        InputError: a length is not positive, an angle too large, or a fillet too large.
+
+    >>> mould = fx.tools.cup(radius=30.0, depth=20.0, draft=5.0, fillet=3.0, lip=2.0)
     >>> mould.signed_distance([[0.0, 19.0]]).round(6).tolist()
     [-1.0]
     """
@@ -52,10 +60,12 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
     """Return a male mould that points up, over which a sheet is draped.
 
     Args:
-        radius: of the flat top, length; height: from the base plate up to the top.
-        base: Z of the base plate.
-        draft: angle between the wall and the Z axis, degrees; the base is wider than the top.
-        fillet, foot: radii of the edge around the top and of the edge between wall and base plate, length.
+        radius: radius of the flat top, length.
+        height: height of the top above the base plate, length.
+        base: Z of the base plate, length.
+        draft: draft angle between the wall and the Z axis, degrees; the base is wider than the top.
+        fillet: radius of the edge around the top, length.
+        foot: radius of the edge between wall and base plate, length.
 
     >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)
     >>> mould.signed_distance([[0.0, 25.0]]).tolist()
@@ -70,13 +80,20 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
 
 def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_height: float, base: float = 0.0,
            fillet: float = 0.0, shoulder_fillet: float = 0.0) -> Tool:
-    """Return a bottle-like mould around a parison, open at the neck (up).
+    """Return a bottle mould around a parison, open at the neck, which points up.
 
     Args:
-        radius, height: of the body, lengths; shoulder: height of the cone between body and neck.
-        neck, neck_height: radius and height of the neck.
-        base: Z of the bottom.
-        fillet, shoulder_fillet: radii of the bottom edge and of both shoulder edges.
+        radius: radius of the body, length.
+        height: height of the body, length.
+        neck: radius of the neck, length.
+        shoulder: height of the cone between body and neck, length.
+        neck_height: height of the neck, length.
+        base: Z of the bottom, length.
+        fillet: radius of the bottom edge, length.
+        shoulder_fillet: radius of both shoulder edges, length.
+
+    Raises:
+        InputError: a length is not positive, or the neck is not narrower than the body.
 
     >>> mould = fx.tools.bottle(radius=30.0, height=110.0, neck=12.0, shoulder=20.0, neck_height=20.0, fillet=5.0)
     >>> mould.signed_distance([[0.0, 60.0]]).tolist(), float(mould.bounds[1, 1])           # 150 mm high in all
@@ -94,7 +111,12 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 
 
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
-    """Return a flat-ended plug that points down, its face at Z = z.
+    """Return a flat-ended plug that points down.
+
+    Args:
+        radius: radius of the plug, length.
+        z: Z of its face, length.
+        fillet: radius of the edge, length.
 
     >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
     >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
@@ -109,11 +131,15 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
     """Return a cone that points down.
 
     Args:
-        half_angle: between its surface and the Z axis, degrees, from 0.01 to below 90.
-        z: of its lowest point; tip: radius of the rounded tip, length.
-        size: a length to draw it at (the cone has no end).
+        half_angle: angle between its surface and the Z axis, degrees, from 0.01 to below 90.
+        z: Z of its lowest point, length.
+        tip: radius of the rounded tip, length.
+        size: length of the drawn surface; the cone itself has no end.
 
-    >>> plug = fx.tools.cone(half_angle=np.radians(30), z=1.0)
+    Raises:
+        InputError: the angle is outside its range.
+
+    >>> plug = fx.tools.cone(half_angle=30.0, z=1.0)
     >>> plug.signed_distance([[0.0, 0.0]]).tolist()
     [-1.0]
     """
@@ -129,7 +155,12 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
 
 
 def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
-    """Return a ball (axisymmetric, r = 0) or a round bar (plane strain), its lowest point at (r, z).
+    """Return a ball (axisymmetric, r = 0) or a round bar (plane strain).
+
+    Args:
+        radius: radius, length.
+        z: Z of its lowest point, length.
+        r: R of its lowest point, length.
 
     >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
     [-1.0, 1.0]
@@ -140,23 +171,30 @@ def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
 
 
 class Pot(NamedTuple):
-    """The tools of a tapered cup: `mould`, above the sheet, and `plug`, below it."""
+    """Tools of a tapered cup.
+
+    Attributes:
+        mould: female mould above the sheet.
+        plug: plug below the sheet.
+    """
 
     mould: Tool
     plug: Tool
 
 
 def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, height: float | None = None) -> Tool:
-    """Return a ring that a sheet lies under, its flat face at Z = z and its inner edges rounded: half a grip.
+    """Return the upper ring of a clamp, with its flat face at Z = z and rounded inner edges.
 
-    The other half is `clamp_ring(...).mirrored()`. Between the two a sheet may grow thin, and it leaves them over their
-    edges: a clamp without a singular corner. Hold the sheet's rim, between the rings, by `SimplySupported`.
+    The lower ring is `clamp_ring(...).mirrored()`. The sheet may become thinner between the rings, and it leaves them
+    over rounded edges. So this clamp has no singular corner. Support the rim of the sheet between the rings by
+    `SimplySupported`.
 
     Args:
-        radius: of the opening.
-        width: from there outwards, more than the fillet.
-        fillet: radius of the edges.
-        height: of the ring, at least two fillets, as by default.
+        radius: radius of the opening, length.
+        width: radial width of the ring, larger than the fillet, length.
+        fillet: radius of the edges, length.
+        z: position of the flat face, length.
+        height: height of the ring, at least two fillets (the default), length.
 
     >>> ring = fx.tools.clamp_ring(radius=50.0, width=20.0, fillet=2.0)
     >>> ring.signed_distance([[60.0, -1.0]]).tolist()
@@ -171,21 +209,27 @@ def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, he
 
 def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float, lip: float = 0.0,
         plug: float | None = None, nose: float | None = None) -> Pot:
-    """Mould and plug of a tapered round cup, upside down: the sheet is formed upwards.
+    """Return mould and plug of a tapered cup, which is formed upwards.
 
-    The sheet lies on Z from 0 to its thickness, as `mesh.disc` makes it; the mould opens downwards onto its top, the
-    plug points up and touches its bottom; drive it with `direction=(0, 1)`. Lengths in millimetres, or as the mesh.
+    The sheet lies on Z from 0 to its thickness, as made by `mesh.disc`. The mould opens downwards onto the top of the
+    sheet. The plug points up and touches the bottom. Drive the plug with `direction=(0, 1)`.
 
     Args:
-        mouth, base: radii of the cup at its mouth and at its base, the base not wider; depth: between the two.
-        sheet: thickness of the sheet.
-        fillet: radius of the edge between wall and base; lip: of that between wall and flange.
-        plug: radius of the flat-ended plug, smaller than the base; default 0.8 of the base.
-        nose: radius of the plug's rounded edge, at most its radius (a ball); default half of it.
+        mouth: radius of the cup at its mouth, length.
+        base: radius of the cup at its base, at most `mouth`, length.
+        depth: distance between mouth and base, length.
+        sheet: thickness of the sheet, length.
+        fillet: radius of the edge between wall and base, length.
+        lip: radius of the edge between wall and flange, length.
+        plug: radius of the flat-ended plug, smaller than the base, length; default 0.8 of the base.
+        nose: radius of the plug's rounded edge, at most its radius (a ball), length; default half of it.
+
+    Returns:
+        The mould and the plug.
 
     Raises:
-        InputError: a length that is not positive, a base wider than the mouth, fillets that do not fit, a plug that is
-            not smaller than the base.
+        InputError: a length is not positive, the base is wider than the mouth, or the plug as wide as the base. A
+            fillet does not fit.
 
     >>> tools = fx.tools.pot(mouth=40.0, base=25.0, depth=70.0, sheet=1.2, fillet=4.0)
     >>> tools.mould.bounds.round(6).tolist()
@@ -208,6 +252,11 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
 
 
 def _draft(shape: str, draft: float) -> float:
+    """Return a draft angle in radians, checked.
+
+    Raises:
+        InputError: the angle is negative, or 90 degrees or more.
+    """
     angle = non_negative(f"{shape}: draft", draft)
     if angle >= 90:
         raise InputError(f"{shape}: draft = {draft!r}: must be below 90 degrees")
