@@ -1,7 +1,7 @@
 """Admissibility of a body: hoop stretches and in-plane determinants are positive.
 
-det F > 0 at the quadrature points is not enough. Beyond the axis the hoop stretch and the in-plane determinant are
-both negative, so their product is positive. A strongly bent edge may also invert an element between these points.
+det F > 0 at the quadrature points is not enough. Beyond the axis the hoop stretch and the in-plane determinant are both
+negative, so their product is positive. A strongly bent edge may also invert an element between these points.
 """
 
 from __future__ import annotations
@@ -42,8 +42,7 @@ class Admissible:
             - \frac{\partial u_r}{\partial Z} \frac{\partial u_z}{\partial R}
 
     On the axis the hoop stretch is its limit, :math:`1 + \partial u_r / \partial R`. A membrane has a hoop stretch
-    only.
-    The constructor computes all arrays that do not depend on the state.
+    only. The constructor computes all arrays that do not depend on the state.
 
     Args:
         forms: a `Formulation`; its `w` is the examined field.
@@ -139,9 +138,8 @@ class Admissible:
         """Check that no point lies beyond the axis and that elements are not inverted; collective.
 
         In-plane determinants are checked at the quadrature points of the energy only. Between them a sharp edge may
-        invert
-        a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `least` finds such
-        points.
+        invert a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `least` finds
+        such points.
 
         Returns:
             True if all checked values of the current fields are positive on all ranks.

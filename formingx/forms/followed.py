@@ -14,8 +14,7 @@ class Followed:
     r"""Coefficient f(T) at the quadrature points of the energy, for temperatures that may change with time.
 
     The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
-    with
-    its logarithmic rate in the previous step:
+    with its logarithmic rate in the previous step:
 
     .. math::
         f(t) = f_0 \exp(a (t - t_0)), \qquad a = \frac{\ln f_0 - \ln f_{-1}}{t_0 - t_{-1}}

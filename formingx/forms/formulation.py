@@ -1,8 +1,8 @@
 """Forms of a scene: common base class of solids and membranes.
 
-Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress`
-(the largest shear modulus). The energy is divided by stress times reference volume. A run therefore does not depend
-on the user's units, and the solver works with numbers of order one.
+Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
+largest shear modulus). The energy is divided by stress times reference volume. A run therefore does not depend on the
+user's units, and the solver works with numbers of order one.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Formulation(BodyModel):
         control: `Constant` of the dimensionless control.
         time: process time, a function of the control (UFL scalar, time).
         scales: for every item of the scene, its value (pressure, travel, ...) in the user's units over its amplitude
-            (`StepData`); the last entry, 1, belongs to the time.
+            (`Setting`); the last entry, 1, belongs to the time.
         control_scale: scale of the only controlled item, or L.
         terms: the `MaterialTerms` of each material of the scene.
         histories: arguments of the forms besides fields, control and time (`History`).
@@ -368,7 +368,7 @@ class Formulation(BodyModel):
         """Set loads, elastic supports and process time from step data.
 
         Args:
-            setting: the `StepData`.
+            setting: the `Setting`.
         """
         for support, present in self.elastic_supports:
             present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))

@@ -3,8 +3,8 @@ r"""Sparse matrix of a tangent that is extended by a few dense rows and columns 
 .. math::
     \begin{pmatrix} K & C^T \\ C & 0 \end{pmatrix}
 
-K is a compiled form, each row of C a constraint. The rows and columns of the multipliers follow the entries of the
-last rank, so all fields keep the global numbers of DOLFINx.
+K is a compiled form, each row of C a constraint. The rows and columns of the multipliers follow the entries of the last
+rank, so all fields keep the global numbers of DOLFINx.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ class ExtendedMatrix:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
-        """Set the constraints of the tangents from now on.
+        """Set the constraints of the following tangents.
 
         Args:
-            bcs: constrained unknowns; their rows and columns become unit vectors.
+            bcs: DirichletBCs of constrained unknowns; their rows and columns become unit vectors.
             rows: rows of C, locally owned entries, shape (n,) each. If a row is 0 on all ranks, row and column of its
                 multiplier become unit vectors too.
         """
@@ -75,8 +75,7 @@ class ExtendedMatrix:
 
         Args:
             blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to K, shape (n,
-                m, m).
-                The unknowns of a block must share a cell.
+                m, m). The unknowns of a block must share a cell.
 
         Returns:
             The assembled matrix.

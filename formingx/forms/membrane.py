@@ -213,9 +213,7 @@ class MidSurface(Formulation):
         return self._area() * sum(self.thicknesses.values())
 
     def _area(self) -> Any:
-        """Return the kinematic weight times dR/dS, which turns a thickness along Z into a volume per arc length (UFL
-        scalar).
-        """
+        """Return the kinematic weight times dR/dS: thickness along Z times this is volume per arc length (UFL)."""
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:

@@ -101,8 +101,7 @@ class Solid(Formulation):
         """Set `w` to 0, or to a small stretch u = s X if bending stiffness is below round-off.
 
         The stress of the stretch stiffens a thin sheet as a membrane. The stretch is interpolated because the unknowns
-        of
-        bubbles are no nodal values.
+        of bubbles are no nodal values.
         """
         super().set_stiff()
         if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from .. import _compat
 
 _NO_STRESS = 1e-6
-"""Stress over the largest modulus that counts as zero."""
+"""Stress over the largest modulus below which a body counts as stress-free."""
 
 _SYSTEMATIC = 4.0
 """Weight of errors that have the same sign in every step, as the error of a backward difference.
@@ -59,8 +59,7 @@ class StepError:
 
         Returns:
             Error of the stress at the end of the step; the part that persists after another step of this length. The
-            second
-            part adds up from step to step.
+            second part adds up from step to step.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)

@@ -10,21 +10,21 @@ the tangential traction for stick and for Coulomb's law
 
 .. math:: T_{stick} = k F'(d)\, g, \qquad T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g.
 
-The elastic slip g is the tangential motion since the point touched, less the sliding. Stick is mu = inf, frictionless
-contact mu = 0. A point that was open at the last accepted state slips from the place of its gap closure inside the
-step, which the tangent of the path predicts. A sticking point whose gap closes at the very end of the step, or later,
-is free until then.
+The elastic slip g is the tangential motion since gap closure, minus the sliding. Stick is mu = inf, frictionless
+contact mu = 0. The slip of a point that was open at the last accepted state begins at its gap closure within the step,
+which the tangent of the path predicts. A point whose gap closes at the end of the step, or later, carries no shear
+until then.
 
-Coulomb's law is regularised: points slide after the same small elastic slip g_s at every pressure, so that their
-stiffness grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus
-Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes: slip under N1, and
-back under N2, gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
+Coulomb's law is regularised: points slide after the same small elastic slip g_s at every pressure. Their stiffness
+therefore grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus
+Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes: slip under N1 and
+back under N2 gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
-For a tool that the body does not separate from, F(d) = d + theta of either sign for a point that has touched, and
-max(d + theta, 0) for the others, which is continuous when a gap closes.
+For a tool from which the body does not separate, a point that has been in contact has F(d) = d + theta of either sign.
+The other points have max(d + theta, 0), which is continuous at gap closure.
 
-Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact
-for the lumped area), or at Gauss points of the facets. History variables live at the same points.
+Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact for
+the lumped area), or at Gauss points of the facets. History variables belong to the same points.
 """
 
 from __future__ import annotations
@@ -35,32 +35,29 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, instance, non_negative, pair, positive, triple
+from ..errors import InputError, count, instance, pair, positive, triple
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
-from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
+from .contact_arguments import coefficient, contact_points
 from .contact_law import ContactLaw, Motion, NormalLaw, Touch, Tractions, outer
 from .part import Part
 
 _STICKS = 100.0
-"""Coefficients of friction from which on a point counts as one that sticks: nothing slides there."""
+"""Coefficient of friction above which a point counts as sticking."""
 
 _ROUGH = 1000.0
-"""T/N beyond which a sticking point that may separate slides: without pressure no shear traction is left."""
+"""T/N above which a sticking point slides if it may separate: without pressure it carries no shear traction."""
 
 _ELASTIC_SLIP = 1e-3
-"""g_s over thickness: forces hardly feel it (tests/test_compression.py), and Newton's method can still aim at it."""
+"""g_s over thickness: small enough for the forces (tests/test_compression.py), large enough for Newton's method."""
 
-_SLIDES, _STICK, _HELD = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
+_SLIDES, _STICK, _BONDED = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Penalty and ramp of sliding points, of sticking points until pulled off, and of what never separates, where
 stiffer costs iterations."""
 
-_MOST_POINTS = 100
-"""Gauss points on a facet."""
-
-_AT_FOOT = 1e-7
-"""Distances from the outer edge of the ramp, over theta, that are negligible."""
+_RAMP_EDGE = 1e-7
+"""Distance from the outer edge of the ramp, over theta, that is negligible."""
 
 
 class Contact(Part):
@@ -69,28 +66,28 @@ class Contact(Part):
     Args:
         on: name of the boundary that faces the tool.
         tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
-        friction: "stick" (a point stays where it touched), "none", or the coefficient mu of Coulomb's law (5.9), at
-            least 0. A coefficient that depends on the temperature of the body is a `table` {T: mu} or the result of
-            `of_temperature`; its value is taken at the last accepted state.
+        friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), at least 0. A coefficient
+            that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`; its
+            value is taken at the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick.
-        elastic_slip: g_s over thickness of the sheet: the elastic motion of a point before it slides.
-        separates: False: points that have touched stay in contact (a tacky sheet, a plug that the sheet sticks to from
-            the start); with "stick" or "none". The default is True. For "stick" in three dimensions it is False: a
-            point stays in contact until a stage makes the tool inactive. There True lets points in tension separate,
-            for materials that do not relax.
-        nodes_per_step: number of nodes that come into contact in one step (an element edge has two). In three
-            dimensions it is a percentage of all nodes, default 1. The results of stick, friction and heat exchange
-            depend on the time of touch. None: where points stick, up to 5 % of the nodes, whose gap closures are
-            predicted in order; the same for faces that slide beside them; elsewhere one node with friction or heat.
-        present_area: the penalty refers to the area and the wall at the beginning of a step, not to the reference
+        elastic_slip: g_s over thickness of the sheet: elastic motion of a point before it slides.
+        separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
+            sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
+            "stick" is False: a point stays in contact until a stage makes the tool inactive. There True lets points in
+            tension separate, for materials that do not relax.
+        nodes_per_step: number of nodes that come into contact in one step (an element edge has two); in three
+            dimensions a percentage of all nodes, default 1. The results of stick, friction and heat exchange depend on
+            the time of gap closure. None: where points stick, and on faces that slide beside them, up to 5 % of the
+            nodes, whose gap closures are predicted in order; elsewhere one node with friction or heat.
+        present_area: True: the penalty refers to area and wall at the beginning of a step instead of the reference
             configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed one. Only
             without friction. The penetration then depends on the steps.
         points: "nodes" of the face, or the number of Gauss points of each facet. Gauss points separate one by one,
             which is smoother where a sheet slides over an edge.
-        direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z): the travel is a control
+        direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z); the travel is a control
             of the run. None: the tool is fixed.
-        name: its name in a process and in its columns.
+        name: name in a process and in columns.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -101,7 +98,7 @@ class Contact(Part):
     """
 
     quantity = "travel"
-    told = ("mu",)
+    described = ("mu",)
     on: str
     tool: Any
     mu: Any
@@ -114,20 +111,20 @@ class Contact(Part):
         if isinstance(tool, type) or not hasattr(tool, "signed_distance"):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
-        self.mu = _coefficient(f"{name}: friction", friction)
-        in_space = self.lagged
-        usually = not in_space or not self.sticks
+        self.mu = coefficient(f"{name}: friction", friction)
+        three_d = self.lagged
+        usually = not three_d or not self.sticks
         self.separates = instance(f"{name}: separates", usually if separates is None else separates, bool,
                                   "True or False")
-        usual = _HELD if in_space or not self.separates else _STICK if self.sticks else _SLIDES
+        usual = _BONDED if three_d or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
-        if not self.separates and not in_space and (self.friction_by_temperature or 0 < self.mu < math.inf):
+        if not self.separates and not three_d and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
                              f" Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
-        self.points = _points(f"{name}: points", points)
+        self.points = contact_points(f"{name}: points", points)
         self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
             raise InputError(f"{name}: friction = {friction!r}, separates = {self.separates!r} with present_area=True:"
@@ -150,7 +147,7 @@ class Contact(Part):
 
     @property
     def sticks(self) -> bool:
-        """True if a point stays where it touched: under "stick", and for a mu of at least 100."""
+        """True if points never slide, under "stick" and for mu of at least 100."""
         return not self.friction_by_temperature and self.mu >= _STICKS
 
     @property
@@ -160,31 +157,43 @@ class Contact(Part):
 
     @property
     def symmetric(self) -> bool:
-        """True without friction or memory: contact then has an energy."""
+        """True for contact without friction and history, which has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates
 
     @property
     def lagged(self) -> bool:
-        """True if points stick from the step after their touch (`LaggedStick`): on tools in three dimensions."""
+        """True if points stick from the step after their gap closure (`LaggedStick`), on tools in three dimensions."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
-        """Return the shear stress at which n points slide under a pressure, shape (n,), and its derivative:
-        Coulomb's mu p.
+        r"""Return the shear stress at which points slide; the default is Coulomb's law.
 
-        A subclass can return another law, which must be 0 without pressure and must not fall as the pressure grows.
+        .. math:: \tau_{max} = \mu p
+
+        A subclass can return another law, which must vanish without pressure and must not decrease with the pressure.
         It is not used for stick.
+
+        Args:
+            pressure: pressure p, shape (n,), stress.
+            mu: coefficient of friction, shape () or (n,).
+
+        Returns:
+            Shear stress, shape (n,), stress; its derivative with respect to the pressure, shape () or (n,).
         """
         return mu * pressure, mu
 
     def friction_at(self, temperature: np.ndarray | None, clamped: bool = False) -> Any:
-        """Return mu: a number, or the values at the temperatures of n points, shape (n,).
+        """Return the coefficient of friction at temperatures.
 
         Args:
-            clamped: True: beyond an end of a table mu has the value at that end, as in a run.
+            temperature: temperatures at n points, shape (n,); not used for a constant coefficient.
+            clamped: True to take, beyond an end of a table, the value at that end, as in a run.
+
+        Returns:
+            mu, a number, or the values at the points, shape (n,).
 
         Raises:
-            InputError: it has no value there, or one below 0.
+            InputError: mu has no value at a temperature, or a negative one.
         """
         if not self.friction_by_temperature:
             return self.mu
@@ -201,14 +210,21 @@ class Contact(Part):
 
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
-        """Return the law for a penalty k (stress/length, shape () or (n,)), a sheet thickness and points, (n, 2).
+        """Return the contact law at points of the face.
 
-        temperature: of the body there, shape (n,), if friction depends on it.
+        Args:
+            k: penalty, shape () or (n,), stress/length.
+            thickness: thickness of the sheet, length.
+            points: reference positions, shape (n, 2), length.
+            temperature: temperature of the body at the points, shape (n,), if friction depends on it.
+
+        Returns:
+            The law.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
             return self.tool.contact_law(self, k, thickness)
-        edge = (1 - _AT_FOOT * self.separates) * theta
+        edge = (1 - _RAMP_EDGE * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + edge, 0.0)
         mu = self.friction_at(temperature, clamped=True)
         shear_limit: Callable | None = self.shear_limit
@@ -218,32 +234,6 @@ class Contact(Part):
 
     def __repr__(self) -> str:
         return f"Contact({self.on!r}, {self.tool!r}, {self.friction!r})"
-
-
-def _coefficient(name: str, friction: Any) -> Any:
-    """mu, infinite for sticking points, or a function of the temperature; an InputError for anything else."""
-    words = {"none": 0.0, "stick": math.inf}
-    if isinstance(friction, str) and friction in words:
-        return words[friction]
-    if isinstance(friction, Table):
-        non_negative(f"{name} = {friction!r}: its least value", float(friction.y.min()))   # monotone between its points
-        return FunctionOfTemperature(friction)
-    if isinstance(friction, FunctionOfTemperature):
-        return friction
-    if isinstance(friction, str) or callable(friction):
-        raise InputError(f"{name} = {friction!r}: must be 'stick', 'none' or a coefficient of friction: a number"
-                         f" or, by temperature, table({{T: mu, ...}}) or of_temperature(f)")
-    return non_negative(name, friction)
-
-
-def _points(name: str, points: Any) -> str | int:
-    """"nodes", or a number of Gauss points; an InputError for anything else."""
-    if isinstance(points, str) and points == "nodes":
-        return points
-    number = count(name, points)
-    if number > _MOST_POINTS:
-        raise InputError(f"{name} = {points!r}: must be at most {_MOST_POINTS} on a facet")
-    return number
 
 
 class Law(NormalLaw):
@@ -318,7 +308,7 @@ class Law(NormalLaw):
         """Return the initial history variables of points at x."""
         d = self.distance(x)
         if self.pulls:                                      # at the outer edge of the ramp it sticks, free of stress
-            d = np.where(np.abs(d / self.theta + 1) < _AT_FOOT, -(1 - _AT_FOOT) * self.theta, d)
+            d = np.where(np.abs(d / self.theta + 1) < _RAMP_EDGE, -(1 - _RAMP_EDGE) * self.theta, d)
         return _touch(x.copy(), d, np.zeros(len(x)))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
@@ -410,7 +400,7 @@ class Law(NormalLaw):
         """
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
-        about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _AT_FOOT
+        about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * _RAMP_EDGE
         touching = (arrived | about) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
         if old is not None:

@@ -1,6 +1,7 @@
-"""Total Lagrangian kinematics of a meridional (or cross-sectional) plane; the only home of 2 pi R.
+"""Total Lagrangian kinematics of a meridional plane, a cross-section, or a sheet in three dimensions.
 
-Coordinates X = (R, Z), displacement u = (u_r, u_z), in the mesh's unit of length.
+Coordinates X = (R, Z), displacement u = (u_r, u_z), in the mesh's unit of length. The factor 2 pi R appears in this
+module only.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..mesh.nodes import COORDINATES
 from .supports import NAMES, Constrained
 
 BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
-"""The entries of the F of a section that are not 0: in its plane, and round the axis or along the depth."""
+"""Nonzero entries of F of a section: in its plane, and in the hoop direction or along the depth."""
 
 
 class Kinematics:
@@ -48,6 +49,13 @@ class Kinematics:
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
         """Return the constraints of a support with components numbered as the coordinates.
 
+        Args:
+            support: the `Support`, for the message.
+            items: its constraints.
+
+        Returns:
+            Constraints with the numbers of the coordinates.
+
         Raises:
             InputError: a component that the body does not have.
         """
@@ -58,32 +66,75 @@ class Kinematics:
         return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
-        """F, shape (3, 3), of the displacement u at the reference point X, both shape (2,)."""
+        """Return the deformation gradient.
+
+        Args:
+            u: displacement (UFL, shape (2,), length).
+            X: reference position (UFL, shape (2,), length).
+
+        Returns:
+            F (UFL, shape (3, 3)).
+        """
         raise NotImplementedError
 
     def weight(self, X: Any) -> Any:
-        """Return the reference volume per unit area of the plane, and reference area per unit length of a line."""
+        """Return the reference volume per area of the plane, which is the reference area per length of a line.
+
+        Args:
+            X: reference position (shape (2,), length).
+
+        Returns:
+            Weight, length; 1 in plane strain.
+        """
         raise NotImplementedError
 
     def area_vector(self, u: Any, X: Any, N: Any) -> Any:
-        """Nanson: J F^-T N with its weight, the current area vector per unit reference length, shape (2,)."""
+        r"""Return the current area vector per unit reference length by Nanson's formula, with its weight.
+
+        .. math:: w(X) \, J F^{-T} N
+
+        Args:
+            u: displacement (UFL, shape (2,), length).
+            X: reference position (UFL, shape (2,), length).
+            N: reference normal (UFL, shape (2,)).
+
+        Returns:
+            Area vector (UFL, shape (2,)).
+        """
         raise NotImplementedError
 
     def rigid_motions(self) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
-        """{name: displacements, shape (n, 2), of points, shape (n, 2)} of the motions that strain nothing."""
+        """Return the rigid motions, which cause no strain.
+
+        Returns:
+            {name: function from points, shape (n, 2), to displacements, shape (n, 2)}.
+        """
         raise NotImplementedError
 
     def mode_gradient(self, mode: Any, X: Any, number: Any) -> Any:
-        """H, shape (3, 3), components (r, z, hoop or depth), by which a mode changes F.
+        r"""Return the change H of F by a circumferential mode.
+
+        .. math:: u_r = U \cos n\theta, \quad u_z = W \cos n\theta, \quad u_\theta = V \sin n\theta
 
         Args:
-            mode: amplitudes (U, W, V) of u_r = U cos, u_z = W cos, u_hoop = V sin, shape (3,); X: shape (2,).
-            number: waves n round the axis, cos(n theta); in plane strain the wave number k along the depth, cos(k x3).
+            mode: amplitudes (U, W, V) (UFL, shape (3,), length).
+            X: reference position (UFL, shape (2,), length).
+            number: number n of waves; in plane strain the wave number k along the depth, cos(k x3).
+
+        Returns:
+            H (UFL, shape (3, 3)), components r, z, and hoop or depth.
         """
         raise NotImplementedError
 
     def rigid_modes(self, number: float) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Modes (U, W, V), shape (n, 3), of points where they are now, shape (n, 2), that strain nothing."""
+        """Return the modes without strain of the deformed body.
+
+        Args:
+            number: number of waves; in plane strain the wave number.
+
+        Returns:
+            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3).
+        """
         raise NotImplementedError
 
 
@@ -108,7 +159,18 @@ class Axisymmetric(Kinematics):
         return 2 * ufl.pi * X[0]
 
     def area_vector(self, u, X, N):
-        """See `Kinematics`; a polynomial of degree 3 in P2 displacements: no division by R."""
+        r"""Return the current area vector; in P2 displacements a polynomial of degree 3 without division by R.
+
+        .. math:: 2 \pi (R + u_r) \, \mathrm{cof}(1 + \nabla u) N
+
+        Args:
+            u: displacement (UFL, shape (2,), length).
+            X: reference position (UFL, shape (2,), length).
+            N: reference normal (UFL, shape (2,)).
+
+        Returns:
+            Area vector (UFL, shape (2,), length).
+        """
         return 2 * ufl.pi * (X[0] + u[0]) * _cofactor(ufl.Identity(2) + ufl.grad(u)) * N
 
     def rigid_motions(self):
@@ -119,7 +181,14 @@ class Axisymmetric(Kinematics):
         return _rows(ufl.grad(mode), [-(number * U + V) / X[0], -number * W / X[0], (number * V + U) / X[0]])
 
     def rigid_modes(self, number):
-        """Return the motions along the axis and about it (n = 0), or across it and tilting it (n = 1)."""
+        """Return the motions along and about the axis (n = 0), or the translation and rotation across it (n = 1).
+
+        Args:
+            number: number of waves n.
+
+        Returns:
+            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3).
+        """
         def mode(*components):
             return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)
         zero, unit = (lambda r, z: 0 * r), (lambda r, z: 1 + 0 * r)
@@ -129,7 +198,7 @@ class Axisymmetric(Kinematics):
 
 
 class PlaneStrain(Kinematics):
-    """A long body, unit depth: F33 = 1, forces and volumes per unit depth.
+    """Plane strain of a long body: F33 = 1, forces and volumes per unit depth.
 
     >>> fx.PlaneStrain().axes, list(fx.PlaneStrain().rigid_motions())
     (('r', 'z'), ['translation along R', 'translation along Z', 'rotation'])
@@ -155,16 +224,23 @@ class PlaneStrain(Kinematics):
         return _rows(ufl.grad(mode), [-number * mode[0], -number * mode[1], number * mode[2]])
 
     def rigid_modes(self, number):
-        """Return the translations and the rotation in the plane, of a mode that is the same all along."""
+        """Return the rigid motions of a mode that is constant along the depth.
+
+        Args:
+            number: wave number along the depth.
+
+        Returns:
+            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3); none for a wave.
+        """
         plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
         return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]
 
 
 class ThreeD(Kinematics):
-    """A sheet in three dimensions, coordinates (x, y, z): a surface with a thickness.
+    """Sheet in three dimensions: a surface with a thickness, coordinates (x, y, z).
 
-    The gradient of a displacement is the surface gradient. In I + grad u the normal is not stretched, so the cofactor
-    of I + grad u gives the area vector; `Surface` adds the stretch through the thickness.
+    The gradient of a displacement is the surface gradient. The normal of I + grad u is not stretched, so its cofactor
+    gives the area vector; `Surface` adds the stretch through the thickness.
 
     >>> fx.ThreeD().axes, fx.ThreeD().coordinates                                       # a reference point is (x, y)
     (('x', 'y', 'z'), 2)
@@ -174,7 +250,15 @@ class ThreeD(Kinematics):
     components = 3
 
     def in_axes(self, support, items):
-        """See `Kinematics`; a hinge constrains all nodes of its rim, along y too."""
+        """Return the constraints of a support; a hinge constrains all nodes of its rim, along y too.
+
+        Args:
+            support: the `Support`.
+            items: its constraints.
+
+        Returns:
+            Constraints with the numbers of the axes.
+        """
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
         return [Constrained(self.axes.index(NAMES[c.component].replace("r", "x")), on=c.on, driven=c.driven)
@@ -190,17 +274,33 @@ class ThreeD(Kinematics):
         return ufl.cofac(self.deformation_gradient(u, X)) * N
 
     def rigid_motions(self):
-        """Out of its plane a flat sheet may turn about a rim that is straight: only its tension resists."""
+        """Return the rigid motions in the plane of the sheet, and its translation normal to the plane.
+
+        A rotation of a flat sheet out of its plane, about a straight rim, is allowed: the tension resists it.
+
+        Returns:
+            {name: function from points, shape (n, 3), to displacements, shape (n, 3)}.
+        """
         return {**{f"translation along {a}": lambda X, k=k: 0 * X + np.eye(3)[k] for k, a in enumerate(self.axes)},
                 "rotation about z": lambda X: np.stack([-X[:, 1], X[:, 0], 0 * X[:, 0]], 1)}
 
 
 def _along_z(X):
+    """Return unit displacements along Z, shape (n, 2)."""
     return np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)
 
 
 def volume_ratio(F):
-    """J = det F; of an F with the block structure of this module the one product that is not zero."""
+    r"""Return the volume ratio of a deformation gradient.
+
+    .. math:: J = \det F
+
+    Args:
+        F: deformation gradient (UFL, shape (3, 3)).
+
+    Returns:
+        J (UFL scalar); for an F with block structure the only nonzero product.
+    """
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
         return J
@@ -208,26 +308,54 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """Return True if F has the block structure of this module: all but the F of a mode, which is a list of entries."""
+    """Return whether a deformation gradient has the block structure of this module.
+
+    Args:
+        F: deformation gradient (UFL, shape (3, 3)).
+
+    Returns:
+        False for the F of a mode, which is a list of entries.
+    """
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 
 
 def invariants(F):
-    """(I1, I2) of C = F^T F: I1 = tr C, I2 = (I1^2 - tr C^2)/2."""
+    r"""Return the first two invariants of C = F^T F.
+
+    .. math:: I_1 = \mathrm{tr}\, C, \qquad I_2 = \tfrac{1}{2} (I_1^2 - \mathrm{tr}\, C^2)
+
+    Args:
+        F: deformation gradient (UFL, shape (3, 3)).
+
+    Returns:
+        I1 and I2 (UFL scalars).
+    """
     C = F.T * F
     I1 = ufl.tr(C)
     return I1, (I1**2 - ufl.inner(C, C)) / 2
 
 
 def sum_of_powers(F, alpha):
-    """lambda_1^alpha + lambda_2^alpha + lambda_3^alpha, smooth where in-plane stretches coincide.
+    r"""Return the sum of powers of the principal stretches, smooth where in-plane stretches coincide.
 
-    With m and d >= 0 the mean and half difference of the in-plane eigenvalues of C, and a = alpha/2, the in-plane
-    part is even in d. Near d = 0 its series in x = (d/m)^2 replaces it, so that value and derivatives have no 0/0;
-    beyond, the small eigenvalue is det C / (m + d), which unlike m - d loses no digits in a thin sheet. At the switch,
-    x = 1e-4, five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5
-    to 10). The F of a mode may have entries across the blocks: it is exact to their second order.
+    .. math:: \lambda_1^\alpha + \lambda_2^\alpha + \lambda_3^\alpha
+
+    Let m and d >= 0 be mean and half difference of the in-plane eigenvalues of C, and a = alpha/2. The in-plane part
+
+    .. math:: (m + d)^a + (m - d)^a
+
+    is even in d. Near d = 0 its series in x = (d/m)^2 avoids 0/0 in value and derivatives. Elsewhere the small
+    eigenvalue is det C / (m + d), which loses no digits in a thin sheet, as m - d does. At the switch x = 1e-4, five
+    terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10). The F of
+    a mode may have entries across the blocks; the sum is exact to their second order.
+
+    Args:
+        F: deformation gradient (UFL, shape (3, 3)).
+        alpha: exponent (UFL scalar or number).
+
+    Returns:
+        The sum (UFL scalar).
     """
     C = F.T * F
     a = alpha / 2
@@ -253,13 +381,16 @@ def _in_plane_determinant(F):
 
 
 def _powers_across(F, b, a):
-    """Return the terms b . g(A) b that the entries b = (C13, C23) add to tr C^a, to second order.
+    r"""Return the terms that the entries b = (C13, C23) add to tr C^a, to second order.
 
-    A is the in-plane part of C, and c = C33.
+    A is the in-plane part of C, x an eigenvalue of A, and c = C33. To second order x becomes x + b^2/(x - c), so the
+    terms are
 
-    An eigenvalue x of A becomes x + b^2/(x - c), and c less, so g(x) = a (x^s - c^s)/(x - c), s = a - 1, and that is
-    a (x c)^(s - 1)/2 sinh(s y)/sinh(y), y = ln(x/c)/2: nothing is lost where stretches coincide. The term is exact
-    where b = 0, in value and first and second derivatives by all entries of F; where d < 1e-8 m, d is taken as 1e-8 m.
+    .. math:: b \cdot g(A) \, b, \qquad g(x) = a \, \frac{x^s - c^s}{x - c}
+              = a \, (x c)^{(s - 1)/2} \, \frac{\sinh(s y)}{\sinh y}, \quad s = a - 1, \quad y = \tfrac{1}{2} \ln(x/c)
+
+    The second form loses no digits where stretches coincide. At b = 0 the terms are exact in value and in first and
+    second derivatives by all entries of F. Where d < 1e-8 m, d is taken as 1e-8 m.
     """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2
@@ -278,7 +409,15 @@ def _powers_across(F, b, a):
 
 
 def cofactor_change(F, H):
-    """Return the first-order change of the cofactor of F, shape (3, 3), for a change H of F."""
+    """Return the first-order change of the cofactor of F.
+
+    Args:
+        F: deformation gradient (UFL, shape (3, 3)).
+        H: change of F (UFL, shape (3, 3)).
+
+    Returns:
+        Change of cof F (UFL, shape (3, 3)).
+    """
     def entry(i, j):
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
         return F[a, c] * H[b, d] + H[a, c] * F[b, d] - F[a, d] * H[b, c] - H[a, d] * F[b, c]
@@ -286,12 +425,15 @@ def cofactor_change(F, H):
 
 
 def _rows(gradient, last):
+    """Return the tensor of a mode: its in-plane gradient, and the last column (UFL, shape (3, 3))."""
     return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 
 def _block(F2, F33):
+    """Return F with an in-plane block and F33 (UFL, shape (3, 3))."""
     return ufl.as_tensor([[F2[0, 0], F2[0, 1], 0], [F2[1, 0], F2[1, 1], 0], [0, 0, F33]])
 
 
 def _cofactor(F2):
+    """Return the cofactor of a tensor of shape (2, 2)."""
     return ufl.as_tensor([[F2[1, 1], -F2[1, 0]], [-F2[0, 1], F2[0, 0]]])

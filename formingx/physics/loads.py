@@ -1,4 +1,4 @@
-"""Loads: each gives its virtual work."""
+"""Loads, defined by their virtual work."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from .part import Part
 
 
 class Load(Part):
-    """The base of all loads, also of a user's own: `virtual_work` is all that it must give.
+    """Base class of loads, also of user-defined ones; a subclass defines at least `virtual_work`.
 
     Args:
-        on: name of the boundary that it acts on; None: it acts in the body.
-        value: a fixed value, in the user's units; None: it is the control of the run.
-        name: its name in a process and in its columns.
+        on: name of the boundary on which it acts; None for a body force.
+        value: fixed value, in the user's units; None: the value is a control of the run.
+        name: name in a process and in columns.
     """
 
     quantity = "load"
@@ -34,30 +34,46 @@ class Load(Part):
         return self.value is None
 
     def virtual_work(self, body: Any, value: Any) -> Any:
-        """Return the virtual work of the load at a value, which may be a UFL expression: a UFL form, linear in
-        `body.du`.
+        """Return the virtual work of the load.
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
+            value: value of the load (UFL scalar, user's units).
+
+        Returns:
+            UFL form, linear in `body.du`.
         """
         raise NotImplementedError
 
     def mode_work(self, body: Any, value: Any) -> Any:
-        """Return the change of the virtual work by a circumferential mode: a UFL form, or None of a dead load.
+        """Return the change of the virtual work by a circumferential mode.
 
-        Bilinear in `body.dmode` and `body.mode`: amplitudes (u_r, u_z, u_hoop), shape (3,), length.
+        The form is bilinear in `body.dmode` and `body.mode`, amplitudes (u_r, u_z, u_hoop), shape (3,), length.
 
         Args:
-            body: as in `virtual_work`; `body.H`, shape (3, 3): the amount by which the mode changes F.
+            body: as in `virtual_work`, with the change `body.H` of F by the mode, shape (3, 3).
+            value: value of the load (UFL scalar, user's units).
+
+        Returns:
+            UFL form; None for a dead load.
+
+        Raises:
+            InputError: the load does not define it.
         """
         raise InputError(f"{self!r}: stability: how it changes with a mode is not known: give the load a method"
                          f" mode_work(body, value) that returns a form, or None if it does not")
 
     def unit(self, body: Any) -> float:
-        """Return the value at which a driven load counts as one: a run takes its steps in parts of it.
+        """Return the value that scales the amplitude of a controlled load.
 
-        By default the forces in the reference configuration then add up to shear modulus times volume over length of
-        the body.
+        By default its forces in the reference configuration add up to shear modulus times volume over length of the
+        body.
+
+        Args:
+            body: a `formingx.forms.loaded_body.LoadedBody`.
+
+        Returns:
+            The value, in the user's units.
         """
         return body.unit(self)
 
@@ -67,17 +83,17 @@ class Load(Part):
 
 
 class Pressure(Load):
-    r"""Follower pressure on a boundary: it stays normal to the deformed face (Song 1993, section 3.3).
+    r"""Follower pressure on a boundary, normal to the deformed face (Song 1993, section 3.3).
 
     .. math:: \delta W = -p \int_{\gamma} n \cdot \delta u \, da = -p \int_{\Gamma} J F^{-T} N \cdot \delta u \, dA
 
-    Nanson's formula pulls the integral back to the reference face, where it is exact. The unsymmetric load stiffness is
-    part of the tangent.
+    Nanson's formula pulls the integral back to the reference face exactly. The unsymmetric load stiffness is part of
+    the tangent.
 
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
-        value: a fixed pressure (stress); None: the pressure is the control of the run.
-        name: its name in a process and in its columns.
+        value: fixed pressure (stress); None: the pressure is a control of the run.
+        name: name in a process and in columns.
 
     >>> scene.driven                                                                  # `trace` finds its value
     Pressure('bottom')
@@ -100,7 +116,14 @@ class Pressure(Load):
         return -value * face.integral(ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
 
     def unit(self, body):
-        """Stress times thickness over length, thickness being the volume of the body over the loaded area."""
+        """Return stress times thickness over length, with the volume of the body over the loaded area as thickness.
+
+        Args:
+            body: a `formingx.forms.loaded_body.LoadedBody`.
+
+        Returns:
+            Pressure, stress.
+        """
         return body.stress * body.thickness(self.on) / body.length
 
 
@@ -110,10 +133,10 @@ class Gravity(Load):
     .. math:: \delta W = -\int_{V} \rho \, g \, \delta u_z \, dV
 
     Args:
-        density: of the body in the reference configuration, above 0, or {layer: density} for layers with weight:
-            kg/m3 with Pa, m and s; t/mm3 with MPa, mm and s.
-        value: the acceleration, length/time^2 (9.81 m/s2 or 9810 mm/s2; below 0: upward); None: the run controls it.
-        name: its name in a process and in its columns.
+        density: density in the reference configuration, positive, or {layer: density} for layers with weight: kg/m3
+            with Pa, m and s; t/mm3 with MPa, mm and s.
+        value: acceleration g, length/time^2 (9.81 m/s2 or 9810 mm/s2; negative: upward); None: a control of the run.
+        name: name in a process and in columns.
 
     >>> fx.Gravity(density=0.95e-9, value=9810.0)                                        # t/mm3, mm/s2
     Gravity(9810.0)
@@ -133,11 +156,14 @@ class Gravity(Load):
 
 
 class CentrifugalLoad(Load):
-    """Centrifugal force of a body that turns about the axis: dW = integral of density omega^2 (R + u_r) du_r.
+    r"""Centrifugal force of a body that rotates about the axis.
+
+    .. math:: \delta W = \int_{V} \rho \, \omega^2 (R + u_r) \, \delta u_r \, dV
 
     Args:
-        density, name: as of `Gravity`.
-        value: omega^2, the square of the angular speed, 1/time^2; None: the run controls it.
+        density: see `Gravity`.
+        value: omega^2, the square of the angular speed, 1/time^2; None: a control of the run.
+        name: name in a process and in columns.
 
     >>> fx.CentrifugalLoad(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
     CentrifugalLoad(10000.0)
@@ -157,7 +183,7 @@ class CentrifugalLoad(Load):
 
 
 def _density(caller: str, given: Any) -> dict[str | None, float]:
-    """{layer: density}; the layer None: all of them."""
+    """Return {layer: density}; the layer None stands for all layers."""
     each = given if isinstance(given, Mapping) else {None: given}
     return {layer: positive(f"{caller}: density", value) for layer, value in each.items()}
 

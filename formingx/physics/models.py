@@ -1,15 +1,17 @@
-r"""Models of a body: a solid, with one of two treatments of its volume, or a membrane.
+r"""Models of a body: a solid with one of two treatments of incompressibility, or a membrane.
 
 Both treatments are the penalty of Song (1993), eq. (3.4.1),
 
-.. math:: W + \frac{\mu}{\epsilon} (I_3 - 1)^2,
+.. math::
+    W + \frac{\mu}{\epsilon} (I_3 - 1)^2,
 
 with a dimensionless eps and the shear modulus mu of the layer. With the pressure p (tension positive) as an unknown the
 same penalty reads
 
-.. math:: W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
+.. math::
+    W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
 
-Both are equal for small J - 1. The second has far better Newton convergence, since the linearised constraint carries no
+Both are equal for small J - 1. The second has far better Newton convergence, since the linearised constraint has no
 wrong stress k (J - 1).
 """
 
@@ -29,7 +31,13 @@ _WRONG = 0.05                              # expected error above which a scene 
 
 
 class Locking(NamedTuple):
-    """Triangles in which "P1dg" locks: the error that is expected, relative, the most slender one, and where it is."""
+    """Triangles in which the element of "P1dg" locks.
+
+    Attributes:
+        error: expected relative error of the bending stiffness.
+        slenderness: largest height over width of a triangle across the thickness.
+        at: place of this triangle.
+    """
 
     error: float
     slenderness: float
@@ -44,8 +52,12 @@ class Locking(NamedTuple):
 
 
 class Model:
-    """Model of a body. Attributes: solid: True if the body has bending and a stress through its thickness;
-    volume_stiffness: see `MixedPressure`."""
+    """Model of a body.
+
+    Attributes:
+        solid: True if the body has bending stiffness and a stress through its thickness.
+        volume_stiffness: see `MixedPressure`.
+    """
 
     solid = True
     volume_stiffness = 0.0
@@ -56,22 +68,35 @@ class Model:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
-        """Raise an InputError if the scene has items that this model cannot have."""
+        """Raise an InputError if the scene has items that this model cannot have.
+
+        Args:
+            scene: the `Scene`.
+        """
 
     def locking(self, mesh: Any) -> Locking | None:
-        """Return the triangles of a mesh in which the elements lock enough for a warning, or None; collective."""
+        """Return the triangles in which the elements lock enough for a warning; collective.
+
+        Args:
+            mesh: the `Mesh`.
+
+        Returns:
+            The triangles, or None.
+        """
         return None
 
 
 class Membrane(Model):
-    """A membrane: the sheet's mid-surface, its thickness as data, for thin sheets (Adkins and Rivlin 1952).
+    r"""Membrane model of a thin sheet: its mid-surface, with the thickness as data (Adkins and Rivlin 1952).
 
-    The stretch through the thickness is 1/(l1 l2), so the volume is kept exactly; layers are bonded and their energies
-    add up. It has no bending, so a rim cannot be clamped, and knows no stress through the thickness.
+    .. math:: \lambda_3 = \frac{1}{\lambda_1 \lambda_2}
+
+    The thickness stretch preserves the volume exactly. Layers are bonded and their energies add up. A membrane has no
+    bending stiffness, so a rim cannot be clamped, and no stress through the thickness.
 
     Args:
-        wrinkles: in three dimensions: the part of the stiffness, up to 1, that is left where the membrane wrinkles
-            (tension-field theory, see `formingx.extensions.space.surface`), 0.01 for one; None: all of it.
+        wrinkles: in three dimensions, part of the stiffness, up to 1, that remains where the membrane wrinkles
+            (tension-field theory, see `formingx.extensions.space.surface`), for example 0.01; None: the full stiffness.
 
     >>> thin = fx.Scene(mesh=sheet, materials=scene.materials, supports=scene.supports, loads=scene.loads,
     ...                 model=fx.Membrane())
@@ -105,7 +130,13 @@ class Membrane(Model):
 
 
 class PressureSpace(NamedTuple):
-    """A pair of elements on triangles: the pressure's, and whether a cubic bubble enriches the P2 displacement."""
+    """Pair of elements on triangles.
+
+    Attributes:
+        family: family of the pressure element.
+        degree: degree of the pressure element.
+        bubble: True if a cubic bubble enriches the P2 displacement.
+    """
 
     family: str
     degree: int
@@ -113,7 +144,7 @@ class PressureSpace(NamedTuple):
 
     @property
     def continuous(self) -> bool:
-        """True if the pressure is continuous inside a layer: it then needs a field of its own in each."""
+        """True if the pressure is continuous within a layer; each layer then needs a field of its own."""
         return self.family == "Lagrange"
 
 
@@ -125,21 +156,25 @@ _SPACES = {
 
 
 class MixedPressure(Model):
-    """A solid with the pressure as an unknown: P2 displacement and one of three pressure spaces.
+    """Solid with the pressure as an unknown: P2 displacement and one of three pressure spaces.
 
-    The pressure jumps across the interface of two materials, in each of them.
+    The pressure may jump across the interface of two materials.
 
     Args:
-        eps: dimensionless penalty parameter; 0 keeps the volume exactly (weakly, in the pressure space).
-        space: "P1": continuous in each layer (Taylor-Hood); "P0": one value in each element, cheap, displacements
-            converge with order 2 instead of 3; "P1dg": linear in each element, the P2 displacement enriched by a cubic
-            bubble (Crouzeix and Raviart 1973). Both of these keep the volume of each element. Triangles of "P1dg" must
-            not be slim across a thick sheet: its inf-sup constant falls as their width over height, and it locks
-            (`locking`); a scene whose triangles would make it wrong by 5 % is refused.
+        eps: dimensionless penalty parameter; 0 preserves the volume exactly (weakly, in the pressure space).
+        space: one of the following pressure spaces.
+
+            - "P1": continuous in each layer (Taylor-Hood).
+            - "P0": constant in each element, cheap; displacements converge with order 2 instead of 3. It preserves the
+              volume of each element.
+            - "P1dg": linear in each element, with a cubic bubble in the displacement (Crouzeix and Raviart 1973). It
+              preserves the volume of each element. Triangles must not be slender across a thick sheet: the inf-sup
+              constant decreases with width over height, and the element locks (`locking`). A scene with an expected
+              error of 5 % is refused.
         volume_stiffness: k over the shear modulus of an additional energy k (J - 1)^2/2 at each point, for example 10.
-            Pressures keep the volume of an element, not of its parts. If the pressure varies in an element by more
-            than the shear modulus, as in a block that is pressed very flat, one part collapses and another opens. The
-            additional energy prevents that; thin sheets on coarse meshes become stiffer. (The grad-div stabilisation of
+            Pressures preserve the volume of an element, not of its parts. If the pressure varies within an element by
+            more than the shear modulus, as in a block pressed very flat, one part collapses and another opens. The
+            additional energy prevents this; thin sheets on coarse meshes become stiffer. (The grad-div stabilisation of
             mixed methods: Olshanskii and Reusken, Mathematics of Computation 73, 2004.)
 
     >>> scene.model
@@ -162,12 +197,23 @@ class MixedPressure(Model):
             raise InputError(f"Scene: {found}")
 
     def locking(self, mesh):
-        """Return triangles so slim across a thick sheet that its bending is too stiff by more than 0.3 %; collective.
+        r"""Return triangles so slender across a thick sheet that bending is too stiff by more than 0.3 %; collective.
 
-        Its inf-sup constant falls as 2 width/height. Hinged sheets 2 to 15 times wider than thick came out wrong by
-        up to 0.3 (height/width) (height/length of the body)^2.5, at most (benchmarks/thickness.py), clamped ones, and
-        blocks that stick between plates, by more; along a thin sheet slim triangles do no harm, and where one of them
-        spans the sheet every pressure space is as wrong.
+        The inf-sup constant decreases as 2 width/height. For hinged sheets 2 to 15 times wider than thick the error is
+        at most (benchmarks/thickness.py)
+
+        .. math::
+            0.3 \, \frac{\text{height}}{\text{width}}
+            \left(\frac{\text{height}}{\text{length of the body}}\right)^{2.5}
+
+        Clamped sheets, and blocks that stick between plates, have larger errors. Along a thin sheet slender triangles
+        do no harm; where one of them spans the sheet, every pressure space is equally wrong.
+
+        Args:
+            mesh: the `Mesh`.
+
+        Returns:
+            The triangles, or None.
         """
         if not self.pressure.bubble:
             return None
@@ -178,7 +224,19 @@ class MixedPressure(Model):
         return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > _TOO_STIFF else None
 
     def terms(self, J, p, modulus, eps):
-        """[(energy density, quadrature metadata)] for J = det F, pressure p and the layer's shear modulus."""
+        r"""Return the energy densities of incompressibility.
+
+        .. math:: p (J - 1) - \frac{\epsilon p^2}{16 \mu}
+
+        Args:
+            J: det F (UFL scalar).
+            p: pressure (UFL scalar, stress).
+            modulus: shear modulus mu of the layer (UFL scalar, stress).
+            eps: penalty parameter (UFL scalar).
+
+        Returns:
+            List of (energy density (UFL, stress), quadrature metadata).
+        """
         density = p * (J - 1)
         if self.eps > 0:
             density = density - eps * p**2 / (16 * modulus)
@@ -186,14 +244,14 @@ class MixedPressure(Model):
 
 
 class DisplacementPenalty(Model):
-    """A solid the thesis' own way: displacements only, the penalty integrated by a reduced rule (section 3.4).
+    """Solid with displacement unknowns only; a reduced rule integrates the penalty (Song 1993, section 3.4).
 
     Args:
-        eps: dimensionless penalty parameter, above 0 (thesis: 2e-2 to 1e-7).
-        points: 3 (interior, degree 2: the usable rule), 4 (degree 3, one weight negative: the tangent
-            becomes indefinite in bending for eps <= 1e-3) or 7 (full: locks).
-        stress_free: False leaves the energy as printed in (3.4.1), not free of stress in the reference
-            configuration: the unloaded body then swells or shrinks to I3 - 1 of the order of eps.
+        eps: dimensionless penalty parameter, positive (thesis: 2e-2 to 1e-7).
+        points: 3 (interior, degree 2: the usable rule), 4 (degree 3, one weight negative: the tangent becomes
+            indefinite in bending for eps <= 1e-3) or 7 (full: locks).
+        stress_free: False keeps the energy as printed in (3.4.1), which has a stress in the reference configuration:
+            the unloaded body then swells or shrinks to I3 - 1 of the order of eps.
 
     >>> fx.DisplacementPenalty(eps=1e-4)
     DisplacementPenalty(eps=0.0001)
@@ -219,7 +277,19 @@ class DisplacementPenalty(Model):
                                  f" no constants that vary over the body, and no histories; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
-        """[(energy density, quadrature metadata)] for J = det F and the layer's shear modulus; p is not used."""
+        r"""Return the energy density of the penalty.
+
+        .. math:: \frac{\mu}{\epsilon} (J^2 - 1)^2
+
+        Args:
+            J: det F (UFL scalar).
+            p: not used.
+            modulus: shear modulus mu of the layer (UFL scalar, stress).
+            eps: penalty parameter (UFL scalar).
+
+        Returns:
+            List of (energy density (UFL, stress), quadrature metadata).
+        """
         rule = _RULES[self.points]
         metadata = {} if rule is None else {
             "quadrature_rule": "custom", "quadrature_points": rule[0], "quadrature_weights": rule[1]}

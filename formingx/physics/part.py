@@ -1,4 +1,4 @@
-"""Common base of loads, supports and contacts: the items of a scene."""
+"""Common base class of the items of a scene: loads, supports and contacts."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from typing import Any
 
 
 class Part:
-    """A load, a support or a contact of a scene; each kind overrides the defaults that are wrong for it.
+    """Load, support or contact of a scene; each kind overrides some of the defaults.
 
     Attributes:
-        name: its name in a process and in its columns; None: it has no name.
-        on: the boundary that it acts on; None: it acts on none.
+        name: name in a process and in columns, or None.
+        on: boundary on which it acts, or None.
         driven: True if the run controls it.
-        quantity: its controlled quantity, such as "pressure" or "travel"; None: it has none.
+        quantity: controlled quantity, such as "pressure" or "travel", or None.
         symmetric: True if its part of the tangent is symmetric.
-        direction: its motion per unit of travel, (r, z) or (x, y, z); None: it does not move as a whole.
+        direction: motion per unit of travel, (r, z) or (x, y, z); None if it does not move as a whole.
         holds_rotation: True if it also constrains the rotation.
-        told: attributes that its repr shows as text: a summary leaves out their numbers.
+        described: attributes that its repr shows as text; a summary leaves out their numbers.
     """
 
     name: str | None = None
@@ -26,8 +26,12 @@ class Part:
     symmetric: Any = False
     direction: tuple[float, float] | None = None
     holds_rotation = False
-    told: tuple[str, ...] = ()
+    described: tuple[str, ...] = ()
 
     def constraints(self) -> list[Any]:
-        """Return the constraints: a list of `Constrained` or `ConstrainedMean`."""
+        """Return the constraints that it imposes.
+
+        Returns:
+            List of `Constrained` and `ConstrainedMean`.
+        """
         return []

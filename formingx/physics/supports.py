@@ -1,4 +1,4 @@
-"""Supports: each gives the displacement components that it constrains, and where."""
+"""Supports, defined by the displacement components that they constrain, or by an energy."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ NAMES = ("r", "z", "y", "x")
 
 
 class Constrained(NamedTuple):
-    """Constraint of one displacement component to 0 at every node of a boundary, or at the node at `point`.
+    """Constraint of one displacement component to 0, at all nodes of a boundary or at one node.
 
-    driven: the component follows the control of the run instead.
+    Attributes:
+        component: number of the component in `NAMES`.
+        on: name of the boundary, or None.
+        point: reference position of the node, (r, z), length, or None.
+        driven: True if the component follows the control of the run instead.
     """
 
     component: int
@@ -27,7 +31,12 @@ class Constrained(NamedTuple):
 class ConstrainedMean(NamedTuple):
     """Constraint of the mean of one displacement component over a boundary to 0, by a Lagrange multiplier.
 
-    by_stiffness: layers count in proportion to their shear modulus, and carry the force in this proportion.
+    Attributes:
+        component: number of the component in `NAMES`.
+        on: name of the boundary.
+        by_stiffness: True if layers count, and carry the force, in proportion to their shear modulus.
+        point: None.
+        driven: False.
     """
 
     component: int
@@ -38,10 +47,10 @@ class ConstrainedMean(NamedTuple):
 
 
 class Support(Part):
-    """The base of all supports, also of a user's own: it gives `constraints`, or `stored_energy`, or both.
+    """Base class of supports, also of user-defined ones; a subclass defines `constraints`, `stored_energy`, or both.
 
     Args:
-        on: name of the boundary that it holds.
+        on: name of the boundary that it supports.
 
     Attributes:
         resists: components, "r" or "z", along which its energy resists a motion of the whole boundary.
@@ -53,17 +62,24 @@ class Support(Part):
         self.on = instance(f"{type(self).__name__}: on", on, str, "the name of a boundary")
 
     def stored_energy(self, body: Any) -> Any:
-        """Energy of an elastic support (stress length^3, per depth length^2): a UFL form of rank 0; None: it has none.
+        """Return the energy of an elastic support.
 
         Its derivative by the displacement enters the residual. In a stage without the support the energy is 0.
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
+
+        Returns:
+            UFL form of rank 0 (stress length^3, per unit depth stress length^2); None if the support has no energy.
         """
         return None
 
     def all_constraints(self) -> list[Constrained | ConstrainedMean]:
-        """`constraints`, and the components that its energy resists."""
+        """Return the constraints, and constraints of the components that the energy resists.
+
+        Returns:
+            List of `Constrained` and `ConstrainedMean`.
+        """
         resisted = (Constrained(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)
         return [*self.constraints(), *resisted]
 
@@ -72,9 +88,9 @@ class Support(Part):
 
 
 class _OneComponent(Support):
-    """Holds one component of the displacement of a boundary, `value` by name."""
+    """Support of one component of the displacement of a boundary."""
 
-    told = ("component",)
+    described = ("component",)
 
     def __init__(self, on: str, name: str, value: str):
         super().__init__(on)
@@ -85,16 +101,16 @@ class _OneComponent(Support):
 
 
 class Symmetry(_OneComponent):
-    """No displacement across a symmetry line that lies along Z (an axis, `normal="r"`) or R (`normal="z"`).
+    """Symmetry line along Z (an axis, `normal="r"`) or R (`normal="z"`), without displacement across it.
 
     If a flat end of the body lies in it, the part continues behind it as the mirror image of the body, and results
     belong to the whole part: see `Scene.symmetry_factor`.
 
     Args:
         on: name of the boundary.
-        normal: the component that is held: "r" or "z"; in three dimensions "x", "y" or "z".
-        mirror: True: modes that are not symmetric to it count too, see `Path.stability`.
-        guide: True: the part ends there and slides along a frictionless wall, so results belong to the body alone.
+        normal: constrained component, "r" or "z"; in three dimensions "x", "y" or "z".
+        mirror: True: antisymmetric modes count too, see `Path.stability`.
+        guide: True: the part ends at a frictionless wall along which it slides, so results belong to the body alone.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
     [Symmetry('axis', 'r'), Symmetry('middle', 'z')]
@@ -116,11 +132,11 @@ class Symmetry(_OneComponent):
 
 
 class Clamped(Support):
-    """All displacements of a boundary are 0.
+    """Clamped boundary, without displacement.
 
-    The corner of a clamped rim is singular: see docs/validation.md for the band that this leaves in a limit pressure.
+    The corner of a clamped rim is singular: docs/validation.md gives the resulting uncertainty of a limit pressure.
 
-    >>> [(held.component, held.on) for held in fx.Clamped("rim").constraints()]          # u_r and u_z
+    >>> [(c.component, c.on) for c in fx.Clamped("rim").constraints()]          # u_r and u_z
     [(0, 'rim'), (1, 'rim')]
     """
 
@@ -131,14 +147,14 @@ class Clamped(Support):
 
 
 class SimplySupported(Support):
-    """A hinge: the mean displacement of a rim face is 0, its rotation and its thinning are free.
+    """Hinge: the mean displacement of a rim face is 0, rotation and thinning of the face are free.
 
-    (Holding one node instead is a point support, which has no limit under mesh refinement.)
+    A support of a single node would be a point support, which has no limit under mesh refinement.
 
     Args:
         on: name of the boundary.
-        weight: "area": the plain mean, so that every layer is pulled with the same traction; "stiffness": layers count
-            by their shear modulus, for layers so different that the soft one could not carry that traction.
+        weight: "area": plain mean, every layer carries the same traction; "stiffness": mean weighted with the shear
+            modulus of the layers, for soft layers that could not carry that traction.
 
     >>> scene.supports
     [Symmetry('axis', 'r'), SimplySupported('rim')]
@@ -157,12 +173,13 @@ class SimplySupported(Support):
 
 
 class PinnedNode(Support):
-    """The displacement of one mesh node is 0: the hinge of the thesis' coarse grids.
+    """Fixed node: the hinge of the thesis' coarse grids.
 
-    A point support in a solid: results drift with mesh refinement. Prefer `SimplySupported`.
+    It is a point support in a solid: results drift with mesh refinement. Prefer `SimplySupported`.
 
     Args:
-        r, z: the node's reference coordinates, unit of the mesh.
+        r: reference radius of the node, length.
+        z: reference height of the node, length.
 
     >>> fx.PinnedNode(10.0, 0.15)
     PinnedNode(10.0, 0.15)
@@ -179,12 +196,12 @@ class PinnedNode(Support):
 
 
 class PrescribedDisplacement(_OneComponent):
-    """One displacement component of a boundary follows the run's control (a length).
+    """Displacement component of a boundary that follows a control of the run (a length).
 
     Args:
         on: name of the boundary.
         component: "r" or "z".
-        name: its name in a process and in its columns.
+        name: name in a process and in columns.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
     ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0),
@@ -205,7 +222,7 @@ class PrescribedDisplacement(_OneComponent):
 
 
 def _component(name: str, value: str) -> int:
-    """Return the number of a component in `NAMES`, which `Kinematics.in_axes` turns into the number of an axis."""
+    """Return the number of a component in `NAMES`."""
     if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
     return NAMES.index(value)

@@ -57,7 +57,13 @@ class Stages(Vectors):
     _stage: Any
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        """Compute the residual F(x, control)."""
+        """Compute the residual F(x, control); sets `force_scale`.
+
+        Args:
+            x: unknowns.
+            control: dimensionless control.
+            out: vector that receives F.
+        """
         raise NotImplementedError
 
     @cached_property
@@ -102,8 +108,7 @@ class Stages(Vectors):
 
         Args:
             state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
-                and
-                memory.
+                and memory.
 
         Yields:
             The problem.

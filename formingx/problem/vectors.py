@@ -73,8 +73,9 @@ class Vectors(Histories):
         self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
-        """Set a vector to a state near the reference configuration with a regular tangent, for the first direction of a
-        path.
+        """Set a vector to a state near the reference configuration with a regular tangent.
+
+        The first direction of a path is computed there.
 
         Args:
             out: vector that receives the state.

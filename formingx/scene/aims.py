@@ -127,8 +127,8 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
     """Return the volume between a flat body and its mould, and an upper bound of its error as a factor.
 
-    Squares outside the tool are counted if they are connected with the body in the reference configuration. The volume
-    is infinite if the mould is open. `_room_of_tube` treats a closed tube.
+    The volume, infinite if the mould is open, is the sum over the squares outside the tool that are connected with the
+    body in the reference configuration. `_room_of_tube` treats a closed tube.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
@@ -161,8 +161,7 @@ def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
         scene: the `Scene`.
         contact: contact with the mould.
         line: outer face in the reference configuration, from one end to the other, shape (n, 2), length. The volume
-            that
-            it encloses does not count.
+            that it encloses does not count.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

@@ -40,14 +40,12 @@ class Scene:
         supports: list of supports, see `formingx.physics.supports`.
         loads: list of loads, see `formingx.physics.loads`. A run controls one load, support or tool; a
             `formingx.Process` controls several. Contacts of one tool with several faces, of the same `direction` and
-            name,
-            count as one.
+            name, count as one.
         contacts: list of contacts of faces with rigid tools, see `formingx.Contact`.
         model: `MixedPressure()` (default) or `DisplacementPenalty()` for a solid; `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; for a sheet in three dimensions `ThreeD()`.
         quadrature_degree: degree of the quadrature of the energy, at most 30; default 5 (seven points), the thesis'
-            rule;
-            in three dimensions 1.
+            rule; in three dimensions 1.
         temperature: temperature of the body, on which material constants may depend: a number, a `table` over R, a
             function of arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx
             Function.
@@ -74,9 +72,7 @@ class Scene:
 
     Raises:
         InputError: an unknown or empty tag; a layer without material; insufficient support; a mesh with R < 0,
-            overlapping
-            or inverted elements; two controlled items with the same name or without names.
-
+            overlapping or inverted elements; two controlled items with the same name or without names.
 
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top

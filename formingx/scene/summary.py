@@ -32,7 +32,7 @@ def summary(scene: Any) -> dict[str, str]:
             usual = {name: p.default for name, p in signature(type(item)).parameters.items()}
             numbers = "".join(f", {name.replace('_', ' ')} {value!r}" for name, value in vars(item).items()
                               if isinstance(value, int | float) and repr(value) not in text(item)
-                              and name not in item.told and value != usual.get(name))
+                              and name not in item.described and value != usual.get(name))
             lines[f"{kind[:-1]} {k}"] = text(item) + numbers + (" (driven)" if item.driven else "")
     return lines | {"model": text(scene.model), "kinematics": text(scene.kinematics),
                     "quadrature degree": str(scene.quadrature_degree),

@@ -89,8 +89,7 @@ class MirrorPlanes:
         """Return the ratio of the force on a whole tool or support to the force on its modelled part.
 
         A plane counts if the tool reaches it, because the tool then continues on the other side. It does not count if
-        the
-        force has a component across it: the images of this component cancel, and the force on one side is meant.
+        the force has a component across it: the images of this component cancel, and the force on one side is meant.
 
         Args:
             extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),
@@ -112,8 +111,7 @@ class MirrorPlanes:
         Args:
             components: number of components of x.
             extent: lowest and highest coordinates of a tool, shape (2, components), length; planes that the tool
-                crosses are
-                left out.
+                crosses are left out.
 
         Returns:
             List of (scale, shift), shape (components,) each; the first is the identity.

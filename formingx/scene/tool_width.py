@@ -40,9 +40,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
-    """Raise an InputError if a closed tool is narrower than the distance of contact points on the nearest part of the
-    face.
-    """
+    """Raise an InputError if a closed tool is narrower than the distance of the contact points nearest to it."""
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])

@@ -1,0 +1,59 @@
+"""Checks of the arguments of a contact."""
+
+import math
+from typing import Any
+
+from ..errors import InputError, count, non_negative
+from ..values.table import Table
+from ..values.temperature import FunctionOfTemperature
+
+_MOST_POINTS = 100
+"""Largest number of Gauss points on a facet."""
+
+
+def coefficient(name: str, friction: Any) -> Any:
+    """Check a coefficient of friction.
+
+    Args:
+        name: name of the argument, for messages.
+        friction: "stick", "none", a number, a `Table` or a `FunctionOfTemperature`.
+
+    Returns:
+        mu, infinite for sticking points, or a function of the temperature.
+
+    Raises:
+        InputError: another value, or a negative coefficient.
+    """
+    words = {"none": 0.0, "stick": math.inf}
+    if isinstance(friction, str) and friction in words:
+        return words[friction]
+    if isinstance(friction, Table):
+        non_negative(f"{name} = {friction!r}: its least value", float(friction.y.min()))   # monotone between its points
+        return FunctionOfTemperature(friction)
+    if isinstance(friction, FunctionOfTemperature):
+        return friction
+    if isinstance(friction, str) or callable(friction):
+        raise InputError(f"{name} = {friction!r}: must be 'stick', 'none' or a coefficient of friction: a number"
+                         f" or, by temperature, table({{T: mu, ...}}) or of_temperature(f)")
+    return non_negative(name, friction)
+
+
+def contact_points(name: str, points: Any) -> str | int:
+    """Check the choice of contact points.
+
+    Args:
+        name: name of the argument, for messages.
+        points: "nodes", or a number of Gauss points of each facet.
+
+    Returns:
+        The same value.
+
+    Raises:
+        InputError: another value.
+    """
+    if isinstance(points, str) and points == "nodes":
+        return points
+    number = count(name, points)
+    if number > _MOST_POINTS:
+        raise InputError(f"{name} = {points!r}: must be at most {_MOST_POINTS} on a facet")
+    return number
