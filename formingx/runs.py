@@ -408,7 +408,7 @@ def _carried(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         error.path = path = so_far()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
             _end(path, str(error), path.findings() if path.record.on_end else [])
-        if getattr(error, "diagnosis", None) is not None:
+        if isinstance(error, ConvergenceError) and error.diagnosis is not None:
             raise copy.copy(error) from None                # its diagnosis tells the cause: no traceback of the solver
         raise
     except KeyboardInterrupt:

@@ -32,9 +32,9 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
         ("", material, 1.0)]
     rates = [positive(f"{caller}: rates", rate) for rate in several(f"{caller}: rates", rates, "rates")]
     parts = [_limits(name, entry, shift, unit, unit_of_time) for name, entry, shift in cases]
-    picture = _picture(cases, rates if hasattr(material, "constant_rate") else [], unit, unit_of_time)
-    if (tested := getattr(material, "tested", None)) is not None:
-        parts.append(tested.rows())
+    picture = _picture(cases, rates if material.equilibrium is not material else [], unit, unit_of_time)
+    if material.tested is not None:
+        parts.append(material.tested.rows())
     rows = "".join(f"<tr><td>{html.escape(a)}</td><td>{html.escape(b)}</td></tr>" for part in parts for a, b in part)
     path.write_text(_PAGE.format(title=html.escape(type(material).__name__), card=html.escape(str(material)), rows=rows,
                                  picture=picture), encoding="utf-8")
@@ -57,16 +57,15 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
         largest = material.largest_stretch(mode)
         if np.isfinite(largest):
             rows.append((f"largest stretch, {mode}", said(largest)))
-    for mode in MODES if hasattr(material, "rupture_stretch") else ():
+    for mode in MODES:
         if np.isfinite(most := material.rupture_stretch(mode)):
             rows.append((f"stretch at which it ruptures when stretched suddenly, {mode}", said(most)))
-    branches = getattr(material, "spectrum", getattr(material, "branches", []))
-    if branches:
-        times = [shift * tau for _, tau in branches]
+    if material.branches:
+        times = [shift * tau for _, tau in material.branches]
         rows.append(("relaxation times", f"{min(times):.3g} to {max(times):.3g} {unit_of_time}"))
         rest = material.equilibrium
         rows.append(("relaxed shear modulus", said(rest.shear_modulus if rest else 0.0, unit)))
-    elif not material.internal and not hasattr(material, "constant_rate"):
+    elif not material.internal and material.equilibrium is material:
         stable = material.check_stability((0.5, min(_MOST, _PART * material.largest_stretch("equibiaxial"))))
         low, high = stable.drucker["equibiaxial"]
         rows.append(("stable (Drucker), equibiaxial", f"from {low:.3g} to {high:.3g} of the range that was looked at"))

@@ -49,6 +49,7 @@ class Material:
         stores_energy: True if `stored_energy` is defined.
         symmetric: True if the tangent is symmetric.
         tested: the tests that its constants come from (a `MeasuredRange`), or None: not known.
+        branches: [(modulus, relaxation time)] of a material that relaxes.
     """
 
     parameters: dict[str, Any]
@@ -60,6 +61,7 @@ class Material:
     stores_energy: Any = True
     symmetric: Any = True
     tested: Any = None
+    branches: Any = ()
 
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
@@ -135,6 +137,16 @@ class Material:
         return np.unique(columns, axis=1) if columns.size else columns
 
     @property
+    def base(self) -> Material:
+        """The material without solidification."""
+        return self
+
+    @property
+    def equilibrium(self) -> Material | None:
+        """The material that is left when all has relaxed, or None."""
+        return self
+
+    @property
     def largest_I1(self) -> float:
         """The value of I1 at which the energy is infinite; infinity if there is none."""
         return math.inf
@@ -207,6 +219,10 @@ class Material:
         from scipy.optimize import brentq
         k = MODES[mode]
         return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
+
+    def rupture_stretch(self, mode: str) -> float:
+        """Return the sudden stretch of a test beyond which the force falls; infinity if it does not."""
+        return math.inf
 
     def check_stability(self, stretches: Any) -> Stability:
         """Return the ranges of stretch in which the material is stable, in each of the three tests.

@@ -132,7 +132,7 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
-    if getattr(scene.mesh, "columns", None) is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
+    if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
         return _room_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _ROOMY[1]
     low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)

@@ -42,7 +42,7 @@ def summary(scene: Any) -> dict[str, str]:
 
 def _temperatures(scene: Any) -> list[float]:
     """Return the temperatures that a scene gives as numbers: those for its tools, and the initial one of the body."""
-    tools = [given.tool for given in scene.heat.tools.values()] if hasattr(scene.heat, "tools") else []
+    tools = [given.tool for given in scene.heat.tools.values()] if scene.heat is not None else []
     first = scene.temperature.T.x.array if scene.temperature is not None else []
     even = len(first) and np.ptp(first) == 0
     found = [*(t for t in tools if isinstance(t, int | float)), *(first[:1] if even else ())]
@@ -52,7 +52,7 @@ def _temperatures(scene: Any) -> list[float]:
 def _material(item: Any, temperatures: list[float]) -> str:
     """Return `text` of a material, with values in place of unnamed functions of the temperature."""
     found = text(item)
-    for value in getattr(item, "parameters", {}).values():
+    for value in item.parameters.values():
         if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):
             values = []
             for T in temperatures:

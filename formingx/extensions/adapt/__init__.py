@@ -12,7 +12,7 @@ class _Adaptation:
     """`MeshAdaptation` of runs with a pilot run."""
 
     def check(self, mesh: Any) -> None:
-        if not hasattr(mesh, "of_size"):                     # a sheet in three dimensions
+        if mesh.domain.geometry.dim == 2:
             of_columns(mesh)
 
     def make(self, path: Any, options: Mapping[str, float]) -> Mesh:

@@ -74,8 +74,7 @@ def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
 
 def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
     """Return (layer, tests) of each layer whose material has a record of its tests."""
-    found = [(layer, getattr(getattr(material, "base", material), "tested", None))
-             for layer, material in scene.materials.items()]
+    found = [(layer, material.base.tested) for layer, material in scene.materials.items()]
     return [(layer, tested) for layer, tested in found if tested is not None]
 
 

@@ -90,7 +90,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
     for layer, material in scene.materials.items() if np.isfinite([low, high]).all() else ():
         if isinstance(material, Solidification):            # the stiffness added on cooling is free of stress
             continue
-        relaxed = getattr(material, "equilibrium", material)
+        relaxed = material.equilibrium
         for name, value in {} if relaxed is None else relaxed.constants().items():
             if not isinstance(value, OfTemperature):
                 continue

@@ -58,6 +58,7 @@ class KBKZ(Relaxing):
         super().__init__(equilibrium)
         self.spectrum = [(positive(f"KBKZ: G_{k}", G), positive(f"KBKZ: tau_{k}", tau))
                          for k, (G, tau) in enumerate(checked_pairs("KBKZ: spectrum", spectrum, "G, tau"), 1)]
+        self.branches = self.spectrum
         G, tau = np.array(self.spectrum).T
         if len(G) > 2 and np.all(np.diff(G[np.argsort(tau)]) > 0) and np.ptp(np.log(G)) > 3:
             raise InputError(f"KBKZ: spectrum = {spectrum!r}: the moduli grow with the times, from {G.min():g} to"

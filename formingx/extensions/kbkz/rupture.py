@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
 from ...mesh.nodes import COORDINATES
@@ -14,11 +16,8 @@ from .past_states import PastStates
 def ruptures(body: Any) -> Iterator[Finding]:
     """Draws beyond the equibiaxial `rupture_stretch` of a material."""
     for name, material in body.scene.materials.items():
-        melt = getattr(material, "base", material)
-        if not hasattr(melt, "rupture_stretch"):
-            continue
-        most = melt.rupture_stretch("equibiaxial")
-        for about, stretch in expected_stretches(body):
+        most = material.base.rupture_stretch("equibiaxial")
+        for about, stretch in expected_stretches(body) if np.isfinite(most) else ():
             if stretch > most:
                 yield Finding("warning", f"materials[{name!r}]",
                               f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly"
@@ -35,8 +34,8 @@ def thins(failure: Any) -> Iterator[Finding]:
         return
     problem, drawn = failure.problem, None
     with problem.state_context(failure.last):
-        for past in (history for history in getattr(problem, "materials", ()) if isinstance(history, PastStates)):
-            most = getattr(past.material, "base", past.material).rupture_stretch("equibiaxial")
+        for past in (history for history in problem.materials if isinstance(history, PastStates)):
+            most = past.material.base.rupture_stretch("equibiaxial")
             least, point = past.thinnest()
             if (stretch := least**-0.5) > max(most, drawn[0] if drawn else 0.0):
                 drawn = stretch, most, place(problem.scene.mesh, point[:COORDINATES])

@@ -118,8 +118,7 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
     elif scene.expansion:
         why = "thermal expansion"
     elif any(type(support).stored_energy is not Support.stored_energy or any(
-            getattr(constraint, "point", None) is not None for constraint in support.all_constraints())
-            for support in scene.supports):
+            constraint.point is not None for constraint in support.all_constraints()) for support in scene.supports):
         why = "a support at a node, or an elastic one"
     elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
         why = "a contact with separates=False, or at Gauss points"

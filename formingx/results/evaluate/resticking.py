@@ -46,9 +46,9 @@ def furthest(path: Any) -> Resticking | None:
         The point, or None if no gap closed again.
     """
     found = []
-    for number, contact in enumerate(path.problem.histories):
-        definition = getattr(contact, "contact", None)
-        if definition is None or definition.lagged or not (definition.sticks and definition.separates):
+    for number, contact in enumerate(c for c in path.problem.contacts if c.remembers):      # the first histories
+        definition = contact.contact
+        if definition.lagged or not (definition.sticks and definition.separates):
             continue
         touches = [state.memory[number].touch for state in path.segments[-1].states
                    if len(state.memory) > number and state.memory[number] is not None]

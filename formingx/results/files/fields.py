@@ -32,6 +32,7 @@ from ... import _compat, figures
 from ...errors import InputError
 from ...measures.relaxed import ElasticStretches
 from ...mesh.nodes import nearest, own_cells
+from ...solve.state import State
 from .. import files
 from ..evaluate.contact_face import ContactFace
 
@@ -188,8 +189,8 @@ def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
         if states != "all":
             raise InputError(f"states = {states!r}: must be states of the path, or 'all'")
         states = path.states
-    states = [path.last] if states is None else [states] if hasattr(states, "control") else list(states)
-    if not states or not all(hasattr(state, "control") for state in states):
+    states = [path.last] if states is None else [states] if isinstance(states, State) else list(states)
+    if not states or not all(isinstance(state, State) for state in states):
         raise InputError(f"states = {states!r}: must be one or more states of the path, or 'all'")
     numbers = {id(state): k for k, state in enumerate(path.states)}
     found = [numbers.get(id(state), k) for k, state in enumerate(states)]
