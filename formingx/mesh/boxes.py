@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 _MOST = 2**18           # pairs looked at together
+_FEW = 128              # boxes up to which a tree costs more than all their pairs
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -12,7 +13,10 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
 
     low, high: the boxes' corners, shape (n, 2), finite.
     """
-    if len(low) < 2:
+    if len(low) <= _FEW:
+        i, j = np.nonzero(np.all((low[:, None] <= high) & (low <= high[:, None]), axis=2))
+        if len(low) > 1:
+            yield i[i < j], j[i < j]
         return
     order = np.argsort(_along_a_curve((low + high) / 2), kind="stable")
     depth = int(np.ceil(np.log2(len(low))))

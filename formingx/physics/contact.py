@@ -326,12 +326,14 @@ class Law(NormalLaw):
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
         at = d if expected is None else expected.distance
-        held = self._held(old)
+        held, zero = self._held(old), np.zeros(len(x))
+        if at.max(initial=-np.inf) <= -self.theta and not np.any(held):         # no point touches
+            return Tractions(np.zeros(x.shape), zero, zero, zero, lambda: np.zeros((*x.shape, x.shape[1])),
+                             lambda: _touch(x, d, zero))
         F, slope = self.ramp(at, held)
         pressed, ahead = k * F, d - at
         N = pressed + k * slope * ahead
         force = N[:, None] * n
-        zero: np.ndarray = np.zeros(len(x))
         kept_at = np.where(held, np.maximum(d, 0.0), d) if self.remembers else d            # it stays in contact
         if not self.has_friction:
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)

@@ -34,6 +34,7 @@ class EventSettings:
     Attributes:
         iterations: maximum number of equilibrium iterations per event.
         to_tools: contact iterations that project closed points onto curved tools.
+        to_surface: largest number of Newton iterations that locate a closure on its surface.
         changes: maximum number of status changes (slip, opening) between two gap closures.
         taken_over: sliding points of the start state get their own forces only up to this number of points.
         same_place: convergence tolerance of a sticking point: its motion over its tributary length.
@@ -48,6 +49,7 @@ class EventSettings:
 
     iterations: int = 8
     to_tools: int = 4
+    to_surface: int = 3
     changes: int = 100
     taken_over: int = 80
     same_place: float = 1e-3
@@ -327,13 +329,12 @@ class ContactEventSequence:
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
             law, by = face.law.part([i]), 0.0
-            near = law.nearest(x)
-            for _ in range(3):
+            for _ in range(_SETTINGS.to_surface):
+                near = law.nearest(x + by * w)
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
                 if abs(gap) < _SETTINGS.same_place * law.theta or not rate > 0:
                     break
                 by = max(by - gap / rate, self._pieces[-1].begins - time)
-                near = law.nearest(x + by * w)
             closure = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
                                  bool(np.isinf(np.ravel(law.friction)[0])))
         return self._comm.bcast(closure, root=rank)

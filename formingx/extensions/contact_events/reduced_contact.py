@@ -300,8 +300,10 @@ class Points:
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
         turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
-        size = len(self._C)
-        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), self._S - turn).reshape(size, size)
+        size, stiffness = len(self._C), self._S - turn
+        if not stiffness.any():
+            return ReducedSystem(u.ravel(), self._C, turn)
+        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), stiffness).reshape(size, size)
         found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
         return ReducedSystem(found[:, 0], found[:, 1:], turn)
 
@@ -316,25 +318,22 @@ class Points:
         # one unknown force along each way: normal and tangent of sticking points, the slip line of sliding points
         point = np.concatenate([sticks, sticks, slides])
         into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
-        against = into.copy()
-        against[2 * len(sticks):] += (mu * status)[slides, None] * near.tangent[slides]
-        rows = c * point[:, None] + np.arange(c)
-        B, each = np.zeros((len(free), len(point))), np.arange(len(point))
-        B[rows, each[:, None]] = against
-        moves = by @ B
-        gives = (moves[rows] * into[:, :, None]).sum(1)
-        along = (free.reshape(m, c)[point] * into).sum(1)
+        along = (mu * status)[slides, None] * near.tangent[slides]
+        against = np.concatenate([into[:2 * len(sticks)], near.normal[slides] + along])
+        each, columns = np.arange(len(point))[:, None], c * point[:, None] + np.arange(c)
+        A, B = np.zeros((len(point), len(free))), np.zeros((len(free), len(point)))
+        A[each, columns], B[columns, each] = into, against
+        gives, a = A @ by @ B, np.zeros(len(point))
         largest = np.abs(gives).max(1, initial=0.0)
         most = largest.max(initial=0.0)
         stiff = np.flatnonzero(largest < _SEARCH.none * most)
         gives[stiff, stiff] = most                          # along a support, or across the axis, nothing moves
         if to is not None:
             n = 2 * len(sticks)
-            along[:n] -= (to[point[:n]] * into[:n]).sum(1)
-            along[n:] -= near.beyond[slides]
+            a[:n], a[n:] = np.einsum("ni,ni->n", to[point[:n]], into[:n]), near.beyond[slides]
         if slips is not None:
-            k = each[len(sticks):2 * len(sticks)]
+            k = each[len(sticks):2 * len(sticks), 0]
             gives[k, k] += slips[sticks]
-        size_of = np.linalg.solve(gives, along)
-        dx = (free - moves @ size_of).reshape(m, c)
+        size_of = np.linalg.solve(gives, A @ free - a)
+        dx = (free - by @ (B @ size_of)).reshape(m, c)
         return (B @ size_of).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx
