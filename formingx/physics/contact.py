@@ -326,7 +326,8 @@ class Law(NormalLaw):
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
         at = d if expected is None else expected.distance
-        held, zero = self._held(old), np.zeros(len(x))
+        held = self._held(old)
+        zero: np.ndarray = np.zeros(len(x))
         if at.max(initial=-np.inf) <= -self.theta and not np.any(held):         # no point touches
             return Tractions(np.zeros(x.shape), zero, zero, zero, lambda: np.zeros((*x.shape, x.shape[1])),
                              lambda: _touch(x, d, zero))
