@@ -61,20 +61,20 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
         For each item the object of FFCx, a module with its `ffi`, and an empty (declaration, implementation).
 
     Raises:
-        RuntimeError: the compiler failed, on all ranks.
+        RuntimeError: the compiler failed, or on other ranks than 0: FFCx refused an item.
     """
-    folder, found, failure = Path(jit_options["cache_dir"]) / "formingx", {}, None
+    folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
         try:
             found = _opened(items, folder, form_options, jit_options)
-        except RuntimeError as error:
-            failure = str(error)
-    failure = comm.bcast(failure)
-    if failure is not None:
+        except BaseException as error:
+            comm.bcast(str(error))
+            raise
+        comm.bcast(None)
+        return found
+    if (failure := comm.bcast(None)) is not None:
         raise RuntimeError(failure)
-    if comm.rank != 0:                                  # another machine may not see the folder of rank 0
-        found = _opened(items, folder, form_options, jit_options)
-    return found
+    return _opened(items, folder, form_options, jit_options)       # another machine may not see the folder of rank 0
 
 
 def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]

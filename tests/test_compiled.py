@@ -66,6 +66,23 @@ def test_a_form_is_compiled_once(calls, tmp_path, domain):
     assert len(calls) == 1 and len(kept(tmp_path)) == 1
 
 
+def test_a_run_calls_the_compiler_a_few_times(monkeypatch):
+    """The forms of a path together, those of the columns together; volume and area, which scale them, come before."""
+    calls, together = [], _jit.compile_together
+    monkeypatch.setattr(_jit, "compile_together", lambda comm, items, *more: calls.append(len(items)) or together(
+        comm, items, *more))
+    monkeypatch.setattr(_compat, "_compiled", {})
+    pot = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(10, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="vacuum")],
+                     contacts=[fx.Contact("top", pot.mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", pot.plug, "none", direction=(0, 1), name="plug")])
+    path = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(2.0))], progress=False)
+    assert calls == [1, 1, 8, 4]
+    path.stress()
+    assert calls == [1, 1, 8, 4, 2]
+
+
 def test_an_interruption_leaves_nothing_that_counts(calls, tmp_path, monkeypatch, domain):
     """Neither a compiler that is stopped, nor a file that was written in part."""
     def interrupted(command, code):

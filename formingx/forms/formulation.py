@@ -7,6 +7,7 @@ user's units, and the solver works with numbers of order one.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import basix.ufl
@@ -276,6 +277,23 @@ class Formulation(BodyModel):
                 " was killed leaves such a wait behind: if no other run is going on, remove the folder"
                 " .cache/fenics") from error
 
+    def compile_ahead(self, *forms: Any) -> None:
+        """Compile forms by one call of the C compiler (collective); `compile` returns them at once then.
+
+        Args:
+            forms: UFL forms; None is left out.
+        """
+        _compat.compile_ahead(self.comm, [form for form in forms if form is not None])
+
+    @cached_property
+    def tangent(self) -> Any:
+        """Derivative of the residual with respect to the unknowns, a bilinear form."""
+        return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
+
+    def of_every_path(self) -> list[Any]:
+        """Return the forms that each path uses, some of them None."""
+        return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row()]
+
     def integral(self, form: Any) -> float:
         """Compute an integral over all ranks; the form is compiled for this one use.
 
@@ -336,7 +354,15 @@ class Formulation(BodyModel):
         Returns:
             Volume of the body over the area of the boundary, length.
         """
-        return self.volume / self.integral(self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1])
+        return self.volume / self.integral(self.area(boundary))
+
+    def area(self, boundary: str) -> Any:
+        """Return the scalar form of the area of a boundary in the reference configuration.
+
+        Args:
+            boundary: name of the boundary.
+        """
+        return self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1]
 
     @property
     def clock(self) -> float:

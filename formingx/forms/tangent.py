@@ -24,8 +24,8 @@ class Tangent:
     """
 
     def __init__(self, forms: Any, constraints: Constraints, symmetric: bool):
-        scene, tangent = forms.scene, ufl.derivative(forms.residual, forms.w, ufl.TrialFunction(forms.space))
-        self.matrix = ExtendedMatrix(forms.compile(tangent), forms.space.dofmap.index_map,
+        scene = forms.scene
+        self.matrix = ExtendedMatrix(forms.compile(forms.tangent), forms.space.dofmap.index_map,
                                      [e.bc for e in constraints.entries], [row for _, row in constraints.means],
                                      forms.comm, symmetric)
         self._by_load, self._by_time = (form and forms.compile(form)
@@ -34,7 +34,7 @@ class Tangent:
         self._by_motion = self._lift = None
         if constraints.can_move:
             self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
-            self._by_motion = forms.compile(ufl.action(tangent, self._lift))
+            self._by_motion = forms.compile(ufl.action(forms.tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
         """Set the constraints and the rates of a stage.

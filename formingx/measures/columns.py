@@ -9,7 +9,17 @@ from ..errors import InputError
 from ..physics.loads import Gravity
 from .forces import resisting, support_factor, tool_factor
 from .relaxed import PoleStressRatio
-from .targets import Amplitude, Bound, OfWholePart, Sag, Target, bind_pole_height, bind_pole_stretch, bind_volume
+from .targets import (
+    Amplitude,
+    Bound,
+    OfWholePart,
+    Sag,
+    Target,
+    bind_pole_height,
+    bind_pole_stretch,
+    bind_volume,
+    swept_volume,
+)
 
 Measure = Target | Callable[[Any], float]
 """Quantity of a user's own column, see `formingx.trace`."""
@@ -137,14 +147,17 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         found["pole_stretch"] = bind_pole_stretch(problem)
     if any(isinstance(load, Gravity) for load in scene.loads):
         found["sag"] = Sag(problem)
-    if any(item.quantity == "pressure" for item in scene.drivable):
-        found["enclosed_volume"] = bind_volume(problem)
+    pressed = any(item.quantity == "pressure" for item in scene.drivable)
     change = forms.J - 1
+    mass, error = change * forms.weight * forms.dx, change**2 * forms.weight * forms.dx
+    forms.compile_ahead(swept_volume(problem) if pressed else None, forms.energy, mass, error, forms.dissipation,
+                        forms.damage_energy)
+    if pressed:
+        found["enclosed_volume"] = bind_volume(problem)
     if forms.energy is not None:
         found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * energy)
-    found["mass_error"] = _Scalar(problem, change * forms.weight * forms.dx, lambda v: v / volume)
-    found["volume_error"] = _Scalar(problem, change**2 * forms.weight * forms.dx,
-                                    lambda v: (v / volume) ** 0.5)
+    found["mass_error"] = _Scalar(problem, mass, lambda v: v / volume)
+    found["volume_error"] = _Scalar(problem, error, lambda v: (v / volume) ** 0.5)
     if forms.dissipation is not None:
         found["dissipated_power"] = _Scalar(problem, forms.dissipation, lambda v: v * energy)
         if PoleStressRatio.known(problem):

@@ -1,5 +1,6 @@
 """Targets of a run: pole height, stretch, volume, pressure, travel, time."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,9 +118,12 @@ class _Form(Bound):
 
     def __init__(self, problem, form, scale, offset=0.0):
         self._problem, self._scale, self._offset = problem, scale, offset
-        self._value = problem.forms.compile(form)
-        self._derivative = problem.forms.compile(
-            ufl.derivative(form, problem.forms.w, problem.forms.test_function()))
+        self._form, self._value = form, problem.forms.compile(form)
+
+    @cached_property
+    def _derivative(self):
+        forms = self._problem.forms
+        return forms.compile(ufl.derivative(self._form, forms.w, forms.test_function()))
 
     def value(self, x, control):
         self._problem.set_state(x, control)
@@ -323,10 +327,24 @@ def bind_volume(problem: Any) -> Bound:
 
 
 def _volume(problem: Any) -> Bound:
-    """Return the volume swept by the body as modelled: minus the integral of u . n da over the driven face.
+    """Return the volume swept by the body as modelled."""
+    so_far = 0.0
+    if problem.scene.preformed is not None:
+        old, state = problem.scene.preformed.before
+        with old.state_context(state):
+            so_far = _volume(old).value(old.x, state.control)
+    return _Form(problem, swept_volume(problem), _unit_of_volume(problem.forms), so_far)
 
-    The face goes from X to X + u. The area vector of X + t u is of degree 2 in t (axisymmetric): Gauss's rule with two
-    points in t is exact.
+
+def _unit_of_volume(forms: Any) -> float:
+    return forms.length**forms.scene.kinematics.dimension_of_volume
+
+
+def swept_volume(problem: Any) -> Any:
+    """Return the scalar form of the volume that the body as modelled sweeps, over the unit of volume.
+
+    It is minus the integral of u . n da over the driven face. The face goes from X to X + u. The area vector of X + t u
+    is of degree 2 in t (axisymmetric): Gauss's rule with two points in t is exact.
     """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
@@ -334,14 +352,8 @@ def _volume(problem: Any) -> Bound:
         raise InputError(f"enclosed_volume: the scene has {what} it")
     kinematics, forms = problem.scene.kinematics, problem.forms
     N, face = forms.face(driven.on, 5)
-    scale = forms.length**kinematics.dimension_of_volume
     swept = sum(ufl.inner(forms.u, kinematics.area_vector(forms.constant(t) * forms.u, forms.X, N)) for t in _GAUSS)
-    so_far = 0.0
-    if problem.scene.preformed is not None:
-        old, state = problem.scene.preformed.before
-        with old.state_context(state):
-            so_far = _volume(old).value(old.x, state.control)
-    return _Form(problem, -swept / forms.constant(2 * scale) * face, scale, so_far)
+    return -swept / forms.constant(2 * _unit_of_volume(forms)) * face
 
 
 def _displacement(problem, points, factors):

@@ -340,6 +340,7 @@ class Stresses:
                 for S, metadata in parts:
                     picked = sum(self._selector[len(BLOCK) + i] * s for i, s in enumerate(S))
                     rhs += picked * test[k] * (dx(metadata=metadata) if metadata else dx)
+        forms.compile_ahead(rhs, mass)
         self._rhs = forms.compile(rhs)
         self._vector = la.vector(self.space.dofmap.index_map, len(self.cells))
         bcs = self._idle()
