@@ -1,4 +1,4 @@
-"""Meshes of six-node triangles: discs, spheres, parisons, and meshes read from files; sheets in three dimensions."""
+"""Meshes of six-node triangles: discs, spheres, parisons, and meshes from files; sheets in three dimensions."""
 
 from .build import ACCURACY, disc, from_lines, parison, sphere
 from .files import read, write

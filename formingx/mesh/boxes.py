@@ -1,26 +1,31 @@
-"""Overlaps among many boxes, found in a tree of boxes: n log n where few overlap."""
+"""Search for overlapping boxes with a tree of boxes, in O(n log n) if few overlap."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-_MOST = 2**18           # pairs looked at together
-_FEW = 128              # boxes up to which a tree costs more than all their pairs
+_CHUNK = 2**18     # pairs that are compared at a time
+_MAX_DIRECT = 128  # largest number of boxes whose pairs are compared without a tree
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pairs (i, j) of boxes that overlap or touch, each once, in parts, as indices, shape (k,) each.
+    """Yield the pairs of boxes that overlap or touch.
 
-    low, high: the boxes' corners, shape (n, 2), finite.
+    Args:
+        low: lower corners of the boxes, shape (n, 2), finite.
+        high: upper corners of the boxes, shape (n, 2), finite.
+
+    Yields:
+        Numbers i and j of overlapping boxes, shape (k,) each; every pair occurs once.
     """
-    if len(low) <= _FEW:
+    if len(low) <= _MAX_DIRECT:
         i, j = np.nonzero(np.all((low[:, None] <= high) & (low <= high[:, None]), axis=2))
         if len(low) > 1:
             yield i[i < j], j[i < j]
         return
     order = np.argsort(_along_a_curve((low + high) / 2), kind="stable")
     depth = int(np.ceil(np.log2(len(low))))
-    ends = np.full((2, 2**depth, 2), [[[np.inf]], [[-np.inf]]])             # boxes of no size overlap none
+    ends = np.full((2, 2**depth, 2), [[[np.inf]], [[-np.inf]]])             # empty boxes overlap nothing
     ends[0, :len(low)], ends[1, :len(low)] = low[order], high[order]
     tree = [ends]
     while len(tree) <= depth:
@@ -36,11 +41,11 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
         lower, upper = tree[level - 1]
         kept = (a <= b) & np.all((lower[a] <= upper[b]) & (lower[b] <= upper[a]), axis=1)
         a, b = a[kept], b[kept]
-        waiting += [(level - 1, a[k:k + _MOST], b[k:k + _MOST]) for k in range(0, len(a), _MOST)]
+        waiting += [(level - 1, a[k:k + _CHUNK], b[k:k + _CHUNK]) for k in range(0, len(a), _CHUNK)]
 
 
 def _along_a_curve(points: np.ndarray) -> np.ndarray:
-    """Places of points on Morton's space-filling curve, on which neighbours are mostly near, shape (n,)."""
+    """Return positions on Morton's space-filling curve, shape (n,); neighbours on it are mostly close to each other."""
     size = np.ptp(points, axis=0).max() or 1.0
     grid = ((points - points.min(0)) / size * (2**16 - 1)).astype(np.int64)
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):

@@ -1,4 +1,4 @@
-"""Discs, spheres, parisons, and bodies between two lines."""
+"""Meshes of discs, spheres, parisons, and bodies between two lines."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -8,55 +8,64 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, as_points, count, finite, known, non_negative, positive
+from .divisions import (
+    Thickness,
+    checked_grading,
+    divisions,
+    graded,
+    is_row,
+    layer_thicknesses,
+    levels,
+    with_middles,
+)
 from .grid import Grid, to_mesh
 from .mesh import Columns, Mesh
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
-"""Elements of a disc (along the radius, usual number through each layer): docs/accuracy.md says what each promises."""
-_TALLEST = 1.5
-"""Height over width of such elements at most: the inf-sup constant of P2 + bubble / P1dg falls as triangles get slim,
-and across a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
-_BENDS = 1 / 40
-"""A hinged sheet bends within a few thicknesses of its rim: thickness over length from which on that is seen."""
-_BENDING = {"draft": 1, "standard": 4, "fine": 6}
-"""Least number of elements through it then. (Narrower ones at the rim would do with fewer, but there a clamped one
-creases.)"""
-_FILM = 1 / 400
-"""Thickness over length below which none of that is seen: one element through each layer; more cost accuracy, by
-round-off, and from 1/1e5 on the start."""
-_MOST = 250_000            # rectangles of a mesh
+"""Elements of a disc (along the radius, usual number through each layer): see docs/accuracy.md."""
+_ASPECT_RATIO = 1.5
+"""Largest height over width of elements. The inf-sup constant of P2 + bubble / P1dg decreases for slim triangles, and
+in a thick sheet, which bends, they lock (benchmarks/thickness.py)."""
+_BENDING_THICKNESS = 1 / 40
+"""Thickness over length above which the bending of a hinged sheet near its rim matters."""
+_BENDING_ELEMENTS = {"draft": 1, "standard": 4, "fine": 6}
+"""Smallest number of elements through such a sheet. (Narrower elements at the rim would need fewer, but there a clamped
+sheet creases.)"""
+_FILM_THICKNESS = 1 / 400
+"""Thickness over length below which one element through each layer is enough. More elements increase the round-off;
+below 1/1e5 a run would not start."""
 
-Thickness = float | Callable[[float], float] | Mapping[float, float]
-"""Of a layer: a length; or, where it varies along the sheet, a function of the coordinate, or a table {coordinate:
-length}, linear between its points."""
 
 
 def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
          elements: tuple | None = None, grading: float = 1.0, concentrate: Mapping[float, float] | None = None,
          inner_radius: float = 0.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a disc (or ring) in the (R, Z) plane, bottom face on Z = 0.
+    """Return the mesh of a disc or ring in the (R, Z) plane, with its bottom face on Z = 0.
 
-    Boundaries: `axis` (R = inner_radius; called `inner` if that is above 0), `rim`, `bottom`, `top`.
+    Boundaries: `axis` (R = inner_radius; called `inner` for a ring), `rim`, `bottom`, `top`.
 
     Args:
-        radius, inner_radius: lengths.
-        thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. Each may
-            vary with the radius: a function of R, or a table {R: thickness}, linear between its radii (all nodes lie
-            on it, those on edges too).
-        accuracy: "draft", "standard" or "fine": how many elements; more of them through sheets that bend near the rim,
-            and through layers so thick that they would be more than 1.5 times taller than wide (as for `thickness` =
-            `radius` in thicker ones); one through each layer of films, thinner than 1/400 of the radius.
-        elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a row with an
-            entry for each layer: a count, or the relative sizes of its elements from the bottom up, as in
-            (60, [[1, 2, 4], 2]). A single layer needs no outer row, (60, [1, 2, 4]). Each rectangle is two triangles.
-        grading: size of the last element at the rim over the first at the axis, 1e-6 to 1e6.
-        concentrate: in place of `grading`, {reference radius: size of the elements there over the largest}, for
-            example around a plug's edge. Sizes grow linearly with the distance from these radii; nodes lie on them.
+        radius: outer radius, length.
+        inner_radius: radius of the hole of a ring, length.
+        thickness: a length (one layer, called `sheet`), or {layer name: its thickness} from bottom to top. It may vary:
+            a function of R, or a table {R: thickness}, interpolated linearly. All nodes lie on this shape, mid-edge
+            nodes too.
+        accuracy: "draft", "standard" or "fine", for the number of elements. Sheets that bend near the rim get more
+            elements through the thickness. Thick layers get more, too, so that no element is 1.5 times taller than
+            wide. Films thinner than 1/400 of the radius get one element through each layer.
+        elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a list with an
+            entry for each layer. An entry is a count, or relative sizes of elements from the bottom up, as in (60, [[1,
+            2, 4], 2]). A single layer needs no outer list: (60, [1, 2, 4]). Each rectangle is divided into two
+            triangles.
+        grading: size of the element at the rim over the element at the axis, 1e-6 to 1e6.
+        concentrate: in place of `grading`, {reference radius: element size there over the largest}, for example around
+            the edge of a plug. Sizes grow linearly with the distance from these radii, where nodes are placed.
+        comm: MPI communicator.
 
     Raises:
-        InputError: a size is not positive, or a count is not a positive whole number. A radius in `concentrate` is
-            not on the disc. There are fewer elements than intervals between these radii. The thickness is not given
-            at every radius of the disc.
+        InputError: a size is not positive, or a count is not a positive integer. A radius in `concentrate` is not on
+            the disc. There are fewer elements than intervals between these radii. The thickness is not given at every
+            radius.
 
     >>> print(fx.mesh.disc(radius=40.0, thickness={"core": 1.0, "skin": 0.2}, elements=(30, (2, 1))))
     180 six-node triangles, R from 0 to 40, Z from 0 to 1.2
@@ -64,42 +73,47 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     boundaries: axis (3 edges), rim (3 edges), bottom (30 edges), top (30 edges)
     """
     radius = positive("disc: radius", radius)
-    grading = _grading("disc", grading)
+    grading = checked_grading("disc", grading)
     inner_radius = non_negative("disc: inner_radius", inner_radius)
     if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
-    layers = _layers("disc", thickness, "sheet", "R")
+    layers = layer_thicknesses("disc", thickness, "sheet", "R")
     if elements is None:
         elements = _preset(accuracy, inner_radius, radius, layers)
-    along, through = _counts("disc", "radius", elements, len(layers))
+    along, through = divisions("disc", "radius", elements, len(layers))
     sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
-              else inner_radius + (radius - inner_radius) * _graded(along, grading))
+              else inner_radius + (radius - inner_radius) * graded(along, grading))
 
     def points(R: np.ndarray) -> np.ndarray:
-        Z = _levels(layers, through, R)
+        Z = levels(layers, through, R)
         return np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1)
     return _mesh("disc", points, joints, list(sizes or ()), list(layers), through, sides, comm)
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
-    """(elements along, through each layer) of a disc: near squares in thick layers."""
+    """Return the numbers of elements of a disc along the radius and through each layer, nearly square if thick."""
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
     whole = thick.sum()
-    if whole < _FILM:
+    if whole < _FILM_THICKNESS:
         return along, [1] * len(layers)
-    bending = _BENDING[accuracy] * thick / whole if whole >= _BENDS else 0.0
-    return along, np.maximum(usual, np.ceil(np.maximum(bending, thick * along / _TALLEST) - 1e-9)).astype(int).tolist()
+    bending = _BENDING_ELEMENTS[accuracy] * thick / whole if whole >= _BENDING_THICKNESS else 0.0
+    needed = np.ceil(np.maximum(bending, thick * along / _ASPECT_RATIO) - 1e-9)
+    return along, np.maximum(usual, needed).astype(int).tolist()
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
-    """`concentrate` of a disc, checked, sorted by radius."""
+    """Return the argument `concentrate` of a disc, sorted by radius.
+
+    Raises:
+        InputError: a radius is not on the disc, or a size is not between 0 and 1.
+    """
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
     sizes = {}
@@ -114,13 +128,17 @@ def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[
 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
-    """Return the ends of `along` elements from low to high, shape (along + 1,), with relative `sizes` at some radii."""
+    """Return the ends of `along` elements with given relative sizes at some radii, shape (along + 1,).
+
+    Raises:
+        InputError: there are fewer elements than intervals between these radii.
+    """
     at, small = np.array(list(sizes)), np.array(list(sizes.values()))
     ends = np.unique([low, *at, high])
     if along < len(ends) - 1:
         raise InputError(f"disc: elements along the radius = {along}: must be at least {len(ends) - 1}, one between"
                          f" each two radii of concentrate = {sizes!r}")
-    steps = np.geomspace(1e-9, 1, 4001) * (high - low)      # fine where elements are small
+    steps = np.geomspace(1e-9, 1, 4001) * (high - low)      # fine near small elements
     R = np.unique(np.clip([*ends, *np.add.outer(at, steps).ravel(), *np.subtract.outer(at, steps).ravel()], low, high))
     away = np.abs(np.subtract.outer(R, at))
     size = (small + (1 - small) * away / away.min(1).max()).min(1)
@@ -136,16 +154,17 @@ def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]
 
 def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], elements: tuple = (16, 8),
            grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return the upper half of a hollow sphere about the origin of the (R, Z) plane: a quarter of an annulus.
+    """Return the mesh of the upper half of a hollow sphere about the origin: a quarter of an annulus in (R, Z).
 
-    Boundaries: `axis` (R = 0), `equator` (Z = 0), `inner`, `outer`. All nodes, those on edges too, lie where polar
-    coordinates put them: second-order geometry.
+    Boundaries: `axis` (R = 0), `equator` (Z = 0), `inner`, `outer`. All nodes lie on circles, mid-edge nodes too
+    (second-order geometry).
 
     Args:
         inner_radius: length.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
         elements: (from the axis to the equator, through each layer), as in `disc`.
-        grading: size of the last element at the equator over the first at the axis.
+        grading: size of the element at the equator over the element at the axis.
+        comm: MPI communicator.
 
     Raises:
         InputError: as in `disc`.
@@ -154,34 +173,35 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     ['axis', 'equator', 'inner', 'outer']
     """
     inner_radius = positive("sphere: inner_radius", inner_radius)
-    layers = _layers("sphere", thickness, "wall", "")
-    along, through = _counts("sphere", "meridian", elements, len(layers))
+    layers = layer_thicknesses("sphere", thickness, "wall", "")
+    along, through = divisions("sphere", "meridian", elements, len(layers))
 
     def points(angle: np.ndarray) -> np.ndarray:
-        radius = inner_radius + _levels(layers, through, angle)
+        radius = inner_radius + levels(layers, through, angle)
         return np.stack([radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)], axis=-1)
-    ends = np.pi / 2 * _graded(along, _grading("sphere", grading))
+    ends = np.pi / 2 * graded(along, checked_grading("sphere", grading))
     return _mesh("sphere", points, ends, [], list(layers), through, ("axis", "equator", "inner", "outer"), comm)
 
 
 def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
             elements: tuple = (60, 2), grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a closed tube, open at the top: the lower half of a hollow sphere about the origin, and a tube above.
+    """Return the mesh of a tube that is closed by a half sphere at the bottom and open at the top.
 
-    Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All nodes of the bottom, those on edges too, lie
-    where polar coordinates put them: second-order geometry.
+    The half sphere has its centre in the origin. Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All
+    nodes of the half sphere lie on circles, mid-edge nodes too (second-order geometry).
 
     Args:
-        inner_radius, length: of the tube, lengths.
-        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out. Each may
-            vary (a programmed wall): a function of Z, or a table {Z: thickness}, linear between its heights. Z
-            belongs to the inner face, from -inner_radius at the bottom to `length`; thickness is measured along its
-            normal.
+        inner_radius: inner radius, length.
+        thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out. It may vary:
+            a function of Z, or a table {Z: thickness}, interpolated linearly. Z is the height on the inner face, from
+            -inner_radius to `length`. The thickness is measured along the normal.
+        length: length of the tube above the half sphere, length.
         elements: (from the axis to the neck, through each layer), as in `disc`.
-        grading: size of the last element at the neck over the first at the axis.
+        grading: size of the element at the neck over the element at the axis.
+        comm: MPI communicator.
 
     Raises:
-        InputError: as in `disc`; fewer than two elements along the meridian.
+        InputError: as in `disc`; there are fewer than two elements along the meridian.
 
     >>> wall = {-10.0: 2.0, 60.0: 3.0}                                         # at heights of the inner face
     >>> tube = fx.mesh.parison(inner_radius=10.0, thickness=wall, length=60.0, elements=(20, 1))
@@ -189,14 +209,14 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     13.0
     """
     inner_radius, length = positive("parison: inner_radius", inner_radius), positive("parison: length", length)
-    grading = _grading("parison", grading)
-    layers = _layers("parison", thickness, "wall", "Z")
-    along, through = _counts("parison", "meridian", elements, len(layers))
+    grading = checked_grading("parison", grading)
+    layers = layer_thicknesses("parison", thickness, "wall", "Z")
+    along, through = divisions("parison", "meridian", elements, len(layers))
     if along < 2:
         raise InputError(f"parison: elements along the meridian = {along}: must be at least 2, one in the bottom and"
                          f" one in the tube")
     # elements lie along [0, 1] from the neck; the joint of tube and bottom is a node
-    joints = _graded(along, 1 / grading)
+    joints = graded(along, 1 / grading)
     wall = float(sum(thickness_at(np.zeros(1))[0] for thickness_at in layers.values()))
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
@@ -204,7 +224,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     def points(from_neck: np.ndarray) -> np.ndarray:
         z = length * np.maximum(1 - from_neck / node, 0.0)
         angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
-        radius = inner_radius + _levels(layers, through, z - inner_radius * np.sin(angle))
+        radius = inner_radius + levels(layers, through, z - inner_radius * np.sin(angle))
         return np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
     sides = ("neck", "axis", "inner", "outer")
     return _mesh("parison", points, joints, [node], list(layers), through, sides, comm)
@@ -212,22 +232,23 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return a body between two lines through points, point k of the one opposite point k of the other.
+    """Return the mesh of a body between two polygons, whose points are opposite each other.
 
-    Between points k and k + 1 the faces are straight: a curve takes as many points as it needs.
-
-    Boundaries: `inner`, `outer`, `start` and `end` (from the first or last point of one line to the other; called
-    `axis` where both points have R = 0).
+    Boundaries: `inner`, `outer`, and `start` and `end`, which join the first or the last points. `start` or `end` is
+    called `axis` if both points have R = 0.
 
     Args:
-        inner, outer: (R, Z) of their points, shape (n, 2), length; n is at least 2, and the same.
-        elements: (between each two points and the next, through each layer): counts, or a row of n - 1 counts, and
-            the second entry of `elements` in `disc`.
-        layers: {layer name: its part of the way from `inner` to `outer`, in any unit}; default one, called `wall`.
+        inner: corners (R, Z) of the inner face, shape (n, 2), n at least 2, length.
+        outer: corners (R, Z) of the outer face, shape (n, 2), length.
+        elements: (between successive corners, through each layer). The first entry is a count or a list of n - 1
+            counts, the second as in `disc`.
+        layers: {layer name: its fraction of the distance from `inner` to `outer`, in any unit}; default one layer,
+            `wall`.
+        comm: MPI communicator.
 
     Raises:
         InputError: points are not finite, are fewer than 2, or differ in number between the lines. The lines cross or
-            meet. A count is not a positive whole number.
+            meet. A count is not a positive integer.
 
     >>> cone = fx.mesh.from_lines([(0, 0), (20, 0), (30, 40)], [(0, -2), (21, -2), (32, 40)], elements=([8, 16], 2))
     >>> print(cone)
@@ -238,17 +259,17 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     lines = [_points(f"from_lines: {name}", points) for name, points in (("inner", inner), ("outer", outer))]
     if len(lines[0]) != len(lines[1]):
         raise InputError(f"from_lines: inner has {len(lines[0])} points, outer {len(lines[1])}: they must be as many")
-    parts = _layers("from_lines", {"wall": 1.0} if layers is None else layers, "wall", "")
-    if not _is_row(elements) or len(elements) != 2:
+    parts = layer_thicknesses("from_lines", {"wall": 1.0} if layers is None else layers, "wall", "")
+    if not is_row(elements) or len(elements) != 2:
         raise InputError(f"from_lines: elements = {elements!r}: must be (between two points, through each layer)")
     pieces, given = len(lines[0]) - 1, elements[0]
     along = [count("from_lines: elements between two points", n)
-             for n in (given if _is_row(given) else [given] * pieces)]
+             for n in (given if is_row(given) else [given] * pieces)]
     if len(along) != pieces:
         raise InputError(f"from_lines: elements between points = {given!r}: {pieces} pieces need as many counts")
-    _, through = _counts("from_lines", "lines", (sum(along), elements[1]), len(parts))
+    _, through = divisions("from_lines", "lines", (sum(along), elements[1]), len(parts))
     ends = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(along))])
-    level = _levels(parts, through, np.zeros(1))
+    level = levels(parts, through, np.zeros(1))
     around = np.concatenate([lines[0], lines[1][::-1]])
     names = ["axis" if all(line[k, 0] == 0 for line in lines) else name for k, name in ((0, "start"), (-1, "end"))]
     if names[0] == names[1]:
@@ -266,123 +287,25 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
 
 def _points(name: str, points: Any) -> np.ndarray:
+    """Return points as an array, shape (n, 2), checked.
+
+    Raises:
+        InputError: there are fewer than two, or one is not finite.
+    """
     found = np.array(as_points(name, points))
     if len(found) < 2 or not np.all(np.isfinite(found)):
         raise InputError(f"{name} = {points!r}: must be at least two points (R, Z) of finite numbers")
     return found
 
 
-def _layers(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
-    """{name of a layer: its thickness at coordinates, shape (n,)}; `coordinate` is "" where it cannot vary."""
-    named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
-    layers = dict(thickness) if named else {alone: thickness}
-    if not layers:
-        raise InputError(f"{kind}: thickness = {{}}: must name at least one layer")
-    return {name: _thickness(f"{kind}: thickness of {name!r}", given, coordinate) for name, given in layers.items()}
-
-
-def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
-    if not coordinate or not (callable(given) or isinstance(given, Mapping)):
-        value = positive(caller, given)
-        return lambda x: np.full(len(x), value)
-    if callable(given):
-        return lambda x: np.array([positive(f"{caller} at {coordinate} = {v:.6g}",
-                                            _called(given, v, caller, coordinate))
-                                   for v in map(float, x)])
-    points = sorted((finite(f"{caller}: {coordinate}", at), positive(f"{caller} at {coordinate} = {at!r}", h))
-                    for at, h in given.items())
-    ends, values = np.array(points).reshape(-1, 2).T
-
-    def between(x):
-        near = 1e-9 * max(np.abs(x).max(), 1e-300)
-        if len(ends) < 2 or x.min() < ends[0] - near or x.max() > ends[-1] + near:
-            raise InputError(f"{caller} = {given!r}: must cover {coordinate} from {x.min():.6g} to {x.max():.6g}")
-        return np.interp(x, ends, values)
-    return between
-
-
-def _called(function: Callable, v: float, caller: str, coordinate: str) -> Any:
-    try:
-        return function(v)
-    except Exception as error:
-        raise InputError(f"{caller} at {coordinate} = {v:.6g}: the function raised {type(error).__name__}:"
-                         f" {error}") from error
-
-
-def _grading(kind: str, grading: Any) -> float:
-    grading = positive(f"{kind}: grading", grading)
-    if not 1e-6 <= grading <= 1e6:
-        raise InputError(f"{kind}: grading = {grading!r}: must be from 1e-6 to 1e6")
-    return grading
-
-
-def _counts(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
-    """Return the number of elements along the sheet, and the ends of those through each layer, on [0, 1]."""
-    if not _is_row(elements) or len(elements) != 2:
-        raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
-    along = count(f"{kind}: elements along the {along_what}", elements[0])
-    through = list(elements[1]) if _is_row(elements[1]) else [elements[1]] * layers
-    if layers == 1 and len(through) > 1:
-        through = [through]
-    if len(through) != layers:
-        raise InputError(f"{kind}: elements through the layers = {through!r}: {layers} layers need as many counts")
-    ends = [_ends(kind, given) for given in through]
-    rectangles = along * sum(len(found) - 1 for found in ends)
-    if rectangles > _MOST:
-        raise InputError(f"{kind}: elements = {elements!r}: {rectangles} rectangles: at most {_MOST}")
-    return along, ends
-
-
-def _ends(kind: str, given: Any) -> np.ndarray:
-    """Return the ends of the elements through a layer on [0, 1], of their number or their relative sizes."""
-    if not _is_row(given):
-        n = count(f"{kind}: elements through a layer", given)
-        if n > _MOST:
-            raise InputError(f"{kind}: elements through a layer = {given!r}: must be at most {_MOST}")
-        return np.linspace(0.0, 1.0, n + 1)
-    sizes = np.array([positive(f"{kind}: relative size of an element through a layer", size) for size in given])
-    if not len(sizes) or sizes.max() > 1e6 * sizes.min():
-        raise InputError(f"{kind}: relative sizes of elements through a layer = {given!r}: must be at least one, the"
-                         f" largest at most 1e6 times the smallest")
-    ends = np.concatenate([[0.0], np.cumsum(sizes / sizes.max())])
-    return ends / ends[-1]
-
-
-def _is_row(values: Any) -> bool:
-    return isinstance(values, tuple | list) or isinstance(values, np.ndarray) and values.ndim == 1
-
-
-def _graded(along: int, grading: float) -> np.ndarray:
-    """Return the ends of `along` elements on [0, 1] whose sizes grow by one ratio, the last `grading` times the
-    first."""
-    sizes = grading ** (np.arange(along) / max(along - 1, 1))
-    ends = np.concatenate([[0.0], np.cumsum(sizes)])
-    return ends / ends[-1]
-
-
-def _with_middles(joints: np.ndarray) -> np.ndarray:
-    """Return the ends of elements and the middles between them, shape (2 n + 1,)."""
-    both = np.empty(2 * len(joints) - 1)
-    both[::2], both[1::2] = joints, (joints[1:] + joints[:-1]) / 2
-    return both
-
-
-def _levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
-    """Distance of all rows of nodes from the first face, shape (number of rows, number of coordinates)."""
-    rows = [np.zeros(len(coordinates))]
-    for thickness_at, ends in zip(layers.values(), through):
-        h, base = thickness_at(coordinates), rows[-1]
-        rows += [base + h * at for at in _with_middles(ends)[1:]]
-    return np.array(rows)
-
-
 def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
-    """Triangles on rows and columns of nodes; `sides`: names of left, right, bottom, top.
+    """Return the mesh of triangles on rows and columns of nodes.
 
-    Diagonals alternate, as a chessboard's fields in each layer. place, ends, fixed: see `Columns`.
+    The diagonals alternate in each layer as on a chessboard. `sides` are the names of left, right, bottom and top. For
+    place, ends and fixed see `Columns`.
     """
-    points = place(_with_middles(ends))
+    points = place(with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     triangles, first = {}, 0
     halves = np.array([[[(0, 0), (1, 0), (1, 1)], [(1, 1), (0, 1), (0, 0)]],          # (column, row) of corners

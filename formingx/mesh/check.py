@@ -1,4 +1,4 @@
-"""Validity of a mesh: elements cover the body once; none is flat or inverted; none overlap; no gap; one piece."""
+"""Validity of a mesh: the elements cover a connected body once, without gaps, and none is degenerate."""
 
 from collections.abc import Iterator
 
@@ -7,18 +7,18 @@ import numpy as np
 from ..errors import InputError
 from .boxes import overlapping
 
-_SMALLEST = 1e-50                      # the square of such a length is still a number
-_LARGEST = 1e50                        # and a product of some of these
-_FLAT = 1e-12                          # of the square of the longest edge: an area that is nothing
+_MIN_LENGTH = 1e-50                      # lengths whose squares are still numbers
+_MAX_LENGTH = 1e50                        # lengths whose products are still numbers
+_MIN_AREA = 1e-12                          # area over the square of the longest edge that counts as 0
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Check the elements of a section in the reference configuration.
 
     Args:
-        points: shape (n, 2), length.
-        triangles: indices of points, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
-        what: begins the message.
+        points: nodes, shape (n, 2), length.
+        triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
+        what: beginning of the message.
 
     Raises:
         InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet without
@@ -28,12 +28,12 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     if len(bad):
         raise InputError(f"{what}: a node has the coordinates {_show(points[bad[0]])}: must be finite numbers")
     size = float(np.ptp(points, axis=0).max())
-    if not _SMALLEST < size < _LARGEST or np.abs(points).max() > _LARGEST:
-        raise InputError(f"{what}: it is {size:.3g} large: must be between {_SMALLEST:g} and {_LARGEST:g}")
+    if not _MIN_LENGTH < size < _MAX_LENGTH or np.abs(points).max() > _MAX_LENGTH:
+        raise InputError(f"{what}: it is {size:.3g} large: must be between {_MIN_LENGTH:g} and {_MAX_LENGTH:g}")
     corners = points[triangles[:, :3]]
     area = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
-    flat = np.abs(area) <= _FLAT * longest
+    flat = np.abs(area) <= _MIN_AREA * longest
     if flat.any():
         raise InputError(f"{what}: {flat.sum()} elements are flat, one at {_show(corners[flat][0].mean(0))}")
     inside_out = turned_inside_out(points[triangles])
@@ -55,7 +55,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return the number of the piece of each element, 0 for the piece of the first node, shape (m,)."""
+    """Return the number of the connected piece of each element, shape (m,); piece 0 contains the first node."""
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:
@@ -67,7 +67,11 @@ def _pieces(triangles: np.ndarray) -> np.ndarray:
 
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Raise an InputError unless each edge has one middle, and each middle one edge and no corner on it."""
+    """Check that each edge has one mid-edge node, which is no corner and belongs to no other edge.
+
+    Raises:
+        InputError: an edge violates this.
+    """
     if triangles.shape[1] != 6:
         return
     rows = np.concatenate([np.column_stack([np.sort(triangles[:, [i, j]], axis=1), triangles[:, k]])
@@ -85,8 +89,14 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
-    """Return True for triangles, shape (m, 3 or 6, 2), whose curved map changes its sign from node to node, shape
-    (m,)."""
+    """Return True for triangles whose Jacobian changes its sign between nodes.
+
+    Args:
+        nodes: shape (m, 3 or 6, 2), length.
+
+    Returns:
+        Shape (m,).
+    """
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
     a, b, c, ab, bc, ac = (nodes[:, i] for i in range(6))
@@ -101,10 +111,13 @@ def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
 
 
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
-    """Return the edges of one element only, shape (k, 2); an error if two elements lie on the same side of their
-    edge."""
+    """Return the edges that belong to one element only, shape (k, 2).
+
+    Raises:
+        InputError: two elements lie on the same side of an edge.
+    """
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    ahead = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)       # side of the edge that its element is on
+    ahead = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)   # side of the element
     edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     sides = np.zeros(len(edges))
     np.add.at(sides, place.ravel(), ahead)
@@ -116,15 +129,25 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """Return a place where edges touch or cross each other other than at nodes that they share, shape (2,), or None."""
+    """Return a point where edges cross or touch without sharing a node, shape (2,), or None.
+
+    Args:
+        points: shape (n, 2), length.
+        edges: numbers of their ends, shape (k, 2).
+    """
     pairs = next(crossings(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
 
 
 def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
-    """Numbers of edges that touch or cross each other other than at nodes that they share, shape (m, 2), m > 0.
+    """Yield the pairs of edges that cross or touch without sharing a node.
 
-    points: shape (n, 2), length; edges: indices of their ends, shape (k, 2).
+    Args:
+        points: shape (n, 2), length.
+        edges: numbers of their ends, shape (k, 2).
+
+    Yields:
+        Numbers of edges, shape (m, 2), m > 0.
     """
     low, high = points[edges].min(1), points[edges].max(1)
     near = 1e-9 * float((high - low).max())
@@ -146,8 +169,10 @@ def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return the cross products of vectors in the plane."""
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def _show(point: np.ndarray) -> str:
+    """Return a point as text."""
     return f"(R, Z) = ({point[0]:.6g}, {point[1]:.6g})"

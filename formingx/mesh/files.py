@@ -1,4 +1,4 @@
-"""The files of meshes: gmsh's own and plain text."""
+"""Mesh files: gmsh's format and plain text."""
 
 import os
 
@@ -14,12 +14,17 @@ from .mesh import Mesh
 def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """Return a mesh of triangles from a file.
 
-    A gmsh mesh (MSH 2.2 or 4.1, text or binary): physical groups name the layers (2-D) and the boundaries (1-D). A name
-    that ends in .txt: the text format of `formingx.mesh.text`. Nothing in a file is run: a gmsh script is refused.
+    A gmsh file (MSH 2.2 or 4.1, text or binary) names the layers by physical groups of dimension 2. Groups of dimension
+    1 are the boundaries. A name that ends in .txt means the text format of `formingx.mesh.text`. Nothing in a file is
+    executed: a gmsh script is refused.
+
+    Args:
+        file: name of the file.
+        comm: MPI communicator.
 
     Raises:
-        InputError: the file is not there, is no such mesh, has no named 2-D group, or its elements do not cover a
-            section once (see `Mesh.check`).
+        InputError: the file is missing or not in this format, has no named group of dimension 2, or contains an invalid
+            mesh (`Mesh.check`).
 
     >>> fx.mesh.write(sheet, "sheet.msh")
     >>> list(fx.mesh.read("sheet.msh").boundaries)
@@ -36,14 +41,19 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
 
 def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0, 0.0),
           numbering: str = "corners") -> None:
-    """Write a mesh with its names as a file for `read` and for other solvers.
+    """Write a mesh with its names, for `read` and for other solvers; on one rank only.
 
-    A name that ends in .txt: the text format of `formingx.mesh.text`, with its `numbering` ("corners" or "around").
-    Else a gmsh file (MSH 2.2, text). Serial only. Nodes are numbered as in the mesh; `shift` is added to their
-    coordinates.
+    A name that ends in .txt means the text format of `formingx.mesh.text`, any other a gmsh file (MSH 2.2, text). Nodes
+    are numbered as in the mesh.
+
+    Args:
+        mesh: the mesh.
+        file: name of the file.
+        shift: (R, Z) added to the coordinates, length.
+        numbering: order of the nodes of an element in the text format, "corners" or "around".
 
     Raises:
-        InputError: an unknown numbering, or more than one rank.
+        InputError: the numbering is unknown, or there is more than one rank.
 
     >>> fx.mesh.write(sheet, "sheet.txt", numbering="around")                # nodes of an element in a circle
     """
@@ -60,4 +70,5 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
 
 
 def _is_text(file: str) -> bool:
+    """Return True for the name of a text file."""
     return file.lower().endswith(".txt")

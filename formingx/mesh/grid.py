@@ -1,4 +1,4 @@
-"""A mesh as plain arrays, and the way from there to a distributed mesh and back."""
+"""Mesh as plain arrays on one rank, and its conversion to and from a distributed mesh."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -18,14 +18,15 @@ _EDGES = ((0, 1, 3), (1, 2, 4), (2, 0, 5))              # ends, middle
 
 
 class Grid(NamedTuple):
-    """A mesh on one rank; rows of `layers` and `boundaries` hold indices of `points`.
+    """Mesh on one rank; `layers` and `boundaries` refer to rows of `points`.
 
     Attributes:
-        points: (R, Z) of the nodes, shape (n, 2), unit of length of the mesh; of a sheet in three dimensions (x, y, 0).
-        numbers: their numbers in a file, shape (n,).
-        layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20 (of a
-            first-order mesh: shape (m, 3)).
-        boundaries: {name: edges, shape (k, 3)}: first, last, middle, the body on the left (first order: shape (k, 2)).
+        points: nodes (R, Z), shape (n, 2), length; in three dimensions (x, y, 0), shape (n, 3).
+        numbers: node numbers in a file, shape (n,).
+        layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20.
+            First-order triangles have shape (m, 3).
+        boundaries: {name: edges, shape (k, 3)}: first, last, middle node, with the body on the left. First-order edges
+            have shape (k, 2).
 
     >>> grid = fx.mesh.to_grid(sheet)
     >>> grid.points.shape, grid.layers["sheet"].shape, grid.boundaries["bottom"].shape
@@ -39,7 +40,12 @@ class Grid(NamedTuple):
 
 
 def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the triangles, shape (m, 3 or 6), each turned if it runs clockwise."""
+    """Return triangles with clockwise ones reversed.
+
+    Args:
+        points: shape (n, 2), length.
+        triangles: point numbers, shape (m, 3 or 6).
+    """
     triangles = np.array(triangles)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
@@ -48,7 +54,10 @@ def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def to_grid(mesh: Mesh) -> Grid:
-    """Return the mesh as plain arrays (serial only); node i of the mesh has the number i + 1.
+    """Return the mesh as plain arrays, on one rank only; node i of the mesh has the number i + 1.
+
+    Raises:
+        InputError: there is more than one rank.
 
     >>> fx.mesh.to_grid(sheet).points.max(0).tolist()
     [10.0, 0.3]
@@ -59,7 +68,7 @@ def to_grid(mesh: Mesh) -> Grid:
 
 
 def gathered(mesh: Mesh) -> Grid:
-    """Return the whole mesh as plain arrays, the same on all ranks; collective."""
+    """Return the whole mesh as plain arrays on all ranks; collective."""
     domain, comm = mesh.domain, mesh.comm
     own, X = len(own_cells(domain)), domain.geometry.x
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
@@ -85,10 +94,15 @@ def gathered(mesh: Mesh) -> Grid:
 
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
-    """Return the distributed mesh of the grid that `make` returns; it is called, and checked, on rank 0.
+    """Return the distributed mesh of a grid; collective.
+
+    Args:
+        make: function that returns the grid; rank 0 calls it and checks the grid.
+        comm: MPI communicator.
+        what: name of the mesh in messages.
 
     Raises:
-        InputError: `make` raised it, or the elements of `what` are invalid. All ranks raise it.
+        InputError: `make` raised it, or the elements are invalid. All ranks raise it.
     """
     error, shape = None, None
     if comm.rank == 0:
@@ -110,9 +124,12 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 
 
 def _tagged(grid: Grid, what: str) -> tuple:
-    """Cells and edges as DOLFINx numbers them, and one tag for each: cells, points, cell tags, edges, edge tags, names.
+    """Return cells, points, cell tags, edges, edge tags and names, with cells and edges in the numbering of DOLFINx.
 
     An edge of several boundaries gets a tag of its own, which belongs to all of them.
+
+    Raises:
+        InputError: a boundary edge is not an edge of an element.
     """
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
@@ -132,7 +149,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
     owners: dict[tuple[int, int], tuple[list, list[int]]] = {}
     known = _edges(triangles)
     for k, (name, rows) in enumerate(grid.boundaries.items()):
-        for row in _of_elements(number[rows[:, :2]], known, f"{what}: boundary {name!r}", points):
+        for row in _element_edges(number[rows[:, :2]], known, f"{what}: boundary {name!r}", points):
             key = (min(row[:2]), max(row[:2]))
             names = owners.setdefault(key, (row, []))[1]
             if k not in names:
@@ -148,7 +165,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    """Return {the two ends, the lower first: the middle} of all edges; without middles: {ends: []}."""
+    """Return {(lower end, higher end): [middle]} of all edges; without mid-edge nodes {ends: []}."""
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
@@ -156,11 +173,14 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
     return found
 
 
-def _of_elements(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
+def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                  points: np.ndarray) -> list[list[int]]:
-    """Return the edges (ends, then the middle of the element there) if they are edges of elements; [] if none is.
+    """Return the boundary edges of elements, each with its ends and its middle; [] if no edge belongs to an element.
 
-    A curve that is no part of the body (of a tool in the same file) leaves its boundary empty.
+    So a curve that is no part of the body, such as a tool in the same file, gives an empty boundary.
+
+    Raises:
+        InputError: some edges belong to elements, others do not.
     """
     pairs = [(int(a), int(b)) for a, b in edges]
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]

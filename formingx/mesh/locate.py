@@ -1,4 +1,4 @@
-"""Location of points in a mesh: the cell and the place in it, on one rank each."""
+"""Location of points in a mesh: each point in one cell on one rank."""
 
 from typing import Any, NamedTuple
 
@@ -11,11 +11,17 @@ from ..errors import InputError
 from .nodes import own_cells
 
 OUTSIDE = 1e-3
-"""So far outside a cell, in parts of it, a point still counts as in it: a curved edge is met to fourth order only."""
+"""Distance from a cell, over its size, within which a point counts as inside; curved edges are approximate."""
 
 
 class Place(NamedTuple):
-    """Points of this rank: their numbers, shape (m,), cells, shape (m,), and places in them, shape (m, dimension)."""
+    """Located points of this rank.
+
+    Attributes:
+        mine: numbers of the points, shape (m,).
+        cells: local cell numbers, shape (m,).
+        reference: positions in the reference cell, shape (m, dimension).
+    """
 
     mine: np.ndarray
     cells: np.ndarray
@@ -23,14 +29,17 @@ class Place(NamedTuple):
 
 
 def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh") -> Place:
-    """Find points, shape (n, 2), the same on all ranks; collective.
+    """Return the cells that contain points; collective.
 
     Args:
-        mesh: the `dolfinx.mesh.Mesh`. size: its extent, length.
-        cells: look only in these (local numbers); default all. within: name of the cells in the error.
+        mesh: the `dolfinx.mesh.Mesh`.
+        points: shape (n, 2), length, equal on all ranks.
+        size: extent of the mesh, length.
+        cells: local numbers of cells to be searched; default all.
+        within: name of these cells in the message.
 
     Raises:
-        InputError: a point that lies in none of the cells.
+        InputError: a point lies in none of the cells.
     """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
     nodes, own = _compat.cell_nodes(mesh), own_cells(mesh)
@@ -47,7 +56,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
             for cell in candidates.links(i):
                 try:
                     place = cmap.pull_back(point[None], X[nodes[cell]])[0, :dim]
-                except RuntimeError:                 # a curved cell that the point is far from
+                except RuntimeError:                 # the point is far from a curved cell
                     continue
                 inside = min(*place, 1 - place.sum())
                 if inside > depth[i]:

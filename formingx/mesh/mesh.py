@@ -17,13 +17,14 @@ from .nodes import numbers_of_facets, of_facets, own_cells
 
 
 class Columns(NamedTuple):
-    """The columns of elements side by side along a sheet, and how to make the same body of others.
+    """Columns of elements along a sheet, and the functions that make the same body with other columns.
 
     Attributes:
-        ends: where they end, by a coordinate along the sheet, shape (n + 1,); fixed: ends that must stay, shape (m,).
-        faces: names of the boundaries along the sheet, with the first and the last row of nodes.
-        place: at coordinates, shape (k,): the nodes of all rows there, shape (rows, k, 2), length.
-        make: the mesh with other ends.
+        ends: ends of the columns in a coordinate along the sheet, shape (n + 1,).
+        fixed: ends that must be kept, shape (m,).
+        faces: names of the boundaries that contain the first and the last row of nodes.
+        place: function of coordinates, shape (k,), that returns the nodes of all rows, shape (rows, k, 2), length.
+        make: function of other ends that returns the mesh.
     """
 
     ends: np.ndarray
@@ -35,15 +36,16 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True)
 class Mesh:
-    """A distributed mesh and the names of its parts.
+    """Distributed mesh with named layers and boundaries.
 
     Attributes:
-        domain: the `dolfinx.mesh.Mesh`; coordinates (R, Z) in the user's unit of length.
-        cells, facets: its `MeshTags`.
-        layers: name to tag.
-        boundaries: name to the tags of its facets: one, or several where a part has a name of its own (`with_part`).
+        domain: the `dolfinx.mesh.Mesh`, with coordinates (R, Z), length.
+        cells: its `MeshTags` of layers.
+        facets: its `MeshTags` of boundaries.
+        layers: {name: tag}.
+        boundaries: {name: tags of its facets}; several tags if a part has its own name (`with_part`).
         comm: the communicator on which the mesh was made. Pass Python objects on it, not on its copy `domain.comm`.
-            Data that mpi4py attaches to the copy are freed with it. Inside an exception this would lock up the exit of
+            Data that mpi4py attaches to the copy are freed with it. Inside an exception this would block the exit of
             Python.
         columns: `Columns` of elements along a disc, a sphere, a parison or a `from_lines` body; None for other meshes.
 
@@ -60,7 +62,7 @@ class Mesh:
     columns: Columns | None = None
 
     def __str__(self) -> str:
-        """Return a text on the mesh; edges and sizes only of a mesh on one rank: it is not collective."""
+        """Return a summary of the mesh; sizes and numbers of edges only on one rank, because it is not collective."""
         cells, alone = self.domain.topology.index_map(2).size_global, self.comm.size == 1
         edges = {name: f" ({len(self.facets_of(name))} edges)" if alone else "" for name in self.boundaries}
         lines = [f"{cells} six-node triangles"]
@@ -71,7 +73,7 @@ class Mesh:
                           f"boundaries: {', '.join(name + of for name, of in edges.items())}"])
 
     def check(self) -> None:
-        """Check the elements of a mesh whose nodes were moved, as on reading a file. Collective.
+        """Check the elements of a mesh whose nodes were moved; collective.
 
         Raises:
             InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet
@@ -87,24 +89,25 @@ class Mesh:
         check_elements(points, triangles, "the mesh")
 
     def facets_of(self, boundary: str) -> np.ndarray:
-        """Local facet indices of a boundary, sorted, shape (n,), ghosts included."""
+        """Return the local numbers of the facets of a boundary, sorted, shape (n,), ghosts included."""
         known("Mesh: boundary", boundary, self.boundaries)
         return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
 
     def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:
-        """Return the mesh with one more boundary: the facets of a boundary between two coordinates.
+        """Return the mesh with a further boundary: a part of a boundary between two coordinates.
 
-        They belong to both boundaries from then on: a load or contact on the whole acts on the part too.
+        The facets then belong to both boundaries. So a load or contact on the whole boundary also acts on the part.
 
         Args:
-            name: of the part, a new one.
-            of: the boundary that it is a part of.
-            within: (lowest, highest) reference coordinate, length; nodes must lie there (`disc`: `concentrate`), unless
-                the boundary ends before.
+            name: new name of the part.
+            of: name of the boundary that contains the part.
+            within: (lowest, highest) reference coordinate, length. Nodes must lie there (see `concentrate` of `disc`),
+                unless the boundary ends before.
             along: the coordinate, "r" or "z".
 
         Raises:
-            InputError: a name that is not known or not new, no facet within, or one that is within in part only.
+            InputError: `of` is unknown, `name` is not new, or no facet lies between the coordinates. One lies there
+                partly.
         """
         from dolfinx.mesh import meshtags
         caller = f"with_part({name!r}, {of!r})"
@@ -119,10 +122,10 @@ class Mesh:
         domain, axis = self.domain, "rz".index(along)
         comm, facets = self.comm, self.facets_of(of)
         ends = of_facets(domain, facets)[:, :2, axis]
-        near = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
+        tolerance = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
         lowest, highest = ends.min(1), ends.max(1)
-        inside = (lowest > low - near) & (highest < high + near)
-        cut = ~inside & (lowest < high - near) & (highest > low + near)
+        inside = (lowest > low - tolerance) & (highest < high + tolerance)
+        cut = ~inside & (lowest < high - tolerance) & (highest > low + tolerance)
         cuts = gathered(comm, np.column_stack([lowest, highest])[cut])
         if len(cuts):
             raise InputError(f"{caller}: within = {within!r} cuts the element edge from {along} = {cuts[0, 0]:.6g} to"
@@ -140,21 +143,24 @@ class Mesh:
         boundaries = {key: (*tags, *(new[tag] for tag in tags if tag in new)) for key, tags in self.boundaries.items()}
         return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
                        boundaries=boundaries | {name: tuple(new.values())},
-                       columns=self._columns_with((low, high), axis, near, (name, of, within, along)))
+                       columns=self._columns_with((low, high), axis, tolerance, (name, of, within, along)))
 
-    def _columns_with(self, limits: tuple, axis: int, near: float, part: tuple) -> Columns | None:
-        """Return the columns of the mesh with one more part, which ends between two of them."""
+    def _columns_with(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
+        """Return the columns of the mesh with fixed ends at the limits of a new part, or None."""
         if self.columns is None:
             return None
         columns, make = self.columns, self.columns.make
         x = columns.place(columns.ends)[[0, -1], :, axis]
-        limit = (np.abs(x[..., None] - np.array(limits)) < near).any((0, 2))
+        limit = (np.abs(x[..., None] - np.array(limits)) < tolerance).any((0, 2))
         return columns._replace(fixed=np.union1d(columns.fixed, columns.ends[limit]),
                                 make=lambda ends: make(ends).with_part(*part))
 
     def nodes_of(self, boundary: str) -> np.ndarray:
-        """Coordinates of all geometry nodes of a boundary, sorted by R, then Z, shape (n, 2) (in three dimensions
-        (n, 3))."""
+        """Return the coordinates of all nodes of a boundary, sorted by R, then Z; collective.
+
+        Returns:
+            Shape (n, 2), in three dimensions (n, 3), length.
+        """
         domain, facets = self.domain, self.facets_of(boundary)
         nodes = np.unique(numbers_of_facets(domain, facets))
         points = gathered(self.comm, domain.geometry.x[nodes, :domain.geometry.dim])
@@ -165,10 +171,12 @@ class Mesh:
         return points[np.lexsort((points[:, 1], points[:, 0]))]
 
     def line_of(self, boundary: str) -> np.ndarray:
-        """Return ends and middles of the edges of a boundary one after the other, from its end of smaller R (of
-        smaller Z).
+        """Return the ends and middles of the edges of a boundary in order along it; collective.
 
-        Shape (2 n + 1, 2) for n edges, the ends at even rows; same on all ranks.
+        The first node is the end of smaller R, or of smaller Z for equal R.
+
+        Returns:
+            Shape (2 n + 1, 2) for n edges, with the ends in even rows, length; equal on all ranks.
 
         Raises:
             InputError: the boundary is not one line with two ends.
@@ -178,21 +186,22 @@ class Mesh:
         corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, edges.shape[-1]) / size, 12), axis=0,
                                   return_inverse=True)
         ends = ends.reshape(-1, 2)
-        _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)       # a ghost is there twice
-        at: dict[int, list[int]] = {}
-        for edge in first.tolist():
-            for corner in ends[edge].tolist():
-                at.setdefault(corner, []).append(edge)
-        tips = sorted(corner for corner, there in at.items() if len(there) == 1)     # corners are sorted by R, then Z
-        if len(tips) != 2 or max(map(len, at.values())) > 2:
+        _, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)       # ghost edges occur twice
+        edges_at: dict[int, list[int]] = {}
+        for number in first.tolist():
+            for corner in ends[number].tolist():
+                edges_at.setdefault(corner, []).append(number)
+        # corners are sorted by R, then Z
+        tips = sorted(corner for corner, adjacent in edges_at.items() if len(adjacent) == 1)
+        if len(tips) != 2 or max(map(len, edges_at.values())) > 2:
             raise InputError(f"boundary {boundary!r} must be one line with two ends; {len(tips)} ends were found")
-        corner, line, here = tips[0], [], -1
+        corner, line, edge = tips[0], [], -1
         for _ in first:
-            here = next(e for e in at[corner] if e != here)
-            forward = ends[here, 0] == corner
-            a, b = edges[here, [0, 1] if forward else [1, 0]]
-            line += [a, edges[here, 2] if edges.shape[1] == 3 else (a + b) / 2]
-            corner = ends[here, 1 if forward else 0]
+            edge = next(e for e in edges_at[corner] if e != edge)
+            forward = ends[edge, 0] == corner
+            a, b = edges[edge, [0, 1] if forward else [1, 0]]
+            line += [a, edges[edge, 2] if edges.shape[1] == 3 else (a + b) / 2]
+            corner = ends[edge, 1 if forward else 0]
         if len(line) != 2 * len(first) or corner != tips[1]:
             raise InputError(f"boundary {boundary!r} must be one line with two ends, but is in several parts")
         return np.array([*line, b])

@@ -1,12 +1,12 @@
-"""gmsh's mesh files, MSH 2.2 and 4.1, text and binary, read as data.
+"""gmsh mesh files, MSH 2.2 and 4.1, text and binary, read as data.
 
-gmsh itself takes a file for a script unless it begins as a mesh, and scripts can run commands. Here a file is numbers
-and names or it is refused: nothing in it can run.
+gmsh itself treats a file as a script unless it begins as a mesh, and scripts can run commands. This reader accepts only
+numbers and names. Nothing in a file is executed.
 """
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..io.output import replace
 from .grid import Grid, counter_clockwise
+from .msh_section import Section, checked_count, checked_dimension
 
 _KINDS = {1: (1, 2), 2: (2, 3), 3: (2, 4), 4: (3, 4), 5: (3, 8), 6: (3, 6), 7: (3, 5), 8: (1, 3), 9: (2, 6),
           10: (2, 9), 11: (3, 10), 12: (3, 27), 13: (3, 18), 14: (3, 14), 15: (0, 1), 16: (2, 8), 17: (3, 20),
@@ -25,8 +26,15 @@ _LINES, _TRIANGLES = {1: 2, 8: 3}, {2: 3, 9: 6}
 
 
 class Block(NamedTuple):
-    """Elements of one type on one entity: its dimension and number, gmsh's element type, the physical groups (numbers),
-    and node numbers, shape (n, nodes of one)."""
+    """Elements of one type on one entity.
+
+    Attributes:
+        dim: dimension of the entity.
+        entity: number of the entity.
+        kind: gmsh's element type.
+        groups: numbers of the physical groups.
+        nodes: node numbers, shape (n, nodes per element).
+    """
 
     dim: int
     entity: int
@@ -36,7 +44,14 @@ class Block(NamedTuple):
 
 
 class Content(NamedTuple):
-    """Content of a file: node numbers, shape (n,); points, shape (n, 3); blocks; {(dimension, group): name}."""
+    """Content of a mesh file.
+
+    Attributes:
+        numbers: node numbers, shape (n,).
+        points: nodes, shape (n, 3).
+        blocks: the elements.
+        names: {(dimension, group): name}.
+    """
 
     numbers: np.ndarray
     points: np.ndarray
@@ -45,10 +60,10 @@ class Content(NamedTuple):
 
 
 def content(file: str | os.PathLike) -> Content:
-    """Nodes, elements and names of a mesh file.
+    """Return nodes, elements and names of a mesh file.
 
     Raises:
-        InputError: the file cannot be read, or is not a mesh in one of the formats; the message names the section.
+        InputError: the file cannot be read, or is in none of the formats; the message names the section.
     """
     file = os.fspath(file)
     try:
@@ -70,8 +85,8 @@ def content(file: str | os.PathLike) -> Content:
         if name not in sections:
             raise InputError(f"mesh file {file!r} has no section ${name}: was it meshed?")
 
-    def numbers(name: str) -> _Numbers:
-        return _Numbers(sections[name], binary, order, width, f"mesh file {file!r}, section ${name}")
+    def numbers(name: str) -> Section:
+        return Section(sections[name], binary, order, width, f"mesh file {file!r}, section ${name}")
     if version == "2.2":
         tags, points = _nodes_2(numbers("Nodes"))
         blocks = _elements_2(numbers("Elements"))
@@ -87,11 +102,11 @@ def content(file: str | os.PathLike) -> Content:
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a mesh file: physical groups name the layers (2-D) and the boundaries (1-D).
+    """Return the grid in a mesh file; physical groups name the layers (2-D) and the boundaries (1-D).
 
     Raises:
-        InputError: as `content`; no physical group of dimension 2, elements other than triangles, a body that is not
-            in a plane of constant z.
+        InputError: as in `content`. There is no physical group of dimension 2, an element is not a triangle, or the
+            body is not in a plane of constant z.
     """
     file = os.fspath(file)
     found = content(file)
@@ -123,7 +138,7 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def write(grid: Grid, file: str | os.PathLike) -> None:
-    """Write a grid as MSH 2.2, text: groups numbered in order, layers first."""
+    """Write a grid as MSH 2.2, text, with groups numbered in order, layers first."""
     parts = [(2, name, rows) for name, rows in grid.layers.items()]
     parts += [(1, name, rows) for name, rows in grid.boundaries.items()]
     named = [f'{dim} {tag} "{name}"' for tag, (dim, name, _) in enumerate(parts, 1)]
@@ -140,7 +155,11 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
-    """{name: elements as indices into the sorted numbers} of the physical groups of a dimension."""
+    """Return {name of a physical group: elements, as indices into the sorted node numbers} for one dimension.
+
+    Raises:
+        InputError: an element is of another type, or refers to a missing node.
+    """
     parts: dict[str, list[np.ndarray]] = {}
     what = "triangles" if dim == 2 else "edges"
     tags = {group for b in found.blocks if b.dim == dim for group in b.groups}
@@ -166,7 +185,11 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 
 
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
-    """Names and bodies of the sections, which must be the whole file."""
+    """Yield the names and contents of the sections, which must make up the whole file.
+
+    Raises:
+        InputError: a section has no end, or there is text outside the sections.
+    """
     begin, at = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
     while match := begin.match(data, at):
         end = data.find(b"$End" + match[1], match.end())
@@ -180,7 +203,11 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
-    """(version, binary, byte order, bytes of a size) from $MeshFormat."""
+    """Return (version, True if binary, byte order, bytes of a size) from $MeshFormat.
+
+    Raises:
+        InputError: the version is not supported.
+    """
     words = body.split(b"\n")[0].decode("ascii", "replace").split()
     if len(words) != 3 or words[0] not in ("2.2", "4.1") or words[1] not in ("0", "1") or words[2] not in ("4", "8"):
         raise InputError(f"mesh file {file!r}: format {' '.join(words)[:40]!r}: must be MSH 2.2 or 4.1 (gmsh:"
@@ -195,6 +222,11 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 
 
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
+    """Return {(dimension, group): name} from $PhysicalNames.
+
+    Raises:
+        InputError: a line has another form.
+    """
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
     names: dict[tuple[int, int], str] = {}
     if lines and lines[0].strip() != str(len(lines) - 1):
@@ -211,116 +243,29 @@ def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
     return names
 
 
-class _Numbers:
-    """The numbers of a section one after the other, text or binary."""
-
-    def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
-        self._binary, self._order, self._width, self.where = binary, order, width, where
-        self._body, self._at = body, 0
-        if not binary:
-            try:
-                if re.search(rb"[^\s+\-.0-9a-zA-Z]", body):      # NumPy takes 1_0 for a number
-                    raise ValueError("a character that is not part of a number")
-                self._values = np.array(body.split(), dtype=float)
-            except ValueError as error:
-                raise InputError(f"{where}: {error}: must be numbers") from None
-
-    @property
-    def binary(self) -> bool:
-        return self._binary
-
-    def line(self) -> int:
-        """Return the count on a line of text, as the old binary format has it."""
-        end = self._body.find(b"\n", self._at)
-        word = self._body[self._at:end].strip()
-        if end < 0 or not word.isdigit() or len(word) > 15:
-            raise InputError(f"{self.where}: must begin with a count")
-        self._at = end + 1
-        return int(word)
-
-    def reals(self, n: int) -> np.ndarray:
-        """Return the next n real numbers."""
-        return self._take(n, "f8")
-
-    def ints(self, n: int) -> np.ndarray:
-        """Return the next n whole numbers of four bytes."""
-        return self.whole(self._take(n, "i4"))
-
-    def few(self, n: int) -> list[int]:
-        """`ints` as a list."""
-        return [int(value) for value in self.ints(n)]
-
-    def sizes(self, n: int) -> np.ndarray:
-        """Return the next n whole numbers of the file's own width (counts, and numbers of nodes and elements)."""
-        return self.whole(self._take(n, f"u{self._width}"))
-
-    def end(self) -> None:
-        """Raise an InputError unless all of the section was read: the part beyond its counts would be lost."""
-        left = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
-        if left:
-            raise InputError(f"{self.where}: {left} more {'bytes' if self._binary else 'numbers'} follow what its"
-                             f" counts announce")
-
-    def records(self, n: int, fields: list) -> np.ndarray:
-        """Return the next n records of a binary section."""
-        return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
-
-    def _take(self, n: int, kind: str) -> np.ndarray:
-        if self._binary:
-            return self._bytes(n, np.dtype(self._order + kind))
-        if n > len(self._values) - self._at:
-            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
-        self._at += n
-        return self._values[self._at - n:self._at]
-
-    def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
-        if n * kind.itemsize > len(self._body) - self._at:
-            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
-        found = np.frombuffer(self._body, kind, n, self._at)
-        self._at += n * kind.itemsize
-        return found
-
-    def whole(self, values: np.ndarray) -> np.ndarray:
-        """Return the values as whole numbers; an InputError unless they are."""
-        with np.errstate(invalid="ignore"):
-            whole = np.abs(values) < 2.0**53
-            found = np.where(whole, values, 0).astype(np.int64)
-        if not np.all(whole) or np.any(found != values):
-            raise InputError(f"{self.where}: a whole number was expected")
-        return found
-
-
-def _count(found: Sequence[int] | np.ndarray, section: _Numbers) -> int:
-    n = int(found[0])
-    if not 0 <= n < 2**40:
-        raise InputError(f"{section.where}: a count is {n}")
-    return n
-
-
-def _dimension(dim: int, section: _Numbers) -> int:
-    if not 0 <= dim <= 3:
-        raise InputError(f"{section.where}: a dimension is {dim}")
-    return dim
-
-
-def _nodes_2(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
+    """Return node numbers and points of a section in format 2."""
     if section.binary:
         rows = section.records(section.line(), [("number", "i4", ()), ("x", "f8", (3,))])
         section.end()
         return rows["number"].astype(np.int64), rows["x"].astype(float)
-    n = _count(section.ints(1), section)
+    n = checked_count(section.ints(1), section)
     rows = section.reals(4 * n).reshape(n, 4)
     section.end()
     return section.whole(rows[:, 0]), rows[:, 1:].copy()
 
 
-def _elements_2(section: _Numbers) -> list[Block]:
-    """One block for each (type, group, entity), in the order of the file."""
+def _elements_2(section: Section) -> list[Block]:
+    """Return one block for each (type, group, entity) of a section in format 2.
+
+    Raises:
+        InputError: an element type is unknown.
+    """
     found: dict[tuple[int, int, int], list] = {}
-    n, got = section.line() if section.binary else _count(section.ints(1), section), 0
+    n, got = section.line() if section.binary else checked_count(section.ints(1), section), 0
     while got < n:
         # binary: type, number of such elements, number of tags, then elements; text: number, type, number of tags
-        head = section.few(3)
+        head = section.int_list(3)
         kind, many, tags = head if section.binary else (head[1], 1, head[2])
         if kind not in _KINDS or many < 1 or not 2 <= tags <= 1000:
             raise InputError(f"{section.where}: element {got + 1}: type {kind} with {tags} tags is not known")
@@ -334,23 +279,28 @@ def _elements_2(section: _Numbers) -> list[Block]:
             for (kind, group, entity), rows in found.items()]
 
 
-def _groups(section: _Numbers, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
-    """{(dimension, entity): its physical groups}; `whole`: those of the entities that partitions are parts of."""
+def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
+    """Return {(dimension, entity): its physical groups}.
+
+    Args:
+        section: the section $Entities or $PartitionedEntities.
+        whole: groups of the entities that were partitioned.
+    """
     found = {}
     if whole is not None:
         section.sizes(1)                                    # number of partitions
-        section.ints(2 * _count(section.sizes(1), section))         # ghost entities
+        section.ints(2 * checked_count(section.sizes(1), section))         # ghost entities
     counts = section.sizes(4)
     for dim in range(4):
-        for _ in range(_count(counts[dim:], section)):
-            tag, = section.few(1)
+        for _ in range(checked_count(counts[dim:], section)):
+            tag, = section.int_list(1)
             if whole is not None:
-                parent = tuple(section.few(2))
-                section.ints(_count(section.sizes(1), section))     # partitions
+                parent = tuple(section.int_list(2))
+                section.ints(checked_count(section.sizes(1), section))     # partitions
             section.reals(3 if dim == 0 else 6)
-            groups = section.few(_count(section.sizes(1), section))
+            groups = section.int_list(checked_count(section.sizes(1), section))
             if dim:
-                section.ints(_count(section.sizes(1), section))
+                section.ints(checked_count(section.sizes(1), section))
             if whole is not None:
                 groups += whole.get(parent, ()) if parent[0] == dim else ()
             found[dim, tag] = tuple(dict.fromkeys(map(abs, groups)))
@@ -358,33 +308,43 @@ def _groups(section: _Numbers, whole: dict | None = None) -> dict[tuple[int, int
     return found
 
 
-def _nodes_4(section: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
+    """Return node numbers and points of a section in format 4."""
     numbers: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
     points: list[np.ndarray] = [np.zeros((0, 3))]
     blocks, total, *_ = section.sizes(4)
-    for _ in range(_count([blocks], section)):
-        dim, _, parametric = section.few(3)
-        n = _count(section.sizes(1), section)
+    for _ in range(checked_count([blocks], section)):
+        dim, _, parametric = section.int_list(3)
+        n = checked_count(section.sizes(1), section)
         numbers.append(section.sizes(n))
-        width = 3 + (_dimension(dim, section) if parametric else 0)
+        width = 3 + (checked_dimension(dim, section) if parametric else 0)
         points.append(section.reals(width * n).reshape(n, width)[:, :3])
     _total(section, "nodes", total, numbers)
     return np.concatenate(numbers), np.concatenate(points)
 
 
-def _total(section: _Numbers, what: str, total: int, parts: list[np.ndarray]) -> None:
-    """Raise an InputError unless the section ends and has as many parts as its first line says."""
+def _total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
+    """Check that a section ends, and has the number of parts that its first line states.
+
+    Raises:
+        InputError: the numbers differ.
+    """
     section.end()
     if (found := sum(map(len, parts))) != total:
         raise InputError(f"{section.where}: {found} {what}, but its first line says {total}")
 
 
-def _elements_4(section: _Numbers, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
+def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
+    """Return the blocks of a section in format 4.
+
+    Raises:
+        InputError: an element type is unknown.
+    """
     blocks = []
     many, total, *_ = section.sizes(4)
-    for _ in range(_count([many], section)):
-        dim, entity, kind = section.few(3)
-        n = _count(section.sizes(1), section)
+    for _ in range(checked_count([many], section)):
+        dim, entity, kind = section.int_list(3)
+        n = checked_count(section.sizes(1), section)
         if kind not in _KINDS or _KINDS[kind][0] != dim:
             raise InputError(f"{section.where}: elements of type {kind} and dimension {dim} are not known")
         width = 1 + _KINDS[kind][1]

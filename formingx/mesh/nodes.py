@@ -1,4 +1,4 @@
-"""Nodes of the locally owned cells and facets of a DOLFINx mesh, in as many coordinates as the mesh has."""
+"""Nodes of cells and facets of a DOLFINx mesh, in reference coordinates."""
 
 from typing import Any
 
@@ -7,67 +7,70 @@ from mpi4py import MPI
 
 from .. import _compat
 
-MOST_COMPARED = 1_000_000
-"""At most so many coordinates are compared to find nearest points one by one."""
+MAX_COMPARED = 1_000_000
+"""Largest number of compared coordinates for a direct search for nearest points."""
 COORDINATES = 2
 """Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
 
 
 def axes(domain: Any) -> str:
-    """Names of the two reference coordinates: "RZ" of a section, "xy" of a sheet in three dimensions."""
+    """Return the names of the two reference coordinates: "RZ" for a section, "xy" for a sheet in three dimensions."""
     return "RZ" if domain.geometry.dim == 2 else "xy"
 
 
 def own_cells(domain: Any) -> np.ndarray:
-    """Numbers of the cells that are this rank's own, shape (m,), from 0 on."""
+    """Return the local numbers of the cells that this rank owns, shape (m,)."""
     return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
 
 
 def of_mesh(domain: Any) -> np.ndarray:
-    """Return this rank's nodes in the reference configuration, shape (n, COORDINATES)."""
+    """Return the reference positions of this rank's nodes, shape (n, COORDINATES), length."""
     return domain.geometry.x[:, :COORDINATES]
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
-    """Lowest and highest coordinates of the nodes in the reference configuration, all ranks, shape (2, COORDINATES)."""
+    """Return the lowest and highest coordinates of all nodes, shape (2, COORDINATES), length; collective."""
     X = of_mesh(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
 
 
 def of_space(space: Any) -> np.ndarray:
-    """Return the reference positions of the unknowns of a space (of blocks, the blocks), shape (n, COORDINATES)."""
+    """Return the reference positions of the (blocked) unknowns of a function space, shape (n, COORDINATES), length."""
     return space.tabulate_dof_coordinates()[:, :COORDINATES]
 
 
 def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance from each place to the nearest point, and the number of that point, shapes as of `places`.
+    """Return the distance from each place to the nearest point, and the number of this point.
 
     Args:
         points: shape (n, d), length.
         places: shape (..., d), length.
+
+    Returns:
+        Distances, shape (...,), length, and point numbers, shape (...,).
     """
-    if len(points) * places.size > MOST_COMPARED:
+    if len(points) * places.size > MAX_COMPARED:
         from scipy.spatial import cKDTree
         return cKDTree(points).query(places)
-    squares = ((places[..., None, :] - points) ** 2).sum(-1)            # importing SciPy takes longer than all of them
+    squares = ((places[..., None, :] - points) ** 2).sum(-1)            # faster than the import of SciPy
     numbers = squares.argmin(-1)
     return np.sqrt(np.take_along_axis(squares, numbers[..., None], -1)[..., 0]), numbers
 
 
 def of_cells(domain: Any, cells: Any) -> np.ndarray:
-    """Nodes of cells, their corners first, shape (cells, nodes, coordinates)."""
+    """Return the nodes of cells, corners first, shape (cells, nodes, coordinates), length."""
     geometry = domain.geometry
     return geometry.x[np.asarray(_compat.cell_nodes(domain))[cells], :geometry.dim]
 
 
 def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Nodes of facets of a plane mesh or of a sheet, their ends first, shape (facets, 2 or 3, coordinates)."""
+    """Return the nodes of facets, ends first, shape (facets, 2 or 3, coordinates), length."""
     return domain.geometry.x[numbers_of_facets(domain, facets), :domain.geometry.dim]
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the rows of `geometry.x` of the nodes of facets, shape (facets, 2 or 3)."""
+    """Return the rows of `geometry.x` with the nodes of facets, shape (facets, 2 or 3)."""
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

@@ -38,10 +38,15 @@ _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
 
 
 def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:
-    """Write a grid as text (see the module).
+    """Write a grid in the text format (see the module).
+
+    Args:
+        grid: the grid.
+        file: name of the file.
+        numbering: order of the nodes of an element, "corners" or "around".
 
     Raises:
-        InputError: an unknown numbering, or a grid of three-node triangles.
+        InputError: the numbering is unknown, or the triangles have three nodes.
 
     >>> fx.mesh.write(fx.mesh.disc(radius=50.0, thickness=2.0, elements=(10, 1)), "plate.msh")
     >>> sorted(fx.mesh.read("plate.msh").boundaries)
@@ -65,10 +70,10 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a text file (see the module); clockwise elements are turned.
+    """Return the grid in a text file (see the module); clockwise elements are reversed.
 
     Raises:
-        InputError: the file is not there or not in this format; the message names the line.
+        InputError: the file is missing or not in this format; the message names the line.
     """
     lines = _Lines(os.fspath(file))
     *first, version = next(lines, None) or [""]
@@ -119,7 +124,11 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
-    """Raise an InputError for a boundary edge that is no edge of an element."""
+    """Check that every boundary edge is an edge of an element.
+
+    Raises:
+        InputError: an edge is not.
+    """
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
     for name, rows in boundaries.items():
@@ -130,6 +139,11 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
 
 
 def _known(numbering: str, lines: _Lines | None = None) -> str:
+    """Return the numbering, checked.
+
+    Raises:
+        InputError: it is unknown.
+    """
     if numbering not in _NUMBERINGS:
         message = f"numbering = {numbering!r}: must be one of {', '.join(map(repr, _NUMBERINGS))}"
         raise lines.error(message) if lines else InputError(f"mesh.write: {message}")
@@ -137,6 +151,7 @@ def _known(numbering: str, lines: _Lines | None = None) -> str:
 
 
 def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
+    """Return the name of a layer or a boundary, checked to be new."""
     name = " ".join(words[2:])
     if name in taken:
         raise lines.error(f"a second block {words[0]!r} is called {name!r}")
@@ -144,7 +159,7 @@ def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
 
 
 class _Lines(Iterator):
-    """The lines of a file as words, without comments; knows where it is."""
+    """Lines of a file as words without comments, with their line numbers for messages."""
 
     def __init__(self, file: str):
         self.file, self.at = file, 0
@@ -163,11 +178,20 @@ class _Lines(Iterator):
         raise StopIteration
 
     def error(self, message: str) -> InputError:
+        """Return an error that names the present line."""
         shown = self._text[self.at - 1].strip() if self._text else ""
         return InputError(f"mesh file {self.file!r}, line {self.at} ({shown[:60]!r}): {message}")
 
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
-        """`count` lines of numbers; node numbers (all columns, or all but the first) become indices."""
+        """Return `count` lines of numbers, with node numbers converted to indices.
+
+        Args:
+            count: the number of lines, as text.
+            kinds: type of each column.
+            what: content, for messages.
+            nodes: {node number: index}; None for no conversion.
+            all_nodes: True if the first column is a node number, too.
+        """
         if not (count.isascii() and count.isdigit() and len(count) <= 15) or int(count) < 1:
             raise self.error(f"the count {count!r} must be a whole number of at least 1")
         rows = []

@@ -1,4 +1,4 @@
-"""The triangles of a mesh in the reference configuration: their sizes and shapes, and where in the body one is."""
+"""Triangles of a mesh in the reference configuration: sizes, shapes, and places in the body."""
 
 from typing import Any, NamedTuple
 
@@ -10,8 +10,15 @@ from .nodes import of_cells, own_cells
 
 
 class Place(NamedTuple):
-    """A point of the body: reference (R, Z), length; the layer it is in ("" if that is not known); the nearest named
-    boundary and its distance, length."""
+    """Place in the body.
+
+    Attributes:
+        R: reference coordinate R, length.
+        Z: reference coordinate Z, length.
+        layer: name of the layer, "" if unknown.
+        boundary: name of the nearest boundary.
+        distance: distance from this boundary, length.
+    """
 
     R: float
     Z: float
@@ -28,10 +35,12 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Return the `Place` of a point, with its nearest boundary; collective.
+    """Return the `Place` of a point; collective.
 
     Args:
-        point: reference coordinates, shape (2,), of a sheet in three dimensions (x, y); the same on all ranks.
+        mesh: the mesh.
+        point: reference coordinates, shape (2,), length, equal on all ranks; in three dimensions (x, y).
+        layer: name of the layer, if known.
     """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
@@ -44,7 +53,16 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
 
 
 def shape_quality(corners: np.ndarray) -> np.ndarray:
-    """4 sqrt(3) area / (sum of squared edges) of triangles, corners (n, 3, 2): 1 equilateral, 0 flat, < 0 inverted."""
+    """Return 4 sqrt(3) area / (sum of squared edges) of triangles.
+
+    It is 1 for an equilateral triangle, 0 for a flat one, and negative for an inverted one.
+
+    Args:
+        corners: shape (n, 3, 2), length.
+
+    Returns:
+        Shape (n,).
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     squares = sum(((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a)))
@@ -52,14 +70,19 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 
 
 class Triangles:
-    """The m triangles of a mesh, all ranks; collective.
+    """The m triangles of a mesh on all ranks; collective.
+
+    Args:
+        mesh: the mesh.
 
     Attributes:
-        corners: shape (m, 3, 2), length.
+        corners: corners, shape (m, 3, 2), length.
         layer: names of their layers, shape (m,).
-        edge: the longest of each, shape (m,), length; area: shape (m,), length^2.
+        edge: longest edges, shape (m,), length.
+        area: areas, shape (m,), length^2.
         slenderness: longest edge over the height on it, shape (m,).
-        length: the largest extent of the body; thickness: its area over that length.
+        length: largest extent of the body, length.
+        thickness: area of the body over its length, length.
     """
 
     def __init__(self, mesh: Mesh):

@@ -1,4 +1,4 @@
-"""A gmsh model for the time of a mesh, in a session that a script has open, or in one of its own."""
+"""Temporary gmsh models, in the open session of a script or in a new one."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -7,12 +7,20 @@ from typing import Any
 _DEFAULTS = {"General.Terminal": 0, "Mesh.Algorithm": 6, "Mesh.ElementOrder": 1, "Mesh.RecombineAll": 0,
              "Mesh.MeshSizeFactor": 1, "Mesh.MeshSizeMin": 0, "Mesh.MeshSizeMax": 1e22, "Mesh.MeshSizeFromPoints": 0,
              "Mesh.MeshSizeFromCurvature": 0, "Mesh.MeshSizeExtendFromBoundary": 1}
-"""Gmsh's own, but that it is silent and that points ask for no size: a script may have set others."""
+"""Default options of gmsh, without its output and without mesh sizes at points; a script may have set others."""
 
 
 @contextmanager
 def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any]:
-    """gmsh with a new model and these options; then a script's session has its current model and options again."""
+    """Provide gmsh with a new model within a block; afterwards the script's model and options are restored.
+
+    Args:
+        name: name of the model.
+        options: {name: value} of gmsh options.
+
+    Yields:
+        The module gmsh.
+    """
     import gmsh
     mine = not gmsh.isInitialized()
     if mine:

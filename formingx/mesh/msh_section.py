@@ -1,0 +1,141 @@
+"""Section of a gmsh mesh file: reads its numbers in order, text or binary."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+
+
+class Section:
+    """Reader of the numbers of a section.
+
+    Args:
+        body: content of the section.
+        binary: True in a binary file.
+        order: byte order, "<" or ">".
+        width: bytes of a size.
+        where: name of the section, for messages.
+    """
+
+    def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
+        self._binary, self._order, self._width, self.where = binary, order, width, where
+        self._body, self._at = body, 0
+        if not binary:
+            try:
+                if re.search(rb"[^\s+\-.0-9a-zA-Z]", body):      # NumPy takes 1_0 for a number
+                    raise ValueError("a character that is not part of a number")
+                self._values = np.array(body.split(), dtype=float)
+            except ValueError as error:
+                raise InputError(f"{where}: {error}: must be numbers") from None
+
+    @property
+    def binary(self) -> bool:
+        """True in a binary file."""
+        return self._binary
+
+    def line(self) -> int:
+        """Return the count on a line of text, as in the old binary format.
+
+        Raises:
+            InputError: there is no such line.
+        """
+        end = self._body.find(b"\n", self._at)
+        word = self._body[self._at:end].strip()
+        if end < 0 or not word.isdigit() or len(word) > 15:
+            raise InputError(f"{self.where}: must begin with a count")
+        self._at = end + 1
+        return int(word)
+
+    def reals(self, n: int) -> np.ndarray:
+        """Return the next n real numbers."""
+        return self._take(n, "f8")
+
+    def ints(self, n: int) -> np.ndarray:
+        """Return the next n integers of four bytes."""
+        return self.whole(self._take(n, "i4"))
+
+    def int_list(self, n: int) -> list[int]:
+        """Return the next n integers of four bytes as a list."""
+        return [int(value) for value in self.ints(n)]
+
+    def sizes(self, n: int) -> np.ndarray:
+        """Return the next n integers of the file's size type (counts, node and element numbers)."""
+        return self.whole(self._take(n, f"u{self._width}"))
+
+    def end(self) -> None:
+        """Check that the whole section was read.
+
+        Raises:
+            InputError: numbers are left over, which would be lost.
+        """
+        remaining = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
+        if remaining:
+            raise InputError(f"{self.where}: {remaining} more {'bytes' if self._binary else 'numbers'} follow what its"
+                             f" counts announce")
+
+    def records(self, n: int, fields: list) -> np.ndarray:
+        """Return the next n records of a binary section."""
+        return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
+
+    def _take(self, n: int, kind: str) -> np.ndarray:
+        """Return the next n numbers of a kind.
+
+        Raises:
+            InputError: the section is too short.
+        """
+        if self._binary:
+            return self._bytes(n, np.dtype(self._order + kind))
+        if n > len(self._values) - self._at:
+            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
+        self._at += n
+        return self._values[self._at - n:self._at]
+
+    def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
+        """Return the next n numbers of a binary section.
+
+        Raises:
+            InputError: the section is too short.
+        """
+        if n * kind.itemsize > len(self._body) - self._at:
+            raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
+        found = np.frombuffer(self._body, kind, n, self._at)
+        self._at += n * kind.itemsize
+        return found
+
+    def whole(self, values: np.ndarray) -> np.ndarray:
+        """Return real numbers as integers.
+
+        Raises:
+            InputError: a number is not an integer.
+        """
+        with np.errstate(invalid="ignore"):
+            whole = np.abs(values) < 2.0**53
+            found = np.where(whole, values, 0).astype(np.int64)
+        if not np.all(whole) or np.any(found != values):
+            raise InputError(f"{self.where}: a whole number was expected")
+        return found
+
+
+def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
+    """Return the first of the numbers as a count.
+
+    Raises:
+        InputError: it is negative or too large.
+    """
+    n = int(found[0])
+    if not 0 <= n < 2**40:
+        raise InputError(f"{section.where}: a count is {n}")
+    return n
+
+
+def checked_dimension(dim: int, section: Section) -> int:
+    """Return a dimension.
+
+    Raises:
+        InputError: it is not between 0 and 3.
+    """
+    if not 0 <= dim <= 3:
+        raise InputError(f"{section.where}: a dimension is {dim}")
+    return dim
