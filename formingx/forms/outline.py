@@ -13,6 +13,9 @@ from ..errors import InputError
 from ..mesh.check import crossing, crossings
 from ..ranks import gathered
 
+FINE_PIECES = 16
+"""Straight pieces that replace a curved edge where distances and lengths are measured."""
+
 _PARTS = 8
 """Straight pieces of an edge in the search for self-intersections."""
 

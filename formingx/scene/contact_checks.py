@@ -11,7 +11,7 @@ from ..physics.supports import Constrained
 from ..ranks import gathered
 from . import tool_width
 
-_LARGER = 4.0
+OTHER_UNIT = 4.0
 """Ratio of sizes above which a body that starts inside a tool probably has another unit of length."""
 
 
@@ -48,7 +48,7 @@ def check_start(scene: Any, contact: Contact) -> None:
         free = contact.tool.reversed().signed_distance(points).max() <= near
         size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(scene.extent)
         why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
-        if not length < _LARGER * size:
+        if not length < OTHER_UNIT * size:
             why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
                    f" and cm)?")
         raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="

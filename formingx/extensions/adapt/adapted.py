@@ -9,10 +9,7 @@ import numpy as np
 from ...errors import InputError, positive
 from ...mesh.mesh import Columns, Mesh
 from .column_factors import column_factors
-from .sizes import wanted_sizes
-
-_GROWTH = 0.25
-"""Largest relative excess of a column's length over its neighbour's."""
+from .sizes import GROWTH, wanted_sizes
 
 _LEAST = 1 / 8
 """Smallest length of a column over its length in the run: finer sizes are unreliable on coarse columns."""
@@ -118,7 +115,7 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     length = np.diff(joints)
     requested = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
     away = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
-    size = (requested + _GROWTH * away).min(1)
+    size = (requested + GROWTH * away).min(1)
     number = np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
     if number[-1] > _MOST:
         raise InputError(f"adapted: share and error ask for {number[-1]:.3g} elements along the sheet, at most {_MOST}"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import positive
-from ...forms.outline import Outline, along
+from ...forms.outline import FINE_PIECES, Outline, along
 from ...results.extend import method_of
 from ...results.path import Path
 
@@ -16,9 +16,6 @@ _STATES = 12
 
 _NEAR = 0.25
 """Gap over the fillet radius up to which the face lies on the fillet: the gap of a chord of 80 degrees."""
-
-_PARTS = 16
-"""Straight segments of an edge of the face."""
 
 _MOST = 1.0
 """Largest rotation of a column that is used, radians: a larger one belongs to a coarse or a crushed element."""
@@ -76,7 +73,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
         with problem.state_context(state):
             edges = outline.edges()
         found = np.minimum(found, share / np.maximum(_turns(edges, sides), 1e-300))
-        points = along(edges, _PARTS)
+        points = along(edges, FINE_PIECES)
         length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
         with problem.state_context(state):
             for contact, face in zip(problem.contacts, faces):
@@ -88,7 +85,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
                 radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(
                     near.curvature) * near.distance
                 lies = (radius > 0) & (-near.distance < _NEAR * radius)
-                least = np.where(lies, radius, np.inf).reshape(-1, _PARTS + 1).min(1)
+                least = np.where(lies, radius, np.inf).reshape(-1, FINE_PIECES + 1).min(1)
                 np.minimum.at(found, column[face], share * least / length[face])
     return found
 

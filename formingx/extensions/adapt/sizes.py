@@ -11,7 +11,7 @@ from ...mesh.nodes import COORDINATES
 _FINEST = 0.25
 """Smallest wanted over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
-_GROWTH = 0.25
+GROWTH = 0.25
 """Growth of the size per distance along the sheet."""
 
 
@@ -59,9 +59,9 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return sizes at nodes, reduced so that they grow by at most `_GROWTH` along edges."""
+    """Return sizes at nodes, reduced so that they grow by at most `GROWTH` along edges."""
     a, b = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).T
-    reach = _GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
+    reach = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:
         before = size.copy()
         np.minimum.at(size, a, before[b] + reach)

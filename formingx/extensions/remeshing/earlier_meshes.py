@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from ...forms.carry import Carrier
-from ...forms.outline import Outline, along
+from ...forms.outline import FINE_PIECES, Outline, along
 from ...forms.probes import Probe
 from ...mesh.nodes import of_mesh, of_space
 
 _NEAR = 0.02
 """Distance from the outline over the element size below which a point is moved onto it: new edges differ from old."""
 
-_PARTS = 16                # of an edge, to find the nearest of its points
 
 
 class FollowedProbe(Probe):
@@ -76,12 +75,12 @@ class _Onto:
     @cached_property
     def _tree(self) -> Any:
         from scipy.spatial import cKDTree
-        return cKDTree(along(self._edges, _PARTS).reshape(-1, self._edges.shape[-1]))
+        return cKDTree(along(self._edges, FINE_PIECES).reshape(-1, self._edges.shape[-1]))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        edge, part = np.divmod(self._tree.query(x)[1], _PARTS + 1)
+        edge, part = np.divmod(self._tree.query(x)[1], FINE_PIECES + 1)
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
-        s = part[:, None] / _PARTS
+        s = part[:, None] / FINE_PIECES
         bend = 2 * (a + b - 2 * middle)
         for _ in range(4):                                   # Newton's method for the closest point on the parabola
             slope, offset = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...forms.outline import FINE_PIECES
 from ...mesh import with_gmsh
 from ...mesh.grid import Grid, to_mesh
 from ...mesh.mesh import Mesh
@@ -13,7 +14,6 @@ from ...mesh.mesh import Mesh
 _GROWTH = 0.3
 """Growth of the element size per distance from a corner."""
 
-_FINE = 16                 # straight segments that measure the length of an edge
 
 
 def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
@@ -105,7 +105,7 @@ def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
 
 def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
     """Return new ends, shape (n + 1, 2), and midpoints, shape (n, 2), on a line of edges, graded to corners."""
-    parameter = np.linspace(0, len(edges), _FINE * len(edges) + 1)
+    parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 
     def place(t: np.ndarray) -> np.ndarray:
         k = np.minimum(t.astype(int), len(edges) - 1)

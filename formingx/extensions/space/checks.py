@@ -7,10 +7,10 @@ import numpy as np
 
 from ...findings import Finding, register
 from ...physics.supports import NAMES, Symmetry
+from ...scene.contact_checks import OTHER_UNIT
 from .solid_tool import Triangulated
 
 _SHARE = 1e-3              # of the sheet's area in compression
-_LARGER = 4.0              # a file's tool over the sheet: one in another unit of length
 
 
 @register("end")
@@ -37,6 +37,6 @@ def too_large(body: Any) -> Iterator[Finding]:
             cut = [any(isinstance(s, Symmetry) and NAMES[s.component] == axis for s in scene.supports) for axis in "xy"]
             sheet = max((1 + half) * float(length) for half, length in zip(cut, scene.extent))
             ratio = float(np.ptp(contact.tool.bounds, axis=0)[:2].max() / sheet)
-            if ratio > _LARGER:
+            if ratio > OTHER_UNIT:
                 yield Finding("warning", repr(contact), f"the tool is {ratio:.3g} times as wide as the sheet: is its"
                               f" file in another unit of length? Give solid a scale=...")
