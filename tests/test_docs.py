@@ -5,10 +5,12 @@ import importlib
 import pkgutil
 import re
 import shutil
+import sys
 from contextlib import nullcontext
 
 import pytest
 from conftest import ROOT, drawn, run
+from PIL import Image, ImageChops, ImageStat
 from printed import assert_shows
 
 import formingx.exact
@@ -30,6 +32,18 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
         assert_shows(shown, capsys.readouterr().out)
     for name in re.findall(r"\]\(pictures/(\w+\.png)\)", page.read_text()):
         assert drawn(tmp_path / name) and (page.parent / "pictures" / name).is_file(), f"docs/run_page.py stores {name}"
+
+
+def test_thumbnails_are_panels_of_the_pictures():
+    sys.path.insert(0, str(DOCS))
+    import make_thumbnails
+    found = {file.stem for file in make_thumbnails.THUMBNAILS.iterdir()}
+    shown = set(re.findall(r"\(thumbnails/(\w+)\.png\)", (DOCS / "gallery.md").read_text()))
+    assert found == shown == {*make_thumbnails.PANELS}
+    for name in found:
+        with Image.open(make_thumbnails.THUMBNAILS / f"{name}.png") as stored:
+            off = ImageChops.difference(stored.convert("RGB"), make_thumbnails.panel(name))
+        assert max(ImageStat.Stat(off).mean) < 1.5, f"run docs/make_thumbnails.py: {name}"
 
 
 def test_pictures_of_pages_are_all_shown():
