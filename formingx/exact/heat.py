@@ -1,9 +1,11 @@
-"""One-dimensional conduction through a slab, solved without finite elements, to compare with.
+r"""One-dimensional heat conduction through a slab, solved without finite elements, for comparison.
 
-Series: eigenfunctions of a slab whose faces lose heat by convection (Carslaw and Jaeger, Conduction of Heat in Solids,
-1959, section 3.11), about the steady state, which holds the source. Transform: sheet and tool in contact, by Laplace
-transform and Talbot's inversion (Abate and Valko, Int. J. Numer. Methods Eng. 60 (2004) 979-993). Lines: finite volumes
-and a stiff solver, for faces that radiate.
+.. math:: \rho c \, \frac{\partial T}{\partial t} = k \frac{\partial^2 T}{\partial x^2} + q(x)
+
+`series`: eigenfunctions of a slab with convection at both faces, about the steady state (Carslaw and Jaeger, Conduction
+of Heat in Solids, 1959, section 3.11). `on_tool`: a sheet in contact with a tool, by Laplace transform and Talbot's
+inversion (Abate and Valko, Int. J. Numer. Methods Eng. 60 (2004) 979-993). `lines`: finite volumes and a stiff solver
+(method of lines), for faces that radiate.
 """
 
 from collections.abc import Callable
@@ -15,24 +17,49 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Slab:
-    """A slab from x = 0 to `thickness`; numbers in consistent units."""
+    """Slab from x = 0 to `thickness`, in consistent units.
+
+    Attributes:
+        thickness: thickness d, length.
+        conductivity: thermal conductivity k.
+        capacity: heat capacity per volume, rho c.
+    """
 
     thickness: float
     conductivity: float
     capacity: float
-    """Heat per volume and degree."""
 
     @property
     def diffusivity(self) -> float:
-        """k/capacity."""
+        """Thermal diffusivity k / (rho c), length^2/time."""
         return self.conductivity / self.capacity
 
 
 def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, float], x: Any, times: Any,
            source: Callable | None = None, terms: int = 200) -> np.ndarray:
-    """Temperatures, shape (len(times), len(x)); faces x = 0 and x = d lose h (T - air), source(x) heats the inside.
+    r"""Return the temperatures of a slab with convection at both faces.
 
-    The first root must belong to a decaying mode: at least one h above 0.
+    With the Biot numbers b of the faces and the steady state T_s:
+
+    .. math::
+        T(x, t) = T_s(x) + \sum_m A_m \, \phi_m(x/d) \, e^{-m^2 \alpha t/d^2}, \quad
+        \phi_m(s) = \cos m s + \frac{b_0}{m} \sin m s, \quad
+        \tan m = \frac{m (b_0 + b_1)}{m^2 - b_0 b_1}, \quad b_i = \frac{h_i d}{k}
+
+    (Carslaw and Jaeger 1959, section 3.11.) At least one h must be above 0, so that all modes decay.
+
+    Args:
+        slab: the slab.
+        start: uniform initial temperature.
+        h: heat transfer coefficients of the faces x = 0 and x = d.
+        air: temperatures of the air at the two faces.
+        x: positions, shape (n,), length.
+        times: times, shape (k,).
+        source: heat source per volume, a function of x; default none.
+        terms: number of terms.
+
+    Returns:
+        Temperatures, shape (k, n).
 
     >>> from formingx.exact.heat import Slab, series
     >>> sheet = Slab(thickness=2.0, conductivity=0.2, capacity=2.0)
@@ -48,55 +75,68 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
     nodes, weights = np.polynomial.legendre.leggauss(4 * terms)                # on (-1, 1)
     s = (nodes + 1) / 2
 
-    def shapes(at):
+    def mode_shapes(s):
         m = roots[:, None]
-        return np.cos(m * at) + b0 / m * np.sin(m * at)
+        return np.cos(m * s) + b0 / m * np.sin(m * s)
 
     steady = _steady(slab, h, air, source)
-    modes = shapes(s)
+    modes = mode_shapes(s)
     amplitudes = (modes @ (weights * (start - steady(d * s)))) / (modes**2 @ weights)
     x, times = np.asarray(x, dtype=float), np.asarray(times, dtype=float)
     decay = np.exp(-np.outer(times, roots**2) * slab.diffusivity / d**2)
-    return steady(x) + (decay * amplitudes) @ shapes(x / d)
+    return steady(x) + (decay * amplitudes) @ mode_shapes(x / d)
 
 
 def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callable:
-    """-k T'' = source with both faces, by Gauss quadrature."""
+    """Return the steady temperature as a function of x: -k T'' = source, with convection at both faces."""
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
 
-    def twice(x):                                           # -T''/k integrated twice from 0, and once
+    def integrated(x):                                           # -source/k integrated twice from 0, and once
         if source is None:
             return 0.0 * x, 0.0 * x
         y = x[..., None] * (nodes + 1) / 2
         S = source(y) * weights * x[..., None] / 2
         return -((x[..., None] - y) * S).sum(-1) / k, -S.sum(-1) / k
-    P, dP = (float(v) for v in twice(np.array(d)))
+    P, dP = (float(v) for v in integrated(np.array(d)))
     # T = a + b x + P(x): k b = h0 (a - air0); -k (b + dP(d)) = h1 (a + b d + P(d) - air1)
     a, b = np.linalg.solve([[-h[0], k], [h[1], k + h[1] * d]], [-h[0] * air[0], h[1] * (air[1] - P) - k * dP])
-    return lambda x: a + b * np.asarray(x) + twice(np.asarray(x, dtype=float))[0]
+    return lambda x: a + b * np.asarray(x) + integrated(np.asarray(x, dtype=float))[0]
 
 
 def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
 
-    Their shapes are (len(times), len(x)) and (len(times), len(depths)).
+    The heat flux into the tool is `conductance` (T_sheet - T_tool). The other face of the sheet loses h (T - air). The
+    back of the tool keeps its initial temperature.
 
-    x counts from the touching face, where the sheet loses `conductance` (T - tool), to the other, which loses
-    h (T - air); depths count into the tool, whose back is held at `tool_start`.
+    Args:
+        sheet: the sheet.
+        tool: the tool.
+        conductance: thermal contact conductance.
+        start: initial temperature of the sheet.
+        tool_start: initial temperature of the tool.
+        h: heat transfer coefficient of the free face.
+        air: temperature of the air.
+        x: positions in the sheet from the touching face, shape (n,), length.
+        depths: positions in the tool from the touching face, shape (m,), length.
+        times: times above 0, shape (k,).
+
+    Returns:
+        Temperatures of the sheet, shape (k, n), and of the tool, shape (k, m).
     """
     x, depths = (np.asarray(v, dtype=float) for v in (x, depths))
 
     def transformed(s):
         p, q = (np.sqrt(s / slab.diffusivity) for slab in (sheet, tool))
         kp, kq = sheet.conductivity * p, tool.conductivity * q
-        near, far = np.exp(-p * sheet.thickness), np.exp(-q * tool.thickness)
+        e_sheet, e_tool = np.exp(-p * sheet.thickness), np.exp(-q * tool.thickness)
         # sheet: start/s + A exp(-p x) + B exp(-p (d - x)); tool: tool_start/s + C exp(-q y) + D exp(-q (L - y))
-        matrix = np.array([[kp + conductance, (conductance - kp) * near, -conductance, -conductance * far],
-                           [(h - kp) * near, kp + h, 0, 0],
-                           [-conductance, -conductance * near, kq + conductance, (conductance - kq) * far],
-                           [0, 0, far, 1]])
+        matrix = np.array([[kp + conductance, (conductance - kp) * e_sheet, -conductance, -conductance * e_tool],
+                           [(h - kp) * e_sheet, kp + h, 0, 0],
+                           [-conductance, -conductance * e_sheet, kq + conductance, (conductance - kq) * e_tool],
+                           [0, 0, e_tool, 1]])
         gap = conductance * (tool_start - start) / s
         A, B, C, D = np.linalg.solve(matrix, [gap, h * (air - start) / s, -gap, 0])
         return np.concatenate([start / s + A * np.exp(-p * x) + B * np.exp(-p * (sheet.thickness - x)),
@@ -106,7 +146,7 @@ def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_star
 
 
 def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
-    """Return the inverse Laplace transform at a time, on Talbot's contour with n points; good to about 1e-9."""
+    """Return the inverse Laplace transform at a time, on Talbot's contour with n points; the error is about 1e-9."""
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
     cot = 1 / np.tan(theta)
@@ -118,10 +158,21 @@ def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
 
 def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: Any, cells: int = 400,
           source: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """(x, temperatures, shape (len(times), len(x))) by finite volumes; fluxes(T) go into the faces x = 0 and x = d.
+    """Return the temperatures of a slab with given heat fluxes at its faces, by the method of lines.
 
-    Nodes at both faces and between equal cells; the error falls with the square of the cells (Richardson's
-    extrapolation from half as many takes it away).
+    Finite volumes have nodes at both faces and between equal cells. Their error is proportional to the square of the
+    cell size; Richardson's extrapolation from two cell sizes removes it.
+
+    Args:
+        slab: the slab.
+        start: uniform initial temperature.
+        fluxes: heat fluxes into the faces x = 0 and x = d, functions of the temperature.
+        times: times in ascending order, shape (k,).
+        cells: number of cells.
+        source: heat source per volume, a function of x; default none.
+
+    Returns:
+        Positions x, shape (n,), length, and temperatures, shape (k, n).
     """
     coarse, fine = (_lines(slab, start, fluxes, times, n, source) for n in (cells // 2, cells))
     x = np.linspace(0, slab.thickness, cells // 2 + 1)
@@ -129,6 +180,7 @@ def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: An
 
 
 def _lines(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int, source: Callable | None) -> np.ndarray:
+    """Return the temperatures at the nodes of finite volumes, shape (times, cells + 1)."""
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells
@@ -137,9 +189,9 @@ def _lines(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int, sour
     width[[0, -1]] /= 2
 
     def rate(_, T):
-        through = -slab.conductivity * np.diff(T) / dx
-        into = np.concatenate([[fluxes[0](T[0])], through]) - np.concatenate([through, [-fluxes[1](T[-1])]])
-        return (into + heated * width) / (slab.capacity * width)
+        flux = -slab.conductivity * np.diff(T) / dx
+        inflow = np.concatenate([[fluxes[0](T[0])], flux]) - np.concatenate([flux, [-fluxes[1](T[-1])]])
+        return (inflow + heated * width) / (slab.capacity * width)
     pattern = diags([1, 1, 1], [-1, 0, 1], shape=(n, n))
     solved = solve_ivp(rate, (0, max(times)), np.full(n, start), "Radau", t_eval=times, rtol=1e-9, atol=1e-9,
                        jac_sparsity=pattern)

@@ -1,16 +1,41 @@
-"""Exact solutions to compare with: the inflated membrane; the thick tube and the thick sphere.
+r"""Exact solutions for comparison: the inflated circular membrane, the thick tube and the thick sphere.
 
-Membrane: Adkins & Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531. A flat circular membrane, rim held, under a
-pressure. With stretches l1 (meridional), l2 = r/R, l3 = 1/(l1 l2) and the Mooney energy, tensions per deformed length
-are T1 = 2 h0 l3 (l1^2 - l3^2)(c10 + c01 l2^2), T2 likewise. Equilibrium: d(T1 r)/dr = T2 and
-T1 dtheta/ds + T2 sin(theta)/r = p, theta the slope of the meridian. Integrated from the pole until l2 = 1: only the
-product p R counts, so no shooting is needed. Where c10 varies with R it is: per original length, with
-N1 = 2 h0 (c10 + c01 l2^2)(l1 - l1^-3 l2^-2), N2 likewise, the axial force R N1 sin(theta) is p r^2/2, and
-d(R N1 cos(theta))/dR = N2 - p r l1 sin(theta); p is found so that l2 = 1 at the rim.
+**Membrane** (Adkins and Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531). A flat circular membrane of Mooney material
+with a fixed rim, under a pressure p. The stretches are meridional, circumferential and through the thickness:
 
-Thick wall (Green & Adkins, Large Elastic Deformations, 1970; Mooney energy): l = r/R, r^n = R^n + a^n - A^n with n = 2
-(tube in plane strain) or 3 (sphere). Equilibrium, integrated from the free outer face: s_rr = g(l_outer) - g(l), with
-tube: g = 2 (c10 + c01) (ln l - l^-2/2), sphere: g = -c10 (4/l + l^-4) + c01 (4 l - 2 l^-2).
+.. math:: \lambda_1, \qquad \lambda_2 = r/R, \qquad \lambda_3 = 1/(\lambda_1 \lambda_2)
+
+The tensions per deformed length, with reference thickness h0:
+
+.. math:: T_1 = 2 h_0 \lambda_3 (\lambda_1^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_2^2), \qquad
+          T_2 = 2 h_0 \lambda_3 (\lambda_2^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_1^2)
+
+Equilibrium, with the slope theta and the arc length s of the meridian:
+
+.. math:: \frac{d(T_1 r)}{dr} = T_2, \qquad T_1 \frac{d\theta}{ds} + T_2 \frac{\sin\theta}{r} = p
+
+The equations are integrated from the pole until the circumferential stretch is 1. Only the product p R enters, so this
+point is the rim for some radius, and scaling gives the result for the required one.
+
+If c10 varies with R, the tensions per reference length are used:
+
+.. math:: N_1 = 2 h_0 (\lambda_1 - \lambda_1^{-3} \lambda_2^{-2})(c_{10} + c_{01} \lambda_2^2), \qquad
+          R N_1 \sin\theta = \frac{p r^2}{2}, \qquad
+          \frac{d(R N_1 \cos\theta)}{dR} = N_2 - p r \lambda_1 \sin\theta
+
+There the pressure is found by the secant method, such that the circumferential stretch is 1 at the rim.
+
+**Thick wall** (Green and Adkins, Large Elastic Deformations, 1970; Mooney material), with n = 2 for a tube in plane
+strain and n = 3 for a sphere. A and a are the reference and the deformed inner radius:
+
+.. math:: r^n = R^n + a^n - A^n, \qquad \lambda = r/R
+
+Equilibrium is integrated from the free outer face, where the stretch is lambda_B:
+
+.. math:: \sigma_{rr} = g(\lambda_B) - g(\lambda)
+
+.. math:: g_\mathrm{tube} = 2 (c_{10} + c_{01}) (\ln\lambda - \tfrac{1}{2} \lambda^{-2}), \qquad
+          g_\mathrm{sphere} = -c_{10} (4 \lambda^{-1} + \lambda^{-4}) + c_{01} (4 \lambda - 2 \lambda^{-2})
 """
 
 import math
@@ -25,12 +50,15 @@ from ..errors import InputError, known, non_negative, positive
 
 @dataclass(frozen=True)
 class MembraneState:
-    """A membrane inflated to a pole stretch, in the units of the input.
+    """Membrane inflated to a given pole stretch, in the units of the input.
 
     Attributes:
-        pressure: stress. height: of the pole, length.
-        R, r, z: reference radius and deformed meridian, shape (n,), length.
-        thickness_ratio: l3 at those R, shape (n,).
+        pressure: pressure, stress.
+        height: height of the pole, length.
+        R: reference radii, shape (n,), length.
+        r: deformed radii, shape (n,), length.
+        z: deformed heights, shape (n,), length.
+        thickness_ratio: thickness stretch, shape (n,).
     """
 
     pressure: float
@@ -43,13 +71,17 @@ class MembraneState:
 
 def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
                        c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
-    """Return the inflated membrane whose stretch at the pole is `pole_stretch` (above 1).
+    """Return the inflated membrane with a given stretch at its pole.
 
     Args:
-        c10: stress; a number, or a smooth function of R (length).
+        pole_stretch: stretch at the pole, above 1.
+        radius: reference radius, length.
+        thickness: reference thickness, length.
+        c10: Mooney constant, stress; a number, or a smooth function of R (length).
+        c01: Mooney constant, stress.
 
     Raises:
-        InputError: a size or constant that is not allowed; no pressure leads from the unloaded state to this stretch.
+        InputError: a size or constant is not allowed, or no pressure gives this stretch.
 
     >>> from formingx.exact.inflation import membrane_inflation
     >>> state = membrane_inflation(2.0, radius=1.25, thickness=0.082, c10=2.0)
@@ -96,7 +128,11 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
 def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
                       c01: float) -> MembraneState:
-    """`membrane_inflation` with c10(R): the pressure by the secant method, followed from a small stretch."""
+    """Return `membrane_inflation` for c10(R), with the pressure continued from a small stretch by the secant method.
+
+    Raises:
+        InputError: no pressure was found.
+    """
     from scipy.integrate import solve_ivp
     from scipy.optimize import root_scalar
     unit = positive("c10 at R = 0", float(c10(0.0)))       # lengths over radius, tensions over 2 c10(0) h0
@@ -133,7 +169,14 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
 
 
 def meridional_stretch(n: Any, l2: Any) -> Any:
-    """l1 of l1 - l1^-3 l2^-2 = n: Newton's method from above."""
+    r"""Return the meridional stretch of a neo-Hookean membrane for a tension, by Newton's method.
+
+    .. math:: \lambda_1 - \lambda_1^{-3} \lambda_2^{-2} = n
+
+    Args:
+        n: tension per reference length over 2 c10 h0, shape (k,) or a number.
+        l2: circumferential stretch, shape (k,) or a number.
+    """
     l1 = n + l2**-0.5
     for _ in range(20):
         l1 = l1 - (l1 - l1**-3 * l2**-2 - n) / (1 + 3 * l1**-4 * l2**-2)
@@ -142,7 +185,16 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
 
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
-    """(pole stretch, state) of the first pressure maximum below a pole stretch of 12, or None if there is none.
+    """Return the first pressure maximum of a membrane, or None if there is none below a pole stretch of 12.
+
+    Args:
+        radius: reference radius, length.
+        thickness: reference thickness, length.
+        c10: Mooney constant, stress.
+        c01: Mooney constant, stress.
+
+    Returns:
+        The pole stretch and the state at the maximum.
 
     >>> from formingx.exact.inflation import membrane_limit_point
     >>> stretch, state = membrane_limit_point(radius=1.25, thickness=0.082, c10=2.0)
@@ -170,12 +222,15 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
 
 @dataclass(frozen=True)
 class ThickWallState:
-    """A thick tube or sphere inflated to a stretch of its inner face.
+    """Thick tube or sphere inflated to a given stretch of its inner face.
 
     Attributes:
-        pressure: inside, stress.
-        R, r: reference and deformed radii through the wall, shape (n,), length.
-        radial, hoop, third: Cauchy stresses there, shape (n,); third is along the tube, or the sphere's other hoop.
+        pressure: inner pressure, stress.
+        R: reference radii through the wall, shape (n,), length.
+        r: deformed radii, shape (n,), length.
+        radial: radial Cauchy stress, shape (n,), stress.
+        hoop: hoop stress, shape (n,), stress.
+        third: axial stress of a tube, second hoop stress of a sphere, shape (n,), stress.
     """
 
     pressure: float
@@ -187,14 +242,15 @@ class ThickWallState:
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
-        """-(s_rr + s_hoop + s_third)/3, shape (n,), stress."""
+        """Hydrostatic pressure, minus the mean of the three stresses, shape (n,), stress."""
         return -(self.radial + self.hoop + self.third) / 3
 
     def cauchy(self, direction: Any) -> np.ndarray:
         """Return the Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
 
         Args:
-            direction: from the inside out in the (r, z) plane, of any length, shape (2,) or (n, 2): (1, 0) for a tube.
+            direction: outward direction through the wall in the (r, z) plane, of any length, shape (2,) or (n, 2); (1,
+                0) for a tube.
         """
         radial = np.broadcast_to(np.asarray(direction, dtype=float), (len(self.R), 2))
         radial = radial / np.linalg.norm(radial, axis=1)[:, None]
@@ -208,16 +264,19 @@ class ThickWallState:
 
 def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_radius: float, c10: float,
                c01: float = 0.0, R: Any = None) -> ThickWallState:
-    """Return the exact state of a thick "tube" (plane strain) or "sphere" whose inner face has the stretch
-    `inner_stretch`.
+    """Return the exact state of a thick tube (plane strain) or sphere with a given stretch of its inner face.
 
     Args:
-        inner_radius, outer_radius: A and B, of the unloaded wall, length.
-        c10, c01: Mooney constants, stress.
-        R: reference radii to evaluate at, shape (n,); default: both faces.
+        kind: "tube" or "sphere".
+        inner_stretch: deformed over reference inner radius.
+        inner_radius: reference inner radius A, length.
+        outer_radius: reference outer radius B, length.
+        c10: Mooney constant, stress.
+        c01: Mooney constant, stress.
+        R: reference radii at which the stresses are given, shape (n,), length; default both faces.
 
     Raises:
-        InputError: a size or constant that is not allowed.
+        InputError: a size or constant is not allowed.
 
     >>> from formingx.exact.inflation import thick_wall
     >>> state = thick_wall("sphere", 2.0, inner_radius=1.0, outer_radius=2.0, c10=1.0)
@@ -250,10 +309,13 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
 
 
 def thick_sphere_limit_point(**wall: float) -> tuple[float, ThickWallState] | None:
-    """(inner stretch, state) of the first pressure maximum of a thick sphere below a stretch of 20, or None.
+    """Return the first pressure maximum of a thick sphere, or None if there is none below an inner stretch of 20.
 
     Args:
-        wall: the sizes and constants of `thick_wall`.
+        wall: sizes and constants of `thick_wall`.
+
+    Returns:
+        The inner stretch and the state at the maximum.
     """
     from scipy.optimize import minimize_scalar
 

@@ -1,18 +1,36 @@
-"""Membranes under a plug, solved by ordinary differential equations, to compare with.
+r"""Membranes under a plug, solved by ordinary differential equations, for comparison.
 
-A flat circular membrane (Mooney), rim held, pushed by a flat plug of radius rp. Sharp edge: outside the plug, with
-tensions per original length N1 = 2 h0 (l1 - l1^-3 l2^-2)(c10 + c01 l2^2), N2 likewise, and H, V the radial and axial
-parts of R N1: dH/dR = N2, V = force/(2 pi), dr/dR = l1 H/(R N1), dz/dR = l1 V/(R N1). A stuck membrane keeps r = rp
-at R = rp; one that slides without friction is equally stretched over the face, by l0, and N1 goes on across the edge
-at R = rp/l0.
+A flat circular membrane with a fixed rim is pushed by a flat plug of radius r_p.
 
-Rounded edge, Coulomb friction (neo-Hookean): the flat carries no pressure, so it is stretched equally, by l0, and
-everything that touches the edge and the side slides outwards. With tensions per deformed length
-T1 = 2 c10 h0 (l1/l2 - (l1 l2)^-3), T2 likewise, arc length s, slope phi and the meridian's curvature kappa,
-dT1/ds = (T2 - T1) cos(phi)/r + mu N,   N = T1 kappa + T2 sin(phi)/r   (equilibrium: Song 1993, 2.2; friction: 5.9),
-kappa = 0 on the side; where the membrane is free N = 0 gives kappa. On the edge the sheet's thickness h = h0/(l1 l2)
-counts: its middle surface bends with kappa = 1/(fillet + h/2), friction acts h/2 below it, which turns mu N into
-mu N fillet/(fillet + h/2) (moments about the centre of the edge), and the travel is measured at the plug's face.
+**Sharp edge** (Mooney material). Outside the plug, N are tensions per reference length, H and V the radial and axial
+components of R N1:
+
+.. math:: N_1 = 2 h_0 (\lambda_1 - \lambda_1^{-3} \lambda_2^{-2})(c_{10} + c_{01} \lambda_2^2), \qquad
+          N_2 = 2 h_0 (\lambda_2 - \lambda_2^{-3} \lambda_1^{-2})(c_{10} + c_{01} \lambda_1^2)
+
+.. math:: \frac{dH}{dR} = N_2, \qquad V = \frac{F}{2 \pi}, \qquad \frac{dr}{dR} = \frac{\lambda_1 H}{R N_1}, \qquad
+          \frac{dz}{dR} = \frac{\lambda_1 V}{R N_1}
+
+A sticking membrane keeps r = r_p at R = r_p. A membrane that slides without friction has the equal biaxial stretch l0
+over the face. There N1 is continuous across the edge, at R = r_p/l0.
+
+**Rounded edge with Coulomb friction** (neo-Hookean material). The flat of the plug carries no pressure. So the membrane
+has an equal biaxial stretch l0 there, and all of it that touches the edge and the side slides outwards. T are tensions
+per deformed length, s the arc length, phi the slope and kappa the curvature of the meridian (equilibrium: Song 1993,
+2.2; friction: 5.9):
+
+.. math:: T_1 = 2 c_{10} h_0 \left(\frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}\right), \qquad
+          T_2 = 2 c_{10} h_0 \left(\frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}\right)
+
+.. math:: \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r} + \mu N, \qquad N = T_1 \kappa + T_2 \frac{\sin\phi}{r}
+
+On the side, kappa is 0. In the free part N = 0 gives kappa. On the edge, the thickness h of the sheet counts: its
+middle surface has the radius fillet + h/2, and friction acts h/2 below it. Moments about the centre of the edge give:
+
+.. math:: \kappa = \frac{1}{f + h/2}, \qquad \mu N \to \mu N \frac{f}{f + h/2}, \qquad
+          h = \frac{h_0}{\lambda_1 \lambda_2}
+
+with the fillet radius f. The travel is measured at the face of the plug.
 """
 
 import functools
@@ -28,12 +46,15 @@ from .inflation import meridional_stretch
 
 @dataclass(frozen=True)
 class PlugState:
-    """A membrane under a plug, in the units of the input.
+    """Membrane under a plug, in the units of the input.
 
     Attributes:
-        force: on the plug, stress length^2. face_stretch: in both directions under the plug.
-        R, r, z: reference radius and deformed meridian from the plug's edge to the rim, shape (n,), length; rim z = 0.
-        thickness_ratio: l3 at those R, shape (n,).
+        force: force on the plug, stress length^2.
+        face_stretch: equal biaxial stretch under the plug.
+        R: reference radii from the edge of the plug to the rim, shape (n,), length.
+        r: deformed radii, shape (n,), length.
+        z: deformed heights, 0 at the rim, shape (n,), length.
+        thickness_ratio: thickness stretch, shape (n,).
     """
 
     force: float
@@ -46,14 +67,20 @@ class PlugState:
 
 def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thickness: float, c10: float,
                         c01: float = 0.0, friction: str = "stick") -> PlugState:
-    """Return the membrane, rim held, that a sharp-edged flat plug has pushed by `travel` (length, above 0).
+    """Return the membrane that a flat plug with a sharp edge has pushed by a travel.
 
     Args:
+        travel: travel of the plug, above 0, length.
+        radius: reference radius of the membrane, length.
+        plug_radius: radius of the plug, length.
+        thickness: reference thickness, length.
+        c10: Mooney constant, stress.
+        c01: Mooney constant, stress.
         friction: on the plug, "stick" or "none".
 
     Raises:
-        InputError: a size or constant that is not allowed; a travel at which the membrane would touch the plug's side,
-            or that a frictionless plug does not reach.
+        InputError: a size or constant is not allowed. At this travel the membrane would touch the side of the plug, or
+            a frictionless plug does not reach it.
 
     >>> from formingx.exact.plug import membrane_under_plug
     >>> state = membrane_under_plug(0.5, radius=1.0, plug_radius=0.4, thickness=0.02, c10=1.0)
@@ -71,7 +98,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     def tension(l1, l2):                      # lengths over the radius, tensions over 2 c10 h0
         return (l1 - l1**-3 * l2**-2) * (1 + k * l2**2)
 
-    def stretch(n, l2):                       # l1 of that tension
+    def stretch(n, l2):                       # meridional stretch of this tension
         return meridional_stretch(n / (1 + k * l2**2), l2)
 
     def start(p):
@@ -92,13 +119,14 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
         return np.array(found)
 
     s = np.linspace(0, 1, 60) ** 2
-    share = min(depth, 0.1)                   # a cone, pushed on to the travel
-    l1 = np.hypot(1, share / (1 - edge))
+    first_depth = min(depth, 0.1)                   # the first guess is a cone
+    l1 = np.hypot(1, first_depth / (1 - edge))
     RN = (edge + (1 - edge) * s) * tension(l1, 1.0)
-    y, p = np.array([edge + (1 - edge) * s, share * (s - 1), RN / l1]), [edge * tension(l1, 1.0) * share / (1 - edge)]
+    y = np.array([edge + (1 - edge) * s, first_depth * (s - 1), RN / l1])
+    p = [edge * tension(l1, 1.0) * first_depth / (1 - edge)]
     if slides:
         p.append(brentq(lambda l: tension(l, l) - tension(l1, 1.0), 1, l1))
-    found = _pushed(slopes, ends, s, y, p, share, depth, radius)
+    found = _continued(slopes, ends, s, y, p, first_depth, depth, radius)
     r = found.y[0]
     if r.min() < edge * (1 - 1e-6):
         raise InputError(f"travel = {travel!r}: the membrane would touch the side of the plug")
@@ -109,9 +137,13 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
                      R / (l1 * r))
 
 
-def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
+def _continued(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
             radius: float) -> Any:
-    """Return the solution of the boundary value problem at depth `goal`, in steps from a guess at a smaller depth."""
+    """Return the solution of the boundary value problem at the travel `goal`, continued from a guess at a smaller one.
+
+    Raises:
+        InputError: a step of the continuation does not converge.
+    """
     from scipy.integrate import solve_bvp
     while True:
         found = solve_bvp(slopes, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
@@ -120,18 +152,20 @@ def _pushed(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: l
                              f" {found.message}")
         if depth == goal:
             return found
-        depth, before = min(1.25 * depth, goal), depth
-        y, p = found.sol(s) * np.array([[1], [depth / before], [1]]), found.p
+        depth, previous = min(1.25 * depth, goal), depth
+        y, p = found.sol(s) * np.array([[1], [depth / previous], [1]]), found.p
 
 
 @dataclass(frozen=True)
 class SlidingState:
-    """A membrane that slides over the rounded edge of a plug, in the units of the input.
+    """Membrane that slides over the rounded edge of a plug, in the units of the input.
 
     Attributes:
-        travel: of the plug, length. force: on it, stress length^2.
-        face_stretch: in both directions under the flat; wrap: angle of the edge that is touched, up to pi/2.
-        side: how far the membrane lies on the plug's side, length.
+        travel: travel of the plug, length.
+        force: force on the plug, stress length^2.
+        face_stretch: equal biaxial stretch under the flat of the plug.
+        wrap: angle of the touched part of the edge, up to pi/2, radians.
+        side: length of contact on the side of the plug.
     """
 
     travel: float
@@ -143,14 +177,19 @@ class SlidingState:
 
 def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radius: float, fillet: float,
                                thickness: float, c10: float, mu: float) -> SlidingState:
-    """Return the neo-Hookean membrane, rim held, under a flat plug with a rounded edge and Coulomb friction, drawn
-    so far.
+    """Return the neo-Hookean membrane under a flat plug with a rounded edge and Coulomb friction.
 
     Args:
-        face_stretch: under the flat of the plug, above 1: it grows with the travel. mu: coefficient of friction.
+        face_stretch: stretch under the flat of the plug, above 1. It increases with the travel.
+        radius: reference radius of the membrane, length.
+        plug_radius: radius of the plug, length.
+        fillet: radius of its edge, length.
+        thickness: reference thickness, length.
+        c10: neo-Hookean constant, stress.
+        mu: coefficient of friction.
 
     Raises:
-        InputError: a size or constant that is not allowed; a stretch that this plug does not reach.
+        InputError: a size or constant is not allowed, or this plug does not reach the stretch.
     """
     from scipy.optimize import brentq
     l0, c10, mu = positive("face_stretch", face_stretch), positive("c10", c10), non_negative("mu", mu)
@@ -165,51 +204,51 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     upright.terminal = True  # type: ignore[attr-defined]
     flat = np.array([(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6])
     edge = _integrated(2 * (f + h0), flat, _touching(mu, h0, f), events=upright, dense_output=True)
-    whole = edge.t[-1]                        # of the arc length, around the edge
+    edge_length = edge.t[-1]                        # arc length of the edge
 
-    def left(u):                              # where the membrane separates, u of arc length up the edge and the side
-        return _along(max(u - whole, 0.0), edge.sol(min(u, whole)), _touching(mu))
+    def separation_point(u):                              # y at the arc length u of contact
+        return _along(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _touching(mu))
 
-    def misses(u):                            # the rim
-        y = left(u)
+    def rim_error(u):                            # 0 if the membrane ends at the rim
+        y = separation_point(u)
         return _along(1 - y[0], y, _free)[1] - 1 if y[0] < 1 else 1.0
 
-    lengths = np.concatenate([np.linspace(0.01, 1, 30) * whole, whole + np.linspace(0.01, 3, 60)])
-    found = [misses(lengths[0])]
-    with np.errstate(over="ignore", invalid="ignore"):      # too far
+    lengths = np.concatenate([np.linspace(0.01, 1, 30) * edge_length, edge_length + np.linspace(0.01, 3, 60)])
+    found = [rim_error(lengths[0])]
+    with np.errstate(over="ignore", invalid="ignore"):      # too long
         while not found[-1] <= 0 and len(found) < len(lengths):
-            found.append(misses(lengths[len(found)]))
+            found.append(rim_error(lengths[len(found)]))
     if not (len(found) > 1 and found[-2] > 0 >= found[-1]):
         raise InputError(f"face_stretch = {face_stretch!r}: this plug does not draw the membrane so far")
-    u = brentq(misses, lengths[len(found) - 2], lengths[len(found) - 1], xtol=1e-13)
-    _, r, _, phi, t = y = left(u)
+    u = brentq(rim_error, lengths[len(found) - 2], lengths[len(found) - 1], xtol=1e-13)
+    _, r, _, phi, t = y = separation_point(u)
     travel = _along(1 - y[0], y, _free)[2] * radius + thickness * (1 - l0**-2) / 2
     force = 4 * np.pi * c10 * thickness * radius * r * t * np.sin(phi)
-    return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - whole, 0.0) * radius))
+    return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - edge_length, 0.0) * radius))
 
 
 def _tensions(t: float, l2: float) -> tuple[float, float]:
-    """l1 and T2 where T1 = t, over 2 c10 h0."""
+    """Return the meridional stretch and T2 for T1 = t; tensions over 2 c10 h0."""
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
 def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
-    """y = (R, r, z, phi, T1) at a distance from where it is known; lengths over the radius, tensions over 2 c10 h0."""
+    """Return y = (R, r, z, phi, T1) at a distance from a given y; lengths over the radius, tensions over 2 c10 h0."""
     return y if length == 0 else _integrated(length, y, slopes).y[:, -1]
 
 
 def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
-    """Return the solution of `solve_ivp` from y on; options: of `solve_ivp`."""
+    """Return the solution of `solve_ivp` that starts at y."""
     from scipy.integrate import solve_ivp
     return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 
 
 def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
-    """dy/ds on a rounded edge, or, without one, on the side of the plug."""
+    """Return the function dy/ds on the rounded edge, or, without a fillet, on the side of the plug."""
     def slopes(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
-        half = h0 * R / (l1 * r) / 2                        # of the thickness
+        half = h0 * R / (l1 * r) / 2                        # half of the thickness
         kappa, lever = 1 / (fillet + half), 1 / (1 + half / fillet)
         N = t * kappa + t2 * np.sin(phi) / r
         return [1 / l1, np.cos(phi), np.sin(phi), kappa, (t2 - t) * np.cos(phi) / r + mu * lever * N]
@@ -217,6 +256,6 @@ def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
 
 
 def _free(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
-    """dy/dR where nothing is touched."""
+    """Return dy/dR on the free part of the membrane."""
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

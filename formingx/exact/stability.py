@@ -1,12 +1,19 @@
-"""Exact bifurcations of neo-Hookean bodies (shear modulus mu = 2 c10), for comparison with `Path.stability`.
+r"""Exact bifurcations of neo-Hookean bodies, for comparison with `Path.stability`.
 
-Small motions v superposed on a finite deformation (Biot 1965; Haughton and Ogden 1979; Green and Adkins 1970): with
-B = F F^T, sigma = mu B - p I and L = grad v, the change of nominal stress is
+Small motions v are superposed on a finite deformation (Biot 1965; Green and Adkins 1970; Haughton and Ogden 1979). With
+the shear modulus mu = 2 c10, the increment of the nominal stress S and incremental equilibrium are:
 
-    S_ji = mu B_jk L_ik + p L_ji - q delta_ji,      div S = 0,  div v = 0,
+.. math:: B = F F^T, \qquad \sigma = \mu B - p I, \qquad L = \nabla v
 
-and on a face under a fluid pressure P its traction is P L_ji N_j. A bifurcation is where three motions that meet the
-conditions on one face leave a determinant of 0 on the other.
+.. math:: \dot{S}_{ji} = \mu B_{jk} L_{ik} + p L_{ji} - q \, \delta_{ji}, \qquad
+          \nabla \cdot \dot{S} = 0, \qquad \nabla \cdot v = 0
+
+On a face with the normal N under a fluid pressure P, the increment of the traction is:
+
+.. math:: \dot{t}_i = P L_{ji} N_j
+
+Three independent motions satisfy the conditions on one face. A bifurcation occurs where the determinant of their
+conditions on the other face vanishes.
 """
 
 from collections.abc import Callable
@@ -18,10 +25,15 @@ from scipy.special import iv, ivp, jn_zeros
 
 
 def block(nu: float, kind: str) -> float:
-    """Stretch at which a plane-strain block, length L0 = pi H0/nu, thickness 2 H0, between frictionless plates loses
-    stability in one half wave along the load (Biot 1965).
+    r"""Return the stretch at which a compressed plane-strain block buckles in one half wave along the load.
 
-    kind: "flexure" or "barrelling". With r = lambda^2: 4 r tanh(r k h) = (1 + r^2)^2 tanh(k h), or with coth for tanh.
+    The block lies between frictionless plates (Biot 1965). For flexure, and for barrelling with coth in place of tanh:
+
+    .. math:: 4 r \tanh(r k h) = (1 + r^2)^2 \tanh(k h), \qquad r = \lambda^2
+
+    Args:
+        nu: slenderness pi H0/L0, with the length L0 and the thickness 2 H0.
+        kind: "flexure" or "barrelling".
     """
     def f(stretch):
         r, kh = stretch**2, nu / stretch**2
@@ -31,11 +43,19 @@ def block(nu: float, kind: str) -> float:
 
 
 def cylinder(nu: float, n: int) -> float:
-    """Axial stretch at which a solid cylinder, length H0 = pi R0/nu, between frictionless plates loses stability in one
-    half wave cos(pi z/H) along it and cos(n theta) round it.
+    r"""Return the axial stretch at which a compressed solid cylinder buckles in one half wave along its axis.
 
-    With L = lambda^-1 (d2/dr2 + ...) + lambda^2 d2/dz2: L v = grad q/mu, so v is a gradient (of I_n(k r)), or L v = 0
-    (I_n(k lambda^(3/2) r): curls of two potentials along the axis).
+    The cylinder lies between frictionless plates; its mode is cos(pi z/H) cos(n theta). Two kinds of motion satisfy the
+    equations, with the modified Bessel function I_n. One is a gradient of I_n(k r). The other is a curl of axial
+    potentials I_n(k lambda^(3/2) r), for which the pressure q is 0:
+
+    .. math:: \mathcal{L} v = \frac{\nabla q}{\mu}, \qquad
+              \mathcal{L} = \lambda^{-1} \left(\frac{\partial^2}{\partial r^2} + \dots\right)
+              + \lambda^2 \frac{\partial^2}{\partial z^2}
+
+    Args:
+        nu: slenderness pi R0/H0, with the length H0.
+        n: number of waves round the axis.
 
     >>> from formingx.exact.stability import cylinder
     >>> round(cylinder(1.0, 1), 4)
@@ -58,15 +78,22 @@ def cylinder(nu: float, n: int) -> float:
             columns.append([(B[0] + p) * dU - pressure, B[0] * dV - p * (n * U + V) / a, B[0] * dW - p * k * U])
         M = np.array(columns).T
         M = M / np.abs(M).max(0)
-        if n == 0:                                                   # torsion apart
+        if n == 0:                                                   # without torsion
             return np.linalg.det(M[np.ix_([0, 2], [0, 2])])
         return np.linalg.det(M)
     return _last_root(f, 0.3)
 
 
 def tube(ratio: float, n: int) -> tuple[float, float]:
-    """(pressure over mu, inner radius ratio) at which a tube of inner over outer radius `ratio` under an outer fluid
-    pressure, its axial stretch held at 1, buckles in n waves round it."""
+    """Return the state at which a tube under an outer fluid pressure buckles, at an axial stretch of 1.
+
+    Args:
+        ratio: inner over outer reference radius.
+        n: number of waves round the axis.
+
+    Returns:
+        Pressure over mu, and deformed over reference inner radius.
+    """
     def f(inner):
         return _determinant(ratio, inner, n, 0.0, outside=True)
     inner = _last_root(f, 0.4)
@@ -74,22 +101,37 @@ def tube(ratio: float, n: int) -> tuple[float, float]:
 
 
 def inflated_tube(ratio: float, kB: float, n: int) -> float:
-    """Inner radius ratio at which a tube inflated at its length pi B/kB (B: outer radius, `ratio`: inner over it), the
-    ends frictionless, bulges (n = 0) or bends (n = 1) in one half wave along it: the first one."""
+    """Return the first inner stretch at which an inflated tube bulges or bends in one half wave along its axis.
+
+    The ends are frictionless, the length is constant. The inner stretch is deformed over reference inner radius.
+
+    Args:
+        ratio: inner over outer reference radius.
+        kB: pi B over the length, with the outer radius B.
+        n: 0 for bulging, 1 for bending.
+    """
     def f(inner):
         return _determinant(ratio, inner, n, kB, outside=False)
     grid = 1 + np.geomspace(1e-3, 4.0, 60)
-    before = f(grid[0])
+    last = f(grid[0])
     for a, b in zip(grid, grid[1:]):
-        now = f(b)
-        if before * now < 0:
+        value = f(b)
+        if last * value < 0:
             return float(brentq(f, a, b, xtol=1e-13))
-        before = now
+        last = value
     return float("nan")
 
 
 def clamped_plate(n: int) -> float:
-    """N a^2/D at which a thin clamped disc under equal radial compression buckles in n waves round it.
+    r"""Return the buckling load N a^2/D of a thin clamped disc under radial compression.
+
+    .. math:: \frac{N a^2}{D} = j_{n+1,1}^2
+
+    j is the first zero of the Bessel function J_(n+1). For n = 0 see Timoshenko and Gere, Theory of Elastic Stability,
+    1961.
+
+    Args:
+        n: number of waves round the axis.
 
     >>> from formingx.exact.stability import clamped_plate
     >>> round(clamped_plate(0), 2)
@@ -101,29 +143,29 @@ def clamped_plate(n: int) -> float:
 def _last_root(f: Callable[[float], float], low: float) -> float:
     """Return the root below 1 that is nearest to 1, or nan."""
     grid = 1 - np.geomspace(1e-5, 1 - low, 80)
-    before = f(grid[0])
+    last = f(grid[0])
     for a, b in zip(grid, grid[1:]):
-        now = f(b)
-        if before * now < 0:
+        value = f(b)
+        if last * value < 0:
             return float(brentq(f, b, a, xtol=1e-14))
-        before = now
+        last = value
     return float("nan")
 
 
 def _pressure(ratio: float, inner: float, stretch: float) -> float:
-    """Pressure outside less that inside, over mu, of a tube of outer radius 1."""
-    at, weights = np.polynomial.legendre.leggauss(60)
-    R, w = ratio + (1 - ratio) * (at + 1) / 2, weights * (1 - ratio) / 2
+    """Return the outer minus the inner pressure over mu, for a tube of outer radius 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    R, w = ratio + (1 - ratio) * (nodes + 1) / 2, weights * (1 - ratio) / 2
     r = np.sqrt((inner * ratio) ** 2 + (R**2 - ratio**2) / stretch)
     b_r, b_h = (R / (r * stretch)) ** 2, (r / R) ** 2
     return float(-np.sum(w * (b_h - b_r) * R / (r**2 * stretch)))    # r sigma_r' = sigma_hoop - sigma_r
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    """Return the determinant of the outer face's conditions for three motions that meet the inner face's conditions."""
+    """Return the determinant of the conditions on the outer face for three motions that satisfy the inner ones."""
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
-    delta = _pressure(ratio, inner, 1.0)                             # outside less inside
+    delta = _pressure(ratio, inner, 1.0)                             # outer less inner pressure
     P_in, P_out = (0.0, delta) if outside else (-delta, 0.0)
 
     def state(r):
@@ -134,7 +176,7 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
         y, p = y[:-1].reshape(-1, 6), y[-1]
         br, bh = state(r)
         R2 = A**2 + r**2 - a**2
-        dbr = 2 * r / r**2 - 2 * R2 / r**3                           # of (R/r)^2
+        dbr = 2 * r / r**2 - 2 * R2 / r**3                           # derivative of (R/r)^2
         U, V, W, rr, rh, rz = y.T
         hoop = (n * V + U) / r
         dU = -hoop - k * W
@@ -148,15 +190,15 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
         return np.append(np.array(found).T.ravel(), dbr - (bh - br) / r)
 
     def free(r, P):
-        """Rows that are 0 on a face under a pressure, of (U, V, W, rr, rh, rz); U' from div v = 0."""
+        """Return the rows of (U, V, W, rr, rh, rz) that vanish on a face under a pressure; U' from div v = 0."""
         return np.array([[P / r, P * n / r, P * k, 1, 0, 0], [P * n / r, P / r, 0, 0, 1, 0], [P * k, 0, 0, 0, 0, 1]])
     start = np.hstack([np.eye(3), -free(a, P_in)[:, :3].T])         # tractions that follow from U, V, W
     p0 = state(a)[0] + P_in
-    done = solve_ivp(rates, (a, b), np.append(start.ravel(), p0), method="DOP853", rtol=1e-10, atol=1e-11)
-    y = done.y[:-1, -1].reshape(3, 6)
+    solution = solve_ivp(rates, (a, b), np.append(start.ravel(), p0), method="DOP853", rtol=1e-10, atol=1e-11)
+    y = solution.y[:-1, -1].reshape(3, 6)
     M = free(b, P_out) @ y.T
-    if n == 0:                                                       # torsion apart
+    if n == 0:                                                       # without torsion
         M = M[np.ix_([0, 2], [0, 2])]
-    elif k == 0:                                                     # motion along the tube apart
+    elif k == 0:                                                     # without axial motion
         M = M[np.ix_([0, 1], [0, 1])]
     return float(np.linalg.det(M))

@@ -1,17 +1,29 @@
-"""Exact solutions in time to compare with: a block under a dead force, the thick tube and sphere, the thin balloon.
+r"""Exact solutions in time for comparison: a block under a dead load, a thick tube or sphere, a thin balloon.
 
-All are incompressible, of W = c10 (I1 - 3) and the branches of `Viscoelastic`, and have one degree of freedom s. Their
-points have logarithmic strains e(s) along fixed directions; a branch has there the elastic strains w,
-dw_i/dt = de_i/dt - [exp(2 w_i) - (1/3) sum_j exp(2 w_j)]/(2 tau). With T = 2 c10 (l_1^2 - l_3^2)
-+ sum mu [exp(2 w_1) - exp(2 w_3)], the difference of the stresses along 1 and 3, the load is a sum over
-points, c(s) T::
+All bodies are incompressible with one degree of freedom s. The material is W = c10 (I1 - 3) with the branches of
+`Viscoelastic`. The principal directions are fixed, with logarithmic strains e(s). A branch with the shear modulus mu
+and the relaxation time tau has the elastic logarithmic strains w:
 
-    block under a nominal stress P:  P = T/l,  s = ln l
-    thick wall, r^n = R^n + s, s = a^n - A^n, n = 2 (tube in plane strain) or 3 (sphere), 1 = hoop, 3 = radial:
-        p = integral of (n - 1) T R^(n-1)/r^n dR, by Gauss's rule
-    thin balloon, R0 and H0 in the reference configuration:  p R0/H0 = 2 T/l^3,  s = ln l, 3 = through the wall
+.. math:: \dot{w}_i = \dot{e}_i - \frac{1}{2 \tau} \left(e^{2 w_i} - \frac{1}{3} \sum_j e^{2 w_j}\right)
 
-If s is prescribed, the branches are integrated. If the load is constant, its zero rate gives ds/dt.
+The load is a sum over points of c(s) T. T is the difference of the stresses in directions 1 and 3:
+
+.. math:: T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum \mu \left(e^{2 w_1} - e^{2 w_3}\right)
+
+**Block** under a nominal stress P, with s = ln(lambda):
+
+.. math:: P = T / \lambda
+
+**Thick wall** under a pressure p; n = 2 for a tube in plane strain, 3 for a sphere; 1 is hoop, 3 radial. The integral
+is evaluated by Gauss quadrature:
+
+.. math:: r^n = R^n + s, \qquad s = a^n - A^n, \qquad p = \int \frac{(n - 1) \, T \, R^{n-1}}{r^n} \, dR
+
+**Thin balloon** with reference radius R0 and thickness H0, with s = ln(lambda); 3 is through the wall:
+
+.. math:: \frac{p R_0}{H_0} = \frac{2 T}{\lambda^3}
+
+If s is prescribed, the branches are integrated in time. If the load is constant, its zero rate gives ds/dt.
 """
 
 import math
@@ -30,14 +42,17 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 @dataclass
 class Body:
-    """A body of one degree of freedom s, and its state; free of stress at s = 0 at first.
+    """Body of one degree of freedom s and its state; it is stress-free at s = 0 initially.
 
     Attributes:
-        c10, branches: of the material, stress and (stress, time).
-        direction: de_i/de in the three directions, shape (3,).
-        strain: called with s, gives e and de/ds of all points, each of shape (n,).
-        weight: called with s, gives c and dc/ds, each of shape (n,).
-        time, s: where it is. w: elastic strains, shape (n, branches, 3).
+        c10: material constant, stress.
+        branches: (shear modulus, relaxation time) of each branch.
+        direction: de_i/de in the three principal directions, shape (3,).
+        strain: function of s that returns e and de/ds of all points, shape (n,) each.
+        weight: function of s that returns c and dc/ds of all points, shape (n,) each.
+        time: present time.
+        s: present degree of freedom.
+        w: elastic logarithmic strains of the branches, shape (n, branches, 3).
 
     >>> from formingx.exact.time import block
     >>> bar = block("uniaxial", c10=0.5, branches=[(1.0, 2.0)])
@@ -61,22 +76,26 @@ class Body:
 
     @property
     def load(self) -> float:
-        """The load of the state."""
+        """Load in the present state."""
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
-        """Go to s at once."""
+        """Deform to s instantaneously."""
         self.w = self._jumped(s)
         self.s = s
 
     def jump_to_load(self, load: float, bracket: tuple[float, float]) -> None:
-        """Go at once to the s, within `bracket`, at which the load is `load`."""
+        """Deform instantaneously to the s, within `bracket`, at which a given load is reached."""
         from scipy.optimize import brentq
         self.jump(brentq(lambda s: self._load(s, self._jumped(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
     def drive(self, path: Callable, times: Any) -> np.ndarray:
-        """Return the loads at times (ascending, above the present one) at which path(t) gives s and ds/dt; ends at
-        the last."""
+        """Return the loads while s follows a prescribed path, shape (n,).
+
+        Args:
+            path: function of time that returns s and ds/dt.
+            times: times after the present one, ascending, shape (n,). The last one becomes the present time.
+        """
         def rate(t, y):
             s, ds = path(t)
             return self._flow(s, ds, y.reshape(self.w.shape)).ravel()
@@ -87,12 +106,12 @@ class Body:
         return np.array([self._load(*state) for state in states])
 
     def hold(self, times: Any) -> np.ndarray:
-        """Return the loads at these times while s keeps its present value."""
+        """Return the loads at given times while s is constant (relaxation), shape (n,)."""
         s = self.s
         return self.drive(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
-        """Return s at these times while the load keeps its present value."""
+        """Return s at given times while the load is constant (creep), shape (n,)."""
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
@@ -103,10 +122,17 @@ class Body:
         return found[:, 0]
 
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
-        """Return (times at which s grows to the targets under the present load, time at which no state follows).
+        """Return the times at which s reaches given values under the present load.
 
-        A target that is passed already has the present time, one that is not met nan; the second is None if s reaches
-        `end`. There must be no s up to `end` at which the body stays.
+        There must be no equilibrium up to `end` at which the body would stay.
+
+        Args:
+            targets: values of s, shape (n,).
+            end: last s of the integration.
+
+        Returns:
+            Times, shape (n,): the present time for a target below s, nan for one that is not reached. Then the time at
+            which equilibrium is lost, or None if s reaches `end`.
         """
         from scipy.integrate import solve_ivp
 
@@ -115,36 +141,39 @@ class Body:
             dt = self._time_per_s(s, w)
             return np.append(dt, self._strain_rate(s) - dt * self._relaxing(w).ravel())
 
-        def fold(s, y):
+        def limit_point(s, y):
             return self._time_per_s(s, y[1:].reshape(self.w.shape))
 
-        fold.terminal = True                              # type: ignore[attr-defined]
+        limit_point.terminal = True                              # type: ignore[attr-defined]
         found = solve_ivp(rate, (self.s, end), np.append(self.time, self.w), method="DOP853", dense_output=True,
-                          events=fold, max_step=0.01, **_TOLERANCES)
+                          events=limit_point, max_step=0.01, **_TOLERANCES)
         met = [self.time if s <= self.s else found.sol(s)[0] if s <= found.t[-1] else np.nan for s in targets]
         return np.array(met), float(found.y_events[0][0][0]) if len(found.t_events[0]) else None
 
     def _load(self, s: float, w: np.ndarray) -> float:
+        """Return the load for s and the elastic strains."""
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """T, shape (n,)."""
+        """Return the stress difference T, shape (n,)."""
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu
 
     def _jumped(self, s: float) -> np.ndarray:
+        """Return the elastic strains after an instantaneous deformation to s."""
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
     def _strain_rate(self, s: float) -> np.ndarray:
-        """Return dw/ds without flow."""
+        """Return dw/ds without relaxation, flattened."""
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _flow(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """dw/dt."""
+        """Return dw/dt, flattened."""
         return self._strain_rate(s) * ds - self._relaxing(w).ravel()
 
     def _relaxing(self, w: np.ndarray) -> np.ndarray:
+        """Return the relaxation rate of the elastic strains, shape (n, branches, 3)."""
         m = np.exp(2 * w)
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 
@@ -154,11 +183,16 @@ class Body:
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])
         stiffness += 2 * (d[0] * m[..., 0] - d[2] * m[..., 2]) @ self.mu
-        lost = 2 * m * self._relaxing(w)
-        lost = (lost[..., 0] - lost[..., 2]) @ self.mu
-        return float((dc @ self._difference(s, w) + (c * de) @ stiffness) / (c @ lost))
+        relaxation = 2 * m * self._relaxing(w)
+        relaxation = (relaxation[..., 0] - relaxation[..., 2]) @ self.mu
+        return float((dc @ self._difference(s, w) + (c * de) @ stiffness) / (c @ relaxation))
 
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
+        """Return the solution at given times, and set the present time.
+
+        Raises:
+            InputError: the solution ends before the last time.
+        """
         from scipy.integrate import solve_ivp
         found = solve_ivp(rate, (self.time, times[-1]), start, method="DOP853", t_eval=times, **_TOLERANCES)
         if not found.success:
@@ -168,7 +202,13 @@ class Body:
 
 
 def block(mode: str, *, c10: float, branches: Any) -> Body:
-    """Return a block in a homogeneous test; s = ln l, its load is the nominal stress."""
+    """Return a block in a homogeneous test, with s = ln(lambda) and the nominal stress as load.
+
+    Args:
+        mode: a key of `formingx.materials.homogeneous.MODES`, such as "uniaxial".
+        c10: material constant, stress.
+        branches: (shear modulus, relaxation time) of each branch.
+    """
     known("block: mode", mode, MODES)
     k = MODES[mode]
     return Body(c10, branches, np.array([1, k, -1 - k]), lambda s: (np.array([s]), np.ones(1)),
@@ -176,7 +216,19 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
 
 
 def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any, points: int = 40) -> Body:
-    """Return a thick "tube" or "sphere" under an inner pressure, its load; s = a^n - A^n, with a its inner radius."""
+    """Return a thick tube or sphere under an inner pressure, with s = a^n - A^n for the inner radius a.
+
+    Args:
+        kind: "tube" or "sphere".
+        inner_radius: reference inner radius A, length.
+        outer_radius: reference outer radius, length.
+        c10: material constant, stress.
+        branches: (shear modulus, relaxation time) of each branch.
+        points: number of Gauss points through the wall.
+
+    Raises:
+        InputError: a size or constant is not allowed.
+    """
     known("wall: kind", kind, ("tube", "sphere"))
     A, B, n = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius), 2 if kind == "tube" else 3
     if not A < B:
@@ -191,6 +243,11 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    """Return a thin spherical balloon; s = ln(r/R0), its load is p R0/H0."""
+    """Return a thin spherical balloon, with s = ln(r/R0) and p R0/H0 as load.
+
+    Args:
+        c10: material constant, stress.
+        branches: (shear modulus, relaxation time) of each branch.
+    """
     return Body(c10, branches, np.array([1, 1, -2.0]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([2 * math.exp(-3 * s)]), np.array([-6 * math.exp(-3 * s)])))
