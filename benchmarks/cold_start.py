@@ -1,15 +1,18 @@
-"""What the first seconds of a process take: set-up of a scene where many forms have been compiled before, compiling.
+"""Processor time of the first run of a script: nothing compiled, and all forms compiled before.
 
-    ./fx python3 benchmarks/cold_start.py [--files 4000] [--against CHECKOUT]
+    ./fx python3 benchmarks/cold_start.py [--runs 3] [--against CHECKOUT] [--out DIR]
 
-Set-up of Treloar's sheet (10 x 1), and of one that relaxes, up to the first state of its path, in a process of its own:
-with nothing compiled (processor time, the C compiler's apart), with its own forms, and with so many files of others
-beside them; then a second scene like it in the same process.
+* README's pot with its picture and its report, the whole process with all that it starts, and its parts;
+* set-up of Treloar's sheet (10 x 1), and of one that relaxes, up to the first state of its path; then a second scene
+  like it in the same process.
+
+Every process is a fresh one; "cold" has an empty cache of its own. Of several runs the median is given.
 """
 
 import argparse
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -17,75 +20,106 @@ import tempfile
 import time
 from pathlib import Path
 
-RUNS = 5
+HERE = Path(__file__).resolve().parents[1]
+CASES = {"pot": ("process", "import", "run", "picture", "report", "compiler"),
+         "treloar": ("first", "first compiler", "second"), "relaxing": ("first", "first compiler", "second")}
 
 
-def child(kind):
-    """{part: seconds}, in this process."""
+def own():
+    """Processor time of this process, s."""
+    return time.process_time()
+
+
+def compiler():
+    """Processor time of the processes that have ended, s: of the compiler, but for the server of the picture."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def pot():
+    """{part: seconds} of README's script, in this process and its working folder."""
+    (script,) = re.findall(r"```python\n(.*?)```", (HERE / "README.md").read_text(), flags=re.S)
+    began = own()
+    import formingx as fx
+    found = {"import": own() - began}
+
+    def timed(name, method):
+        def measured(*given, **more):
+            start = own()
+            try:
+                return method(*given, **more)
+            finally:
+                found[name] = own() - start
+        return measured
+    for name, method in (("picture", "view3d"), ("report", "report")):
+        setattr(fx.Path, method, timed(name, getattr(fx.Path, method)))
+    fx.Process.run = timed("run", fx.Process.run)
+    exec(compile(script, "README.md", "exec"), {"__name__": "__main__"})
+    return found | {"compiler": compiler(), "process": own() + compiler()}
+
+
+def sheet(relaxes):
+    """{part: seconds} of the set-up of a sheet, in this process."""
     import formingx as fx
     from formingx.solve.path_following import Run
     begun, follow = [], Run.follow
 
     def noted(*given, **more):
-        begun.append(time.process_time())
+        begun.append(own())
         return follow(*given, **more)
     Run.follow = noted
     material = fx.NeoHookean(c10=2.0)
     found = {}
     for name in ("first", "second"):
-        started, others = time.process_time(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        started, before = own(), compiler()
         scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)),
-                         materials=fx.Viscoelastic(material, [(1.0, 1.0)]) if kind == "relaxing" else material,
+                         materials=fx.Viscoelastic(material, [(1.0, 1.0)]) if relaxes else material,
                          supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
         fx.trace(scene, until=fx.pole_stretch(1.01), progress=False)
         found[name] = begun[-1] - started
-        found[f"{name} C"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - others.ru_utime
+        found[f"{name} compiler"] = compiler() - before
     return found
 
 
-def fill(cache, files):
-    """Make files of so many other modules there, as the compiler of forms leaves three of each."""
-    for folder in (cache, *(p for p in cache.iterdir() if p.is_dir())):
-        for k in range(files // (3 if folder == cache else 3 * 16)):
-            for end in (".c", ".c.cached", ".cpython-313-x86_64-linux-gnu.so"):
-                (folder / f"libffcx_forms_{k:040x}{end}").touch()
-
-
-def measured(kind, checkout, files):
-    """{case: medians}: "cold" without compiled forms, "own" with those alone, "full" with files of others."""
-    with tempfile.TemporaryDirectory() as place:
-        inside = (f"import os, sys, runpy; os.environ['XDG_CACHE_HOME'] = {place!r}\n"
-                  f"sys.argv[1:] = ['--child', {kind!r}]; runpy.run_path({__file__!r}, run_name='__main__')")
-
-        def run():
-            done = subprocess.run([sys.executable, "-c", inside], env=os.environ | {"PYTHONPATH": str(checkout)},
+def measured(case, checkout, runs):
+    """{"cold" and "warm": {part: median of so many runs, s}}."""
+    def run(cache):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, str(Path(__file__).resolve()), "--child", case], cwd=folder,
+                                  env=os.environ | {"PYTHONPATH": str(checkout), "XDG_CACHE_HOME": cache},
                                   capture_output=True, text=True, timeout=600, check=True)
-            return json.loads(done.stdout.splitlines()[-1])
+        return json.loads(done.stdout.splitlines()[-1])
 
-        def median():
-            rows = [run() for _ in range(RUNS)]
-            return {part: sorted(row[part] for row in rows)[RUNS // 2] for part in rows[0]}
-        found = {"cold": run(), "own": median()}
-        fill(Path(place) / "fenics", files)
-        return found | {"full": median()}
+    def medians(rows):
+        return {part: sorted(row[part] for row in rows)[len(rows) // 2] for part in CASES[case]}
+    cold = []
+    for _ in range(runs):
+        with tempfile.TemporaryDirectory() as cache:
+            cold.append(run(cache))
+            warm = [run(cache) for _ in range(runs)] if len(cold) == runs else []
+    return {"cold": medians(cold), "warm": medians(warm)}
 
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--files", type=int, default=4000)
+    options.add_argument("--runs", type=int, default=3)
     options.add_argument("--against", type=Path, help="another checkout of the package")
-    options.add_argument("--child", help=argparse.SUPPRESS)
+    options.add_argument("--out", type=Path, default=Path("results/cold_start"))
+    options.add_argument("--child", choices=CASES, help=argparse.SUPPRESS)
     args = options.parse_args()
     if args.child:
-        print(json.dumps(child(args.child)))
+        print(json.dumps(pot() if args.child == "pot" else sheet(args.child == "relaxing")))
         return
-    versions = {"now": Path(__file__).parents[1], **({"before": args.against.resolve()} if args.against else {})}
-    print(f"{'scene':10}{'version':9}{'cached':8}{'set-up, s':>10}{'C, s':>8}{'second, s':>11}{'C, s':>8}")
-    for kind in ("treloar", "relaxing"):
+    versions = {"now": HERE, **({"before": args.against.resolve()} if args.against else {})}
+    summary = {}
+    for case in CASES:
         for version, checkout in versions.items():
-            for case, row in measured(kind, checkout, args.files).items():
-                print(f"{kind:10}{version:9}{case:8}{row['first']:10.3f}{row['first C']:8.2f}{row['second']:11.3f}"
-                      f"{row['second C']:8.2f}", flush=True)
+            summary[f"{case} {version}"] = found = measured(case, checkout, args.runs)
+            for cache, row in found.items():
+                parts = ", ".join(f"{part} {seconds:.2f} s" for part, seconds in row.items())
+                print(f"{case:9}{version:7} {cache}: {parts}", flush=True)
+    args.out.mkdir(parents=True, exist_ok=True)
+    (args.out / "summary.json").write_text(json.dumps(summary, indent=1))
 
 
 if __name__ == "__main__":

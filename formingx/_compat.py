@@ -67,14 +67,14 @@ def _compiled_here(compiled: Any) -> Any:
     """Return `compiled()`, whose form or expression is compiled by `_jit`, once in a process."""
     compiler = jit.ffcx_jit
 
-    def once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any]) -> Any:
+    def once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any], **more: Any) -> Any:
         options, form_options = jit.get_options(jit_options), ffcx.get_options(form_compiler_options)
         key = _jit.key(item, options, form_options)
         if not comm.allreduce(key in _compiled, op=MPI.LAND):    # ranks compile together, or none does
             if _jit.supported(options):
                 _compiled.update(_jit.compile_together(comm, {key: item}, options, form_options))
             else:
-                _compiled[key] = compiler(comm, item, form_compiler_options, jit_options)
+                _compiled[key] = compiler(comm, item, form_compiler_options, jit_options, **more)
         return _compiled[key]
     jit.ffcx_jit = once
     try:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-import fcntl
 import functools
 import hashlib
 import os
@@ -30,9 +29,9 @@ import ffcx.compiler
 import numpy as np
 import ufl
 from dolfinx import jit
+from ffcx import naming
 from ffcx.codegeneration import get_include_path
 from ffcx.codegeneration import jit as ffcx_jit
-from ffcx.naming import compute_signature, expression_name, form_name
 
 
 def supported(jit_options: dict[str, Any]) -> bool:
@@ -40,13 +39,14 @@ def supported(jit_options: dict[str, Any]) -> bool:
 
     FFCx must have the interface of 0.9, a compiler must be there, and no option may ask for the build by distutils.
     """
-    return (ffcx.__version__.startswith("0.9.") and _compiler() is not None
+    return (ffcx.__version__.startswith("0.9.") and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
 
 
 def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) -> str:
     """Return the name of a form or of (an expression, its points), by all that its machine code depends on."""
-    return "form_" + compute_signature([item], f"{sorted(form_options.items())}{_command(jit_options)}{_program()}")
+    tag = f"{sorted(form_options.items())}{_command(jit_options)}{_program()}" if supported(jit_options) else ""
+    return "form_" + naming.compute_signature([item], tag)
 
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
@@ -98,8 +98,8 @@ def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], j
 
 def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
     """Return (object, module, code) of a library, or None if there is none, or none that can be loaded."""
-    kind, symbol = (("ufcx_form", form_name(item, 0, name)) if isinstance(item, ufl.Form) else
-                    ("ufcx_expression", expression_name(item, name)))
+    kind, symbol = (("ufcx_form", naming.form_name(item, 0, name)) if isinstance(item, ufl.Form) else
+                    ("ufcx_expression", naming.expression_name(item, name)))
     try:
         library = ctypes.CDLL(str(folder / f"{name}.so"))
         address = ctypes.addressof(ctypes.c_char.in_dll(library, symbol))
@@ -218,6 +218,7 @@ def _locked(folder: Path, name: str) -> Iterator[None]:
 
     The lock ends with its process. A file system without locks does without.
     """
+    import fcntl
     file = folder / f"{name}.lock"
     with open(file, "w") as lock:
         with contextlib.suppress(OSError):

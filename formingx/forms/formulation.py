@@ -290,7 +290,7 @@ class Formulation(BodyModel):
         """Derivative of the residual with respect to the unknowns, a bilinear form."""
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
 
-    def of_every_path(self) -> list[Any]:
+    def path_forms(self) -> list[Any]:
         """Return the forms that each path uses, some of them None."""
         return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row()]
 

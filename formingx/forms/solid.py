@@ -66,10 +66,10 @@ class Solid(Formulation):
         v = ufl.split(self.test_function())[0][constraint.component]
         return v * weight / self.constant(self.integral(weight * ds)) * ds
 
-    def of_every_path(self) -> list[Any]:
+    def path_forms(self) -> list[Any]:
         rows = {contact.on: self.length_row(contact.on) for contact in self.scene.contacts if contact.points == "nodes"}
         areas = {contact.on: self.area(contact.on) for contact in self.scene.contacts}
-        return [*super().of_every_path(), *rows.values(), *areas.values()]
+        return [*super().path_forms(), *rows.values(), *areas.values()]
 
     def length_row(self, boundary: str) -> Any:
         """Return the linear form of the tributary lengths of the nodes of a boundary.

@@ -56,7 +56,7 @@ class Problem(Stages, Units):
     def __init__(self, scene: Scene):
         self.scene, self.forms = scene, formulate(scene)
         self.comm, forms = self.forms.comm, self.forms
-        forms.compile_ahead(*forms.of_every_path())
+        forms.compile_ahead(*forms.path_forms())
         index_map = forms.space.dofmap.index_map
         self._n = index_map.size_local
         self._buffer = la.vector(index_map, 1)
