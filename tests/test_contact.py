@@ -410,3 +410,22 @@ def test_what_never_slides_is_stick():
     assert np.abs(same.last.x - stick.last.x).max() < 1e-12 * np.abs(stick.last.x).max()
     np.testing.assert_allclose(rough.profile().thickness, stick.profile().thickness, rtol=1e-4)
     assert rough.last.measures["tool_force"] == pytest.approx(stick.last.measures["tool_force"], rel=1e-4)
+
+
+@pytest.mark.parametrize("pulls", [False, True])
+@pytest.mark.parametrize("mu", [0.0, 0.3, 1000.0])
+def test_open_points_carry_nothing_alone_or_beside_closed_ones(mu, pulls):
+    """Forces, stiffness, sense and history variables of open points are the same whether another point touches."""
+    law = Law(TOOL, mu, K, THETA, SLIP, pulls=pulls and not 0 < mu < 1000)
+    random = np.random.default_rng(5)
+    outside = random.uniform(-3, 3, (200, 2))
+    outside = outside[law.distance(outside) < -2 * THETA][:20]
+    inside = random.uniform(-3, 3, (200, 2))
+    inside = inside[law.distance(inside) > THETA][:1]
+    both, step = np.concatenate([outside, inside]), np.full(2, 0.3 * THETA)
+    alone, beside = (law.tractions(x + step, law.start(x)) for x in (outside, both))
+    assert beside.normal[-1] > 0 and np.all(alone.force == 0) and np.all(alone.stiffness == 0)
+    for name in ("force", "normal", "tangential", "sense", "stiffness", "status"):
+        assert np.array_equal(getattr(alone, name), getattr(beside, name)[:-1])
+    for a, b in zip(alone.touch, beside.touch, strict=True):
+        assert np.array_equal(a, b[:-1])

@@ -182,3 +182,25 @@ def test_iterations_that_go_to_and_fro_are_mixed():
     found = ContactEventSequence._mixed(SimpleNamespace(_comm=MPI.COMM_SELF), tried)
     np.testing.assert_allclose(found.at[0][0], fixed, atol=1e-9)
     np.testing.assert_allclose([found.begins, *found.off[0], found.off[1]], [*fixed[:1], *fixed, fixed[1]], atol=1e-9)
+
+
+def test_forces_of_sticking_sliding_and_open_points_together():
+    """Five points on tilted tools, of one elastic body: prescribed motions, Coulomb's law and the compliance hold."""
+    random = np.random.default_rng(4)
+    angle, half = random.uniform(0, 6, 5), random.uniform(-1, 1, (10, 10))
+    points = Points([SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((5, 2)))], 0, 0, None)
+    points._C, points._S, points._pulls = half @ half.T + np.eye(10), np.zeros((5, 2, 2)), np.zeros(5, dtype=bool)
+    points.friction, points.elastic_slip = np.array([np.inf, 0.3, 0.2, 0.0, 0.3]), np.full(5, 1e-3)
+    near = ToolFrame(np.column_stack([np.cos(angle), np.sin(angle)]), np.column_stack([-np.sin(angle), np.cos(angle)]),
+                     np.zeros(5), random.uniform(-1, 1, 5))
+    status = np.array([ContactStatus.STICKS, ContactStatus.STICKS, -1, 1, ContactStatus.FREE])
+    u, to, force = random.uniform(-1, 1, (5, 2)), random.uniform(-1, 1, (5, 2)), near.normal * 2.0
+    F, change = points.held(u, status, near, force, to)
+    dx = u - (points._C @ change.ravel()).reshape(5, 2)
+    N, T = points.parts(F, near)
+    assert change == pytest.approx(F - force) and F[4] == pytest.approx(0.0, abs=1e-12)
+    assert dx[0] == pytest.approx(to[0])                    # it sticks; the next one after its elastic slip
+    slip = 1e-3 * T[1] / (0.3 * points.parts(force, near)[0][1])
+    assert dx[1] == pytest.approx(to[1] + slip * near.tangent[1])
+    assert [dx[i] @ near.normal[i] for i in (2, 3)] == pytest.approx(near.beyond[2:4])
+    assert T[2:4] == pytest.approx([-0.2 * N[2], 0.0])

@@ -101,12 +101,13 @@ class Increment:
         The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
         (m, c), length. It is 0 where friction does not grow in the ramp: without friction, and on adhering points.
         """
-        width, there = 2 * self._law.theta, self._foreseen(points)
+        assert self._before is not None
+        width, x = 2 * self._law.theta, self._now[0][points]
+        before = Motion(*(part[points] for part in self._before))
         grows = self._law.has_friction and not self._law.pulls
 
         def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            motion = there(by)
-            return motion.distance / width + 0.5, width * grows * motion.normal
+            return before.distance_at(x + by) / width + 0.5, width * grows * before.normal
         return found
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:

@@ -368,9 +368,12 @@ class Law(NormalLaw):
 
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
-        sticks, k = np.asarray(self.mu >= _STICKS), self.k
+        sticks, k = self.mu >= _STICKS, self.k
+        if np.ndim(sticks) == 0 and not sticks:
+            limit, grows = self.shear_limit(pressed, self.mu)
+            return limit / self.elastic_slip, grows / self.elastic_slip * k * slope
         rising = (np.abs(d) < self.theta) * (k / (2 * self.theta) * (not self.pulls))
-        if not sticks.ndim and sticks:
+        if np.ndim(sticks) == 0:
             return k * slope, rising
         limit, grows = self.shear_limit(pressed, np.where(sticks, 0.0, self.mu))
         return (np.where(sticks, k * slope, limit / self.elastic_slip),

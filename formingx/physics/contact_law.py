@@ -90,9 +90,12 @@ class Motion(NamedTuple):
 
     def to(self, x: np.ndarray) -> Motion:
         """Return the predicted values for the points moved to x, shape (n, c)."""
-        offset = x - self.position
-        distance = self.distance + np.einsum("ni,ni->n", self.normal, offset)
-        return self._replace(position=x, distance=distance, slip=self.slip + np.einsum("ni,ni->n", self.along, offset))
+        slip = self.slip + np.einsum("ni,ni->n", self.along, x - self.position)
+        return Motion(x, self.distance_at(x), self.normal, slip, self.along)
+
+    def distance_at(self, x: np.ndarray) -> np.ndarray:
+        """Return the predicted distances of the points moved to x, shape (n, c), shape (n,), length."""
+        return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
 
 
 class ContactLaw(Protocol):

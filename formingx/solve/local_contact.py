@@ -178,6 +178,8 @@ class _Points:
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
+        ends = np.cumsum([0, *(len(i) for _, i in self._some)])
+        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]     # of the owned points of each contact
         self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # locally owned rows
         self._steps = border(self._columns)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
@@ -255,8 +257,8 @@ class _Points:
 
     def _each(self, functions: list[Any], y: Array) -> list[Any]:
         """Return the values of the functions of each contact's points for motions y."""
-        ends = np.cumsum([len(i) for _, i in self._some])[:-1]
-        return [f(mine) for f, mine in zip(functions, np.split(y[self._own].reshape(-1, self._c), ends))]
+        owned = y[self._own].reshape(-1, self._c)
+        return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
         """Gather values of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
