@@ -84,7 +84,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("materials/viscoelastic.py", "share * _bulge(x)\n", "0 * _bulge(x)\n", "viscoelastic"),
     ("materials/viscoelastic.py", "return 3 * s / (q**2 + p * q + p**2) - 3", "return s / q**2 - 3", "viscoelastic"),
     ("materials/viscoelastic.py", "(_mean_decay(x) - decay + p) * c", "(1 - decay + p) * c", "viscoelastic"),
-    ("materials/viscoelastic.py", "mu / (2 * tau) * ufl.max_value", "mu / tau * ufl.max_value", "viscoelastic time"),
+    ("materials/relaxing.py", "mu / (2 * tau) * ufl.max_value", "mu / tau * ufl.max_value", "viscoelastic time"),
     ("extensions/kbkz/kbkz.py", "rested + np.sum", "np.sum", "kbkz"),
     ("extensions/heat/expansion.py", "return self.stretch(temperature) ** 3", "return self.stretch(temperature) ** 2",
      "setting"),

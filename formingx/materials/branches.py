@@ -1,7 +1,11 @@
-"""Relaxing branches in homogeneous tests: their elastic strains, integrated in time.
+r"""Relaxing branches in homogeneous tests: integration of their elastic strains in time.
 
-In principal direction i a branch has the elastic logarithmic strain w_i, part of the strain e_i = ln l_i, and the
-Kirchhoff stress mu exp(2 w_i). It flows by dw_i/dt = de_i/dt - f_i(w)/(2 tau), where f is its material's law.
+In principal direction i a branch has the elastic logarithmic strain w_i, part of the strain :math:`e_i = \ln l_i`, and
+the Kirchhoff stress :math:`\mu \exp(2 w_i)`. Its flow is
+
+.. math:: \frac{dw_i}{dt} = \frac{de_i}{dt} - \frac{f_i(w)}{2 \tau},
+
+where f is the law of its material.
 """
 
 import itertools
@@ -19,15 +23,20 @@ BETWEEN = ("stretch", "strain")
 
 def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stretches: np.ndarray,
                     between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
-    """Return w_i of every branch at every time, shape (n, branches, 3).
+    """Return the elastic strains w_i of every branch at every time.
 
     Args:
-        flow: f, called with w of shape (branches, 3).
-        tau: relaxation times, shape (branches,).
+        flow: function f, called with w of shape (branches, 3).
+        tau: relaxation times, shape (branches,), time.
         mode: a test of `homogeneous.MODES`.
-        times, stretches: shape (n,). The first stretch is put on at once; a second stretch at the same time is a jump.
+        times: times, shape (n,), ascending.
+        stretches: stretches at these times, shape (n,). The first stretch is applied suddenly; a second stretch at the
+            same time is a jump.
         between: one of `BETWEEN`.
-        accuracy: of a step in time, relative; a test keeps about a hundredfold of it.
+        accuracy: relative accuracy of a time step; the error of a test is about a hundred times larger.
+
+    Returns:
+        Elastic strains, shape (n, branches, 3).
 
     Raises:
         ConvergenceError: the integration stopped before the last time.
@@ -59,7 +68,21 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return (times, stretches) of a test as arrays of shape (n,); raise an InputError that begins with `name`."""
+    """Check the arguments of a test in time.
+
+    Args:
+        name: beginning of the messages.
+        mode: a test of `homogeneous.MODES`.
+        times: times, shape (n,).
+        stretches: stretches at these times, shape (n,).
+        between: one of `BETWEEN`.
+
+    Returns:
+        Times and stretches as arrays, shape (n,) each.
+
+    Raises:
+        InputError: an unknown mode or `between`, different shapes, descending times, or a stretch that is not positive.
+    """
     known(f"{name}: mode", mode, MODES)
     known(f"{name}: between", between, BETWEEN)
     try:
@@ -77,7 +100,7 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
 
 
 def _pieces(times: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, int]]:
-    """(first, last) of the parts of a history in which the values grow at one rate."""
+    """Yield (first, last) of the parts of a history in which the values change at a constant rate."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.diff(values) / np.diff(times)
     scale = 1e-9 * np.abs(rates[np.isfinite(rates)]).max(initial=0)

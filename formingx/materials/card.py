@@ -1,4 +1,4 @@
-"""A material's card: a page with its response in three tests, at rates and temperatures of forming, and its limits."""
+"""Material card: a page with the response in three tests, at rates and temperatures of forming, and the limits."""
 
 import base64
 import html
@@ -14,7 +14,7 @@ from ..figures import figure
 from .constants import OfTemperature
 from .homogeneous import MODES
 
-_MOST = 6.0
+_LARGEST_STRETCH = 6.0
 """Largest stretch of the curves, if the material has no smaller limit."""
 _PART = 0.97
 """Largest stretch of the curves over the limit of the stretch."""
@@ -22,7 +22,22 @@ _PART = 0.97
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
-    """See `Material.report`."""
+    """Write the card of a material; see `Material.report`.
+
+    Args:
+        material: the material.
+        file: name of the HTML file.
+        temperatures: temperatures of the curves.
+        rates: Hencky rates, 1/time.
+        unit: unit of stress.
+        unit_of_time: unit of time.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        InputError: a constant depends on the temperature, and no temperatures are given.
+    """
     caller, path = f"{material}: report", place("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
     at = several(f"{caller}: temperatures", temperatures, "temperatures")
@@ -42,7 +57,7 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
 
 
 def _shift(material: Any, temperature: float) -> float:
-    """Return aT at a temperature: a rate acts there as aT times the rate at the reference temperature."""
+    """Return the shift factor aT at a temperature: a rate acts as aT times this rate at the reference temperature."""
     law = material.parameters.get("aT")
     return float(law(temperature)) if isinstance(law, OfTemperature) else 1.0
 
@@ -66,18 +81,19 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
         rest = material.equilibrium
         rows.append(("relaxed shear modulus", said(rest.shear_modulus if rest else 0.0, unit)))
     elif not material.internal and material.equilibrium is material:
-        stable = material.check_stability((0.5, min(_MOST, _PART * material.largest_stretch("equibiaxial"))))
+        top = min(_LARGEST_STRETCH, _PART * material.largest_stretch("equibiaxial"))
+        stable = material.check_stability((0.5, top))
         low, high = stable.drucker["equibiaxial"]
         rows.append(("stable (Drucker), equibiaxial", f"from {low:.3g} to {high:.3g} of the range that was looked at"))
     return rows
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """Return the true stress against stretch in the three tests, as an image for a page."""
+    """Return the curves of true stress against stretch in the three tests, as an image for a page."""
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):
         for k, (name, material, shift) in enumerate(cases):
-            l = np.linspace(1.0, min(_MOST, _PART * material.largest_stretch(mode)), 40)[1:]
+            l = np.linspace(1.0, min(_LARGEST_STRETCH, _PART * material.largest_stretch(mode)), 40)[1:]
             label = f"{name}: " * bool(name)
             if not rates:
                 axis.plot(l, material.stress(mode, l, true=True), color=f"C{k}", label=name)

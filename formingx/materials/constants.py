@@ -1,8 +1,12 @@
-"""Constants of a material that vary over the body.
+"""Spatially varying material constants.
 
-A constant may be a number, a function of the reference position, called as f(R, Z) with arrays of shape (n,), a UFL
-expression of the scene's mesh (a DOLFINx `Function` is one), a `table` over the temperature, the result of
-`of_temperature`, or an object of a class made from `Varying`.
+A constant is one of the following:
+
+- a number;
+- a function f(R, Z) of the reference position, called with arrays of shape (n,);
+- a UFL expression of the scene's mesh, such as a DOLFINx `Function`;
+- a `table` over the temperature, or the result of `of_temperature`;
+- an object of a subclass of `Varying`.
 """
 
 from abc import ABC, abstractmethod
@@ -20,14 +24,14 @@ from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
 
 class Sample(NamedTuple):
-    """Sample of the body for the check of constants: points of the locally owned cells of a layer.
+    """Sample of the body for the check of constants: quadrature points of the locally owned cells of a layer.
 
     Attributes:
         points: reference positions (R, Z), shape (m q, 2), length.
-        cells: local numbers of the cells, shape (m,).
+        cells: local numbers of the m cells, shape (m,).
         places: positions of the q points in the reference cell, shape (q, 2).
         domain: the `dolfinx.mesh.Mesh`.
-        temperature: temperatures at the points, shape (m q,); None: not given.
+        temperature: temperatures at the points, shape (m q,), or None.
     """
 
     points: np.ndarray
@@ -38,35 +42,48 @@ class Sample(NamedTuple):
 
 
 class Varying(ABC):
-    """A constant that varies."""
+    """Spatially varying constant."""
 
     @abstractmethod
     def values(self, sample: Sample) -> np.ndarray:
-        """Return the values at the points of a sample, shape (n,): for checks, moduli and scales.
+        """Return the values at the points of a sample, for checks, moduli and scales.
+
+        Args:
+            sample: the sample with n points.
+
+        Returns:
+            Values, shape (n,).
 
         Raises:
-            InputError: it cannot be evaluated there.
+            InputError: the constant cannot be evaluated there.
         """
 
     @abstractmethod
     def expression(self, fields: Any) -> Any:
-        """Return the constant in a form (UFL scalar).
+        """Return the constant in a form.
 
         Args:
             fields: possible arguments of the constant: `fields.X`, the reference position (UFL, shape (2,)), and
-                `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients that hold f(R, Z) and f(T) at the
-                quadrature points of the energy; the latter follows the temperature when that changes.
+                `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients with the values f(R, Z) and f(T) at
+                the quadrature points of the energy. The latter follows changes of the temperature.
+
+        Returns:
+            The constant (UFL scalar).
         """
 
 
 class OfPosition(Varying):
-    """f(R, Z) of the reference position; arrays of shape (n,) go in and come out."""
+    """Constant that is a function f(R, Z) of the reference position, with arrays of shape (n,).
+
+    Args:
+        function: the function f.
+    """
 
     def __init__(self, function: Callable):
         self.function = function
 
     def __call__(self, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Values, shape (n,), all finite."""
+        """Return the values at positions, shape (n,), all finite."""
         return values(f"the constant {self!r}", self.function, {"R": R, "Z": Z})
 
     def values(self, sample):
@@ -80,7 +97,7 @@ class OfPosition(Varying):
 
 
 class OfTemperature(FunctionOfTemperature, Varying):
-    """A constant that depends on the temperature of the scene, see `FunctionOfTemperature`."""
+    """Constant that depends on the temperature of the scene, see `FunctionOfTemperature`."""
 
     def values(self, sample):
         if sample.temperature is None:
@@ -92,10 +109,16 @@ class OfTemperature(FunctionOfTemperature, Varying):
 
 
 def of_temperature(function: Callable) -> OfTemperature:
-    """Return a constant of a material, or a coefficient of friction, that depends on the temperature of the scene.
+    """Return a material constant, or a coefficient of friction, that depends on the temperature of the scene.
 
     Args:
-        function: f(T), called with an array of temperatures, shape (n,), in the unit that the scene's are given in.
+        function: f(T), called with an array of temperatures, shape (n,), in the unit of the scene's temperature.
+
+    Returns:
+        The constant.
+
+    Raises:
+        InputError: `function` is not callable.
 
     >>> fx.NeoHookean(c10=fx.of_temperature(lambda T: 0.4 * np.exp(-(T - 150.0) / 20.0)))
     NeoHookean(c10=of_temperature(<lambda>))
@@ -106,10 +129,22 @@ def of_temperature(function: Callable) -> OfTemperature:
 
 
 def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
-    """Return a modulus in proportion to the absolute temperature, as of a network of flexible chains (Treloar 1975).
+    r"""Return a modulus proportional to the absolute temperature, as for a network of flexible chains (Treloar 1975).
+
+    .. math:: G(T) = G_0 \, \frac{T - T_z}{T_0 - T_z}
+
+    :math:`T_z` is absolute zero.
 
     Args:
-        value: modulus at the temperature `reference`. unit: unit of temperatures, "C" or "K".
+        value: modulus :math:`G_0` at the reference temperature, stress.
+        reference: reference temperature :math:`T_0`.
+        unit: unit of temperatures, "C" or "K".
+
+    Returns:
+        The modulus as a function of the temperature.
+
+    Raises:
+        InputError: the reference temperature is not above absolute zero, or the unit is unknown.
 
     >>> modulus = fx.entropic(1.0, 20.0, unit="C")
     >>> float(modulus(313.15).round(6))
@@ -125,7 +160,11 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
 
 
 class OfMesh(Varying):
-    """A UFL scalar of the scene's own mesh."""
+    """Constant that is a UFL scalar of the scene's own mesh.
+
+    Args:
+        expression: the UFL scalar.
+    """
 
     def __init__(self, expression: Any):
         self._expression = expression
@@ -145,7 +184,14 @@ class OfMesh(Varying):
 
 
 def varying(value: Any) -> Varying | None:
-    """Return a constant as `Varying`, or None if it does not vary."""
+    """Return a constant as `Varying`.
+
+    Args:
+        value: the constant.
+
+    Returns:
+        The constant, or None if it does not vary.
+    """
     if isinstance(value, Varying):
         return value
     if isinstance(value, ufl.core.expr.Expr):

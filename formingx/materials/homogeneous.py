@@ -1,6 +1,6 @@
-"""Homogeneous deformations of a strain energy, F = diag(l1, l2, l3), evaluated at many stretches at once.
+"""Homogeneous deformations F = diag(l1, l2, l3) of a strain energy, evaluated at many stretches at once.
 
-UFL differentiates the energy once; numpy evaluates the derivatives, so that a fit of constants costs no compilation.
+UFL differentiates the energy once, and numpy evaluates the derivatives, so a fit of constants needs no compilation.
 """
 
 import functools
@@ -18,7 +18,7 @@ from ufl.corealg.traversal import unique_post_traversal
 from ..errors import InputError
 
 MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
-"""Tests by name: the stretches are l, l^k and l^(-1-k), with k the value here; the last direction is free of stress."""
+"""Tests by name: the stretches are l, l^k and l^(-1-k), with the value k; the last direction is stress-free."""
 
 
 _DOMAIN = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
@@ -27,11 +27,14 @@ _CONSTANTS: list[Any] = []                                   # as many as an ene
 
 
 class Response:
-    """First and second derivatives of an energy by the principal stretches.
+    """First and second derivatives of an energy with respect to the principal stretches.
 
     Args:
-        energy: called as energy(F, **constants), F of shape (3, 3); returns a UFL scalar.
-        names: the names of its constants.
+        energy: function of (F, **constants), F of shape (3, 3), that returns a UFL scalar.
+        names: names of its constants.
+
+    Raises:
+        InputError: the energy is not a scalar.
     """
 
     def __init__(self, energy: Callable, names: Any):
@@ -46,28 +49,48 @@ class Response:
 
     @np.errstate(all="ignore")
     def stress(self, stretches: Any, constants: Any) -> np.ndarray:
-        """Nominal stresses P_i, shape (2, n), in directions 1 and 2 of a sheet free of stress in direction 3.
+        r"""Return the nominal stresses of a sheet that is stress-free in direction 3.
 
-        P_i = W,i - (l3 / l_i) W,3: the pressure of incompressibility is eliminated.
+        The condition in direction 3 eliminates the pressure of incompressibility:
+
+        .. math:: P_i = \frac{\partial W}{\partial l_i} - \frac{l_3}{l_i} \frac{\partial W}{\partial l_3}
 
         Args:
             stretches: (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: the values of the constants, in the order of `names`.
+            constants: values of the constants, in the order of `names`.
+
+        Returns:
+            Stresses in directions 1 and 2, shape (2, n), stress.
         """
         l = _three(stretches)
         g = self._first(l, constants)
         return g[:2] - l[2] / l[:2] * g[2]
 
     def derivatives(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        """W,i, shape (3, n), and W,ij, shape (3, 3, n), at (l1, l2, l3) of shape (3, n), l3 free."""
+        """Return the derivatives of the energy with respect to three independent stretches.
+
+        Args:
+            stretches: (l1, l2, l3), shape (3, n).
+            constants: values of the constants, in the order of `names`.
+
+        Returns:
+            W,i, shape (3, n), and W,ij, shape (3, 3, n), stress.
+        """
         values = self._all(np.asarray(stretches, float), constants)
         return values[:3], values[3:][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
     @np.errstate(all="ignore")
     def logarithmic(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (2, n) and Hessian (2, 2, n) of W in the strains ln l1, ln l2 with l1 l2 l3 = 1.
+        r"""Return gradient and Hessian of the energy in the strains ln l1 and ln l2, with l1 l2 l3 = 1.
 
-        The gradient holds the Kirchhoff stresses tau_i - tau_3.
+        The gradient is the Kirchhoff stress :math:`\tau_i - \tau_3`.
+
+        Args:
+            stretches: (l1, l2), shape (2, n).
+            constants: values of the constants, in the order of `names`.
+
+        Returns:
+            Gradient, shape (2, n), and Hessian, shape (2, 2, n), stress.
         """
         l = _three(stretches)
         g, h = self.derivatives(l, constants)
@@ -78,12 +101,21 @@ class Response:
 
 
 def along(mode: str, stretches: Any) -> np.ndarray:
-    """(l1, l2), shape (2, n), of a test at its stretches, shape (n,)."""
+    """Return the in-plane stretches of a test.
+
+    Args:
+        mode: a test of `MODES`.
+        stretches: stretches l in the loaded direction, shape (n,).
+
+    Returns:
+        (l1, l2), shape (2, n).
+    """
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
 
 
 def _three(stretches: Any) -> np.ndarray:
+    """Return the three stretches of an incompressible material, shape (3, n)."""
     l1, l2 = np.asarray(stretches, float)
     return np.stack([l1, l2, 1 / (l1 * l2)])
 
@@ -91,9 +123,11 @@ def _three(stretches: Any) -> np.ndarray:
 class Stability(NamedTuple):
     """Ranges of stretch in which a material is stable.
 
-    stretches: the range that was asked for.
-    finite, load, drucker: {mode: (lowest, highest)}, the part of it around l = 1 where the stress is finite, and where
-        each criterion holds.
+    Attributes:
+        stretches: the requested range (lowest, highest).
+        finite: {mode: range around l = 1 where the stress is finite}.
+        load: {mode: range around l = 1 where the force increases}.
+        drucker: {mode: range around l = 1 where Drucker's criterion holds}.
     """
 
     stretches: tuple[float, float]
@@ -121,12 +155,30 @@ class Stability(NamedTuple):
 
 
 def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
-    """See `Material.check_stability`. Bounds are searched for in 400 steps of equal ratio and then bisected."""
+    """Return the ranges of stretch in which a material is stable; see `Material.check_stability`.
+
+    Bounds are searched for in 400 steps of equal ratio, then bisected.
+
+    Args:
+        response: derivatives of the energy.
+        constants: values of its constants.
+        low: lowest stretch, at most 1.
+        high: highest stretch, 1 or larger.
+
+    Returns:
+        The ranges.
+    """
     constants = list(constants)
 
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
-        """1, l^2 dP/dl and the smaller eigenvalue of the Hessian, over the size of their terms, shape (3, n)."""
+        """Return the margins of the three criteria, shape (3, n), relative to the size of their terms.
+
+        The terms are 1, l^2 dP/dl and the smaller eigenvalue of the Hessian.
+
+        Returns:
+            The margins; negative where a criterion fails.
+        """
         tau, K = response.logarithmic(along(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
         slope = K[0, 0] + MODES[mode] * K[0, 1] - tau[0]
@@ -152,7 +204,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
 
 class _Program:
-    """Scalar UFL expressions as a list of numpy operations, each common part done once."""
+    """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once."""
 
     def __init__(self, inputs: list, outputs: list):
         place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}
@@ -201,6 +253,7 @@ _OPERATIONS: dict[type, Callable] = {
 
 
 def _operation(node: Any) -> Callable:
+    """Return the numpy operation of a UFL node."""
     if isinstance(node, classes.Zero):
         return lambda: 0.0
     if isinstance(node, classes.ScalarValue):

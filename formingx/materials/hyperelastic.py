@@ -1,4 +1,4 @@
-"""The strain energies that formingx knows, and the user's own."""
+"""Hyperelastic materials, and user-defined energies."""
 
 import inspect
 import itertools
@@ -48,8 +48,8 @@ class MooneyRivlin(Material):
     .. math:: W = c_{10} (I_1 - 3) + c_{01} (I_2 - 3)
 
     Args:
-        c10: the I1 constant, stress, at least 0.
-        c01: the I2 constant, stress, at least 0 (both at least 0: else W falls without bound).
+        c10: the I1 constant, stress, at lowest 0.
+        c01: the I2 constant, stress, at lowest 0 (both at lowest 0: else W falls without bound).
 
     >>> rubber = fx.MooneyRivlin(c10=0.3, c01=0.1)
     >>> round(float(rubber.stress("uniaxial", 2.0)), 6)                            # 2 (c10 + c01/l) (l - l^-2)
@@ -64,7 +64,7 @@ class MooneyRivlin(Material):
         for name, value in constants.items():
             if finite(f"{self}: {name}", value) < 0:
                 raise InputError(f"{self} is not stable: with {name} < 0 the energy falls without bound at large"
-                                 f" stretch; {name} must be at least 0")
+                                 f" stretch; {name} must be at lowest 0")
 
     def strain_energy(self, F, c10, c01):
         I1, I2 = kinematics.invariants(F)
@@ -85,8 +85,8 @@ class Yeoh(Material):
 
     Args:
         c10: stress, greater than 0.
-        c20: stress, greater than -sqrt(3 c10 c30) (at least 0 if c30 is 0), so that W grows with I1 everywhere.
-        c30: stress, at least 0.
+        c20: stress, greater than -sqrt(3 c10 c30) (at lowest 0 if c30 is 0), so that W grows with I1 everywhere.
+        c30: stress, at lowest 0.
 
     >>> round(float(fx.Yeoh(c10=0.2, c20=0.01, c30=0.001).shear_modulus), 6)
     0.4
@@ -100,10 +100,10 @@ class Yeoh(Material):
         super().check_constants(**constants)
         c10, c20, c30 = constants.values()
         positive(f"{self}: c10", c10)
-        least = -math.sqrt(3 * c10 * max(c30, 0.0))
-        if c30 < 0 or c20 < 0 and c20 <= least:
-            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
-                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {least:.6g}")
+        lowest = -math.sqrt(3 * c10 * max(c30, 0.0))
+        if c30 < 0 or c20 < 0 and c20 <= lowest:
+            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at lowest"
+                             f" 0 and c20 greater than -sqrt(3 c10 c30) = {lowest:.6g}")
 
     def strain_energy(self, F, c10, c20, c30):
         x = ufl.inner(F, F) - 3
@@ -114,7 +114,13 @@ class Yeoh(Material):
         return [cls(c10=modulus / 2, c20=0, c30=0.1 * modulus / I1**2)]
 
     def coordinates(self):
-        """c10, c20 + 0.99 sqrt(3 c10 c30) and sqrt(c30): admissible, with 1 % to spare, where none is negative."""
+        """Return the variables of a fit: c10, c20 + 0.99 sqrt(3 c10 c30), and sqrt(c30).
+
+        Constants are admissible, with 1 % margin, where no variable is negative.
+
+        Returns:
+            List of (value, lowest, highest).
+        """
         c10, c20, c30 = self.parameters.values()
         return [(x, 0, math.inf) for x in (c10, c20 + 0.99 * math.sqrt(3 * c10 * c30), math.sqrt(c30))]
 
@@ -174,13 +180,12 @@ class ArrudaBoyce(Material):
 
     .. math:: W = \mu N \left(\frac{s}{2} - \frac{s^2}{20} - \frac{s^3}{15} - \ln(1 - s)\right),
 
-    less its value at s = 1/N.
+    minus its value at s = 1/N.
 
     Args:
-        mu: n k T, stress, greater than 0. The shear modulus in the reference configuration is larger:
-            mu (1 + 3/(5 N) + ...).
-        N: segments in a chain, greater than 1: I1 stays below 3 N. In uniaxial tension the largest stretch is about
-            sqrt(3 N).
+        mu: n k T, stress, positive. The initial shear modulus is larger: mu (1 + 3/(5 N) + ...).
+        N: number of segments in a chain, greater than 1; I1 stays below 3 N. In uniaxial tension the largest stretch is
+            about sqrt(3 N).
 
     >>> fx.ArrudaBoyce(mu=0.8, N=25.0).largest_I1                                  # 3 N
     75.0
@@ -220,13 +225,13 @@ class Ogden(Material):
     .. math:: W = \sum_k \frac{\mu_k}{\alpha_k}
               \left(\lambda_1^{\alpha_k} + \lambda_2^{\alpha_k} + \lambda_3^{\alpha_k} - 3\right)
 
-    Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on: the same at constant volume (alpha_k = -2 is
-    I2), but finite in an element that is squeezed flat on the way to a solution. Without it Newton's method fails at
-    the stretches of a blown sheet.
+    Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on. Both are equal at constant volume (alpha_k =
+    -2 gives I2), but the second is finite in an element that is squeezed flat during Newton's method. Otherwise
+    Newton's method fails at the stretches of a blown sheet.
 
     Args:
         mu: the mu_k, stress; the shear modulus is half the sum of mu_k alpha_k.
-        alpha: as many exponents alpha_k, none zero, each with mu_k alpha_k > 0.
+        alpha: the same number of exponents alpha_k, nonzero, each with mu_k alpha_k > 0.
 
     >>> same = fx.Ogden(mu=[0.8], alpha=[2.0])                                     # neo-Hookean, c10 = mu/2
     >>> round(float(same.stress("equibiaxial", 2.0)), 6)                           # mu (l - l^-5)
@@ -236,7 +241,7 @@ class Ogden(Material):
     def __init__(self, *, mu: Any, alpha: Any):
         mu, alpha = _as_tuple(mu), _as_tuple(alpha)
         if len(mu) != len(alpha) or not mu:
-            raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at least one each")
+            raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at lowest one each")
         for exponent in alpha:
             if varying(exponent) is not None:
                 raise InputError(f"Ogden: alpha = {alpha!r}: exponents must be numbers; the mu may vary")
@@ -258,11 +263,24 @@ class Ogden(Material):
 
     @staticmethod
     def _pairs(constants):
+        """Return the list of (mu_k, alpha_k)."""
         return [(constants[f"mu{k}"], constants[f"alpha{k}"]) for k in range(1, len(constants) // 2 + 1)]
 
     @classmethod
     def guesses(cls, modulus, I1, terms):
-        """Return a material for every choice of `terms` exponents out of six."""
+        """Return the initial materials of a fit, one for every choice of `terms` exponents out of six.
+
+        Args:
+            modulus: approximate shear modulus, stress.
+            I1: largest I1 of the data.
+            terms: number of exponents; None for 3.
+
+        Returns:
+            The materials.
+
+        Raises:
+            InputError: more than six exponents.
+        """
         exponents = (1.3, 2, 5, 10, -2, -5)
         n = count("fit: terms", 3 if terms is None else terms)
         if n > len(exponents):
@@ -272,20 +290,28 @@ class Ogden(Material):
                 for some in itertools.combinations(exponents, n)]
 
     def coordinates(self):
-        """mu_k and alpha_k keep their signs; alpha_k lies between -30 and 30."""
+        """Return the variables of a fit: mu_k and alpha_k keep their signs; alpha_k lies between -30 and 30.
+
+        Returns:
+            List of (value, lowest, highest).
+        """
         values = list(self.parameters.values())
         largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)
         return [(x, 0, top) if x > 0 else (x, -top, 0) for x, top in zip(values, largest, strict=True)]
 
 
 class Hyperelastic(Material):
-    """Any energy, written as a function of the invariants or of F.
+    """Material with a user-defined energy, a function of the invariants or of F.
 
     Args:
-        energy: called as `energy(I1, I2, **constants)` or `energy(F, **constants)`; returns a UFL scalar. Outside its
-            range it and its derivatives should be infinite or not a number: a step that leaves the range is halved.
+        energy: function `energy(I1, I2, **constants)` or `energy(F, **constants)` that returns a UFL scalar. Outside
+            its range the energy and its derivatives should be infinite or not a number: a step that leaves the range is
+            halved.
         of: argument of the energy, "invariants" or "F" (shape (3, 3)).
-        constants: the energy's named constants. Exponents and the like may be among them.
+        constants: named constants of the energy; exponents may be among them.
+
+    Raises:
+        InputError: an energy that is no function of these arguments.
 
     Example: ``Hyperelastic(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3)**2, c1=0.2, c2=0.01)``
 
@@ -322,10 +348,12 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """Return ln x, not a number for x < 0 with its derivatives. (The derivatives of ln x itself are finite there.)"""
+    """Return ln x; for x < 0 value and derivatives are not a number (the derivatives of UFL's ln x are finite there).
+    """
     return 2 * ufl.ln(ufl.sqrt(x))
 
 
 def _as_tuple(values: Any) -> tuple:
+    """Return one value or several as a tuple."""
     alone = varying(values) is not None or not hasattr(values, "__iter__") or getattr(values, "ndim", 1) == 0
     return (values,) if alone else tuple(values)

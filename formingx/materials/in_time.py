@@ -12,14 +12,37 @@ from .material import Material
 
 
 def checked_shift(name: str, shift: Any) -> Callable:
-    """Return a law of relaxation times over temperature; raise an InputError if it is no function."""
+    """Check the temperature dependence of relaxation times.
+
+    Args:
+        name: beginning of the message.
+        shift: the law aT(T).
+
+    Returns:
+        The same law.
+
+    Raises:
+        InputError: the law is not callable.
+    """
     if not callable(shift):
         raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
     return shift
 
 
 def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
-    """Return at least one pair, such as "mu, tau"; raise an InputError otherwise."""
+    """Check a list of pairs, such as (mu, tau).
+
+    Args:
+        name: beginning of the messages.
+        pairs: the pairs, at least one.
+        what: names of both entries, such as "mu, tau".
+
+    Returns:
+        The pairs as lists.
+
+    Raises:
+        InputError: no pair, or an entry that is not a pair.
+    """
     found = several(name, pairs, f"({what})")
     if not found:
         raise InputError(f"{name} = {pairs!r}: must be at least one ({what})")
@@ -31,12 +54,15 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
 
 
 class Relaxing(Material):
-    """A material that relaxes to an equilibrium; `stress(mode, stretches, times=, between=)` computes its tests.
-
-    Args:
-        equilibrium: the material, without a history, that is left when all has relaxed, or None.
+    """Material that relaxes to an equilibrium; `stress(mode, stretches, times=, between=)` computes its tests.
 
     Subclasses add their own constants to `parameters`, call `check`, and define `_modulus`.
+
+    Args:
+        equilibrium: material without history that describes the relaxed state, or None.
+
+    Raises:
+        InputError: `equilibrium` is no material, or has a history.
     """
 
     stress: Any
@@ -56,19 +82,28 @@ class Relaxing(Material):
         raise NotImplementedError
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
-        """Return G(t) = G_equilibrium + sum G exp(-t/tau) of small shear, at times of any shape; stress."""
+        r"""Return the small-strain relaxation modulus.
+
+        .. math:: G(t) = G_\infty + \sum_k G_k \exp(-t / \tau_k)
+
+        Args:
+            times: times t, any shape, time.
+
+        Returns:
+            Moduli, the same shape, stress.
+        """
         rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
         return rest + self._modulus(finite_array("relaxation_modulus: times", times))
 
     @property
     def shear_modulus(self) -> float:
-        """Shear modulus of the instantaneous response; stress."""
+        """Shear modulus of the instantaneous response, stress."""
         self._numbers()
         return float(self.relaxation_modulus(0.0))
 
     @property
     def rest_stress(self) -> float:
-        """Reference stress of the equilibrium; relaxing branches have none; stress."""
+        """Stress dW/dF11 of the equilibrium energy at F = I, stress; relaxing branches have none."""
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
@@ -84,6 +119,7 @@ class Relaxing(Material):
         return None if self._equilibrium is None else self._relaxed_energy(F, constants)
 
     def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
+        """Return the equilibrium energy of F (UFL, stress); 0 without an equilibrium."""
         if self._equilibrium is None:
             return 0
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
@@ -94,7 +130,7 @@ class Relaxing(Material):
 
     @property
     def equilibrium(self) -> Material | None:
-        """The material that is left when all branches have relaxed, or None."""
+        """Material that describes the relaxed state, or None."""
         if self._equilibrium is None:
             return None
         rest = copy.copy(self._equilibrium)
@@ -102,19 +138,39 @@ class Relaxing(Material):
         return rest
 
     def relaxation(self, mode: str, stretch: float, times: ArrayLike) -> np.ndarray:
-        """Return the nominal stress at times (any shape, at least 0) after a sudden stretch that stays constant."""
+        """Return the nominal stress after a sudden stretch that is then constant.
+
+        Args:
+            mode: a test of `homogeneous.MODES`.
+            stretch: the stretch, positive.
+            times: times after the stretch, any shape, not negative.
+
+        Returns:
+            Stresses, the same shape, stress.
+
+        Raises:
+            InputError: a negative time.
+        """
         t = np.asarray(times, float)
         if not np.all(t >= 0):
             raise InputError(f"{self}: relaxation: times = {times!r}: must not be negative")
         ordered, back = np.unique(np.append(0.0, t.ravel()), return_inverse=True)
-        held = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
-        return self.stress(mode, held, times=ordered)[back[1:]].reshape(t.shape)[()]
+        constant = np.full(len(ordered), positive(f"{self}: relaxation: stretch", stretch))
+        return self.stress(mode, constant, times=ordered)[back[1:]].reshape(t.shape)[()]
 
     def constant_rate(self, mode: str, rate: float, stretches: ArrayLike) -> np.ndarray:
-        """Return the nominal stress at stretches, shape (n,), all above or all below 1, at a constant Hencky rate.
+        """Return the nominal stress at a constant Hencky rate.
 
         Args:
-            rate: absolute value of the rate of the logarithmic strain in the loaded direction, 1/time, above 0.
+            mode: a test of `homogeneous.MODES`.
+            rate: absolute value of the rate of the logarithmic strain in the loaded direction, 1/time, positive.
+            stretches: stretches, shape (n,), all above or all below 1.
+
+        Returns:
+            Stresses, shape (n,), stress.
+
+        Raises:
+            InputError: stretches above and below 1.
         """
         rate = positive(f"{self}: constant_rate: rate", rate)
         t = np.abs(np.log(np.asarray(stretches, float))) / rate

@@ -1,6 +1,6 @@
-"""Thin bodies of one or more layers that are inflated freely: the pressure that they bear at a stretch.
+"""Free inflation of thin bodies of one or more layers: the pressure at a stretch.
 
-Membrane theory: a tube stays a tube, a disc becomes a cap of a sphere. The layers have the same stretches, so their
+Membrane theory: a tube stays a tube, a disc becomes a spherical cap. The layers have the same stretches, so their
 forces add up.
 """
 
@@ -16,18 +16,23 @@ _HALVINGS = 60             # bisections of a stretch, down to round-off
 
 
 class Peak(NamedTuple):
-    """The first maximum of the pressure: the stretch, and the pressure, stress."""
+    """First maximum of the pressure.
+
+    Attributes:
+        stretch: stretch at the maximum.
+        pressure: pressure, stress.
+    """
 
     stretch: float
     pressure: float
 
 
 class Inflated:
-    """A thin body, inflated freely.
+    """Thin body in free inflation.
 
     Args:
-        layers: (material, thickness in the reference configuration, length) of each layer; all constants are numbers.
-        radius: mean radius of the tube, or radius of the opening that holds the disc, in the reference configuration.
+        layers: list of (material, reference thickness, length) for each layer; all constants are numbers.
+        radius: mean reference radius of the tube, or radius of the opening over which the disc is held, length.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
@@ -35,11 +40,17 @@ class Inflated:
         self._radius = radius
 
     def tube(self, hoop: np.ndarray) -> np.ndarray:
-        """Return the pressure in a long tube with closed ends, free to grow longer, at hoop stretches, shape (n,),
-        stress.
+        r"""Return the pressure in a long tube with closed ends, free to extend.
 
-        The Cauchy stress along it is half of that around: P2 lz = P1 lh / 2 gives its stretch lz, and p = P1 h0 / (R
-        lh lz). Infinity where a material cannot be stretched so far.
+        The axial Cauchy stress is half of the hoop stress, which gives the axial stretch; P are nominal stresses:
+
+        .. math:: P_2 \lambda_z = \tfrac{1}{2} P_1 \lambda_h, \qquad p = \frac{P_1 h_0}{R \lambda_h \lambda_z}
+
+        Args:
+            hoop: hoop stretches, shape (n,).
+
+        Returns:
+            Pressures, shape (n,), stress; infinite beyond the largest stretch of a material.
         """
         low, high = np.full_like(hoop, 0.5), hoop + 1.0
         for _ in range(_HALVINGS):
@@ -51,23 +62,39 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def disc(self, stretch: np.ndarray) -> np.ndarray:
-        """Return the pressure on a disc blown to a cap of a sphere that is stretched evenly, shape (n,), stress.
+        r"""Return the pressure on a disc blown to a spherical cap with uniform stretch l.
 
-        With the height s a the area ratio is l^2 = 1 + s^2, and p = 4 s (P h0 / l) / (a (1 + s^2)). The largest is
-        2 to 3 % below the pressure of a hinged neo-Hookean disc.
+        With the height s a and the radius a of the opening, the area ratio is :math:`l^2 = 1 + s^2`, and
+
+        .. math:: p = \frac{4 s \, P h_0 / l}{a (1 + s^2)}
+
+        The maximum is 2 to 3 % below the pressure of a hinged neo-Hookean disc.
+
+        Args:
+            stretch: stretches l, shape (n,), 1 or larger.
+
+        Returns:
+            Pressures, shape (n,), stress; infinite beyond the largest stretch of a material.
         """
         force = self._forces(along("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
         return np.where(np.isfinite(found), found, np.inf)
 
     def _forces(self, stretches: np.ndarray) -> np.ndarray:
-        """Return the forces per length in the reference configuration, shape (2, n)."""
+        """Return the forces per reference length, shape (2, n)."""
         each = [h * material.response.stress(stretches, constants) for material, constants, h in self._layers]
         return np.sum(each, axis=0)
 
 
 def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
-    """Return the first maximum of a pressure over stretches from 1 to 20; None: it only grows."""
+    """Return the first maximum of a pressure over stretches from 1 to 20.
+
+    Args:
+        pressure: function from stretches, shape (n,), to pressures, shape (n,), stress.
+
+    Returns:
+        The maximum; None if the pressure increases throughout.
+    """
     stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
     found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to the largest stretch

@@ -1,9 +1,13 @@
-"""Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
+r"""Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
 
 A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
-which advance from one accepted state to the next. The isotropic stress of an energy of F in the reference
-configuration is removed where the energy is used: W(F) - rest_stress ln J. (On a thin sheet Newton's method takes half
-as many iterations with this form as with the isochoric part of F: see the notes on incompressibility.)
+which are updated from one accepted state to the next. Where the energy is used, its isotropic stress in the reference
+configuration is removed:
+
+.. math:: W(F) - \sigma_0 \ln J, \qquad \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
+
+On a thin sheet Newton's method takes half as many iterations with this form as with the isochoric part of F: see the
+notes on incompressibility.
 """
 
 from __future__ import annotations
@@ -12,106 +16,45 @@ import copy
 import functools
 import math
 from collections.abc import Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import ufl
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, finite, known, positive
 from ..figures import Axes, figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
+from .energies import Energies
 from .homogeneous import MODES, Response, Stability
 
 
-class Material:
-    """A strain energy with named constants.
+class Material(Energies):
+    """Strain energy with named constants.
 
-    Subclasses set `self.parameters` (name to number, or to a varying coefficient: see `constants`) and give
-    `strain_energy`. The constants' unit of stress is the user's own; all pressures and stresses have it.
+    Subclasses set `self.parameters` (name to number, or to a varying coefficient: see `constants`) and define
+    `strain_energy`. The user chooses the unit of stress of the constants; all pressures and stresses have this unit.
 
-    A material with a history sets `self.internal` too, and gives `step_energy` and `updated`. In their arguments and
-    results, `internal` is {name: UFL expression} with the values at the beginning of the step, and `time_step` the
-    process time since then (UFL scalar; 0 where no time passes, then nothing may change).
+    A material with a history also sets `self.internal`, and defines `step_energy` and `updated`. In their arguments and
+    results, `internal` is {name: UFL expression} with the values at the beginning of the step. `time_step` is the
+    process time since then (UFL scalar); where it is 0 no variable may change by flow.
 
     Attributes:
         parameters: {name: constant}.
-        internal: {name: value in the reference configuration}, a number or nested tuples, of the shape
-            of the variable; of a quantity per quadrature point. Empty: no history.
-        of_motion: names of internal variables that describe the motion in the last step, for the rate in the next; with
-            their values in the reference configuration they predict nothing.
-        shapes: {name: 1 or -1} of internal variables that are positive tensors, as C or its inverse, with entries 11,
-            22, 12, 33: they are transferred to another mesh relative to the deformed body, all others as numbers.
+        internal: {name: value in the reference configuration}, a number or nested tuples of the shape of the variable,
+            per quadrature point. Empty: no history.
+        of_motion: names of internal variables that describe the motion in the last step and predict the rate in the
+            next; with their values in the reference configuration they predict no motion.
+        shapes: {name: 1 or -1} of internal variables that are positive definite tensors, like C or its inverse, with
+            entries 11, 22, 12, 33. They are transferred to another mesh relative to the deformed body, others as
+            numbers.
         rate_dependent: False if the history depends on the strain alone, as damage does, and not on the time.
-        integral: the law of a stress that depends on all past states (`IntegralLaw`), or None.
+        integral: law of a stress that depends on all past states (`IntegralLaw`), or None.
         stores_energy: True if `stored_energy` is defined.
         symmetric: True if the tangent is symmetric.
-        tested: the tests that its constants come from (a `MeasuredRange`), or None: not known.
-        branches: [(modulus, relaxation time)] of a material that relaxes.
+        tested: tests from which the constants were fitted (a `MeasuredRange`), or None if unknown.
+        branches: list of (modulus, relaxation time) of a relaxing material.
     """
-
-    parameters: dict[str, Any]
-    internal: dict[str, Any] = {}
-    of_motion: Any = ()
-    shapes: Any = MappingProxyType({})
-    rate_dependent = True
-    integral: Any = None
-    stores_energy: Any = True
-    symmetric: Any = True
-    tested: Any = None
-    branches: Any = ()
-
-    def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
-        """Energy per reference volume of F, shape (3, 3); a UFL scalar, zero at F = I.
-
-        For a material with a history: the instantaneous energy of a body that was in the reference
-        configuration before.
-        """
-        if not self.internal:
-            raise NotImplementedError
-        rest = {name: ufl.as_ufl(value) if np.ndim(value) == 0 else ufl.as_tensor(value)
-                for name, value in self.internal.items()}
-        return self.step_energy(F, rest, ufl.as_ufl(0.0), **constants)
-
-    @property
-    def of_flow(self) -> tuple[str, ...]:
-        """Names of constants that set a rate of flow: a step uses their values at its middle."""
-        return ()
-
-    def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """Return the potential of a step, per reference volume: its derivative by F is the stress at the end of the
-        step."""
-        return self.strain_energy(F, **constants)
-
-    def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
-        """{name: UFL expression}: the internal variables at the end of a step that ends at F."""
-        return {}
-
-    def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the energy per reference volume that is stored at F, with the internal variables as they are then."""
-        return self.strain_energy(F, **constants)
-
-    def equilibrium_energy(self, F: Any, **constants: Any) -> Any:
-        """Return the energy per reference volume that is left at F when all has relaxed; None: none is left, or not
-        known."""
-        return None if self.internal else self.strain_energy(F, **constants)
-
-    def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
-        """Return the largest principal elastic stretch of each relaxing branch, with the present internal variables.
-
-        UFL scalars: 1 for a relaxed branch, the largest isochoric stretch of F before any relaxation.
-        """
-        return []
-
-    def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the dissipated power per reference volume at F, stress over time; 0 without a history."""
-        return ufl.as_ufl(0.0)
-
-    def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the energy per reference volume that damage has cost, with the internal variables as they are then."""
-        return ufl.as_ufl(0.0)
 
     @property
     def varies(self) -> bool:
@@ -119,18 +62,22 @@ class Material:
         return any(varying(value) is not None for value in self.parameters.values())
 
     def constants(self) -> dict[str, float | Varying]:
-        """{name: number, or a varying coefficient}."""
+        """Return the constants for a form.
+
+        Returns:
+            {name: number, or a varying coefficient}.
+        """
         return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
 
     def _numbers(self) -> list[float]:
-        """Return the constants' values, in order; an InputError if they vary."""
+        """Return the values of the constants, in order; raise an InputError if they vary."""
         if self.varies:
             raise InputError(f"{self}: its constants vary over the body: use with_constants([...]) for the material at"
                              f" one point of it")
         return list(self.parameters.values())
 
     def _sampled(self, sample: Sample) -> np.ndarray:
-        """Return the different sets of values that the constants have over a sample, shape (constants, n)."""
+        """Return the distinct sets of values of the constants over a sample, shape (constants, n)."""
         found = [value.values(sample) if isinstance(value, Varying) else float(value)
                  for value in self.constants().values()]
         columns = np.stack(np.broadcast_arrays(np.zeros(len(sample.points)), *found)[1:])
@@ -148,25 +95,35 @@ class Material:
 
     @property
     def largest_I1(self) -> float:
-        """The value of I1 at which the energy is infinite; infinity if there is none."""
+        """Value of I1 at which the energy becomes infinite; infinity if there is none."""
         return math.inf
 
     @property
     def shear_modulus(self) -> float:
-        """Modulus of small shear, E/3; for fibres in the stiffest direction. Unit: stress.
+        r"""Small-strain shear modulus, E/3; with fibres in the stiffest direction. Unit: stress.
 
-        Half the largest W'' of small strains e = ln l with zero sum: if isotropic, W = mu (e1^2 + e2^2 + e3^2).
+        For small strains e = ln l with zero sum an isotropic energy is
+
+        .. math:: W = \mu (e_1^2 + e_2^2 + e_3^2).
+
+        In general mu is half the largest second derivative of W along such strains.
         """
         return float(self._moduli(self._numbers(), 1)[1, 0])
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
-        """`shear_modulus` for the values that the constants have over a sample, shape (n,)."""
+        """Return the shear modulus for the values of the constants over a sample.
+
+        Args:
+            sample: the sample.
+
+        Returns:
+            Moduli for the n distinct sets of values, shape (n,), stress.
+        """
         values = self._sampled(sample)
         return self._moduli(values, values.shape[1])[1]
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
-        """Return the smallest and the largest modulus of small strains along the axes, for n sets of constants, (2,
-        n)."""
+        """Return smallest and largest small-strain modulus along the axes for n sets of constants, shape (2, n)."""
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
         half = np.hypot((a - b) / 2, (H[0, 0] - H[1, 1]) / math.sqrt(12))
@@ -174,23 +131,29 @@ class Material:
 
     @property
     def rest_stress(self) -> float:
-        """dW/dF11 at F = I, stress: for the invariants, 2 (W,1 + 2 W,2)."""
+        """dW/dF11 at F = I, stress: 2 (W,1 + 2 W,2) for a function of the invariants."""
         return float(self.response.derivatives(np.ones((3, 1)), self._numbers())[0][0, 0])
 
     @functools.cached_property
     def response(self) -> Response:
-        """The energy's derivatives by the principal stretches, for any constants."""
+        """Derivatives of the energy by the principal stretches, for any constants."""
         return Response(self.strain_energy, list(self.parameters))
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), *, true: bool = False) -> np.ndarray:
-        """Nominal stress, force over reference area, of a test (`true`: over the area as it is). Unit: stress.
+        r"""Return the nominal stress, force over reference area, in a homogeneous test.
 
-        P = dW/dl / n along the test, with n = 1 direction pulled, or 2. The true stress is P l.
+        With n = 1 direction pulled, or 2:
+
+        .. math:: P = \frac{1}{n} \frac{dW}{dl}
 
         Args:
-            mode: "uniaxial" (l, l^-1/2, l^-1/2), "pure_shear" (l, 1, 1/l), also called planar tension, or
-                "equibiaxial" (l, l, l^-2); "biaxial": (l1, l2), any two, as in `stress(stretches=(l1, l2))`.
-            stretches: l, any shape, each greater than 0; the result has this shape. Of "biaxial" shape (2, ...).
+            mode: "uniaxial" (l, l^-1/2, l^-1/2), "pure_shear" (l, 1, 1/l), also called planar tension, or "equibiaxial"
+                (l, l, l^-2); "biaxial": any (l1, l2), as in `stress(stretches=(l1, l2))`.
+            stretches: stretches l, any shape, each positive; for "biaxial" shape (2, ...).
+            true: True for the true stress P l, force over current area.
+
+        Returns:
+            Stress of the shape of `stretches`, in the unit of the constants.
 
         Raises:
             InputError: unknown mode, a stretch that is not positive or beyond the material's limit.
@@ -212,7 +175,14 @@ class Material:
         return (P * flat if true else P).reshape(l.shape)[()]
 
     def largest_stretch(self, mode: str) -> float:
-        """Return the stretch of a test at which the energy is infinite."""
+        """Return the stretch of a test at which the energy becomes infinite.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+
+        Returns:
+            The stretch; infinity if there is none.
+        """
         known(f"{self}: largest_stretch: mode", mode, MODES)
         if not math.isfinite(self.largest_I1):
             return math.inf
@@ -225,15 +195,24 @@ class Material:
         return math.inf
 
     def check_stability(self, stretches: Any) -> Stability:
-        """Return the ranges of stretch in which the material is stable, in each of the three tests.
+        r"""Return the ranges of stretch in which the material is stable, in each of the three tests.
 
-        Two criteria, each with the part of the range around l = 1 in which it holds:
-        "load": dP/dl > 0, a test under a growing force goes on (P nominal);
-        "Drucker": d tau : d(ln l) > 0 for every change of the three stretches that keeps the volume (tau Kirchhoff
-        stress): the Hessian of W in the logarithmic strains is positive definite at every stretch of the test.
+        Each of two criteria gives the range around l = 1 in which it holds:
+
+        - "load": dP/dl > 0 for the nominal stress P; a test under an increasing force can continue.
+        - "Drucker": the Hessian of W in the logarithmic strains is positive definite at every stretch of the test. For
+          every change of the three stretches at constant volume, with the Kirchhoff stress tau,
+
+          .. math:: d\tau : d \ln l > 0
 
         Args:
-            stretches: the range: any number of stretches, of which the smallest and the largest (and 1) count.
+            stretches: stretches whose smallest and largest value (and 1) bound the examined range.
+
+        Returns:
+            The ranges.
+
+        Raises:
+            InputError: `stretches` is not a range of positive numbers.
         """
         try:
             low, high = (positive(f"{self}: check_stability: stretch", f(stretches)) for f in (min, max))
@@ -243,12 +222,15 @@ class Material:
         return homogeneous.stability(self.response, self._numbers(), min(low, 1.0), max(high, 1.0))
 
     def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "") -> Any:
-        """Draw nominal stress against stretch of the three tests; returns the matplotlib axes.
+        """Draw nominal stress against stretch for the three tests.
 
         Args:
             axes: matplotlib axes; default a new figure.
-            stretches: the stretches, shape (n,); default 1 to 6, and to 95 % of the limit where there is one.
-            unit: the constants' unit of stress, for the label.
+            stretches: stretches, shape (n,); default 1 to 6, or to 95 % of the limit.
+            unit: unit of stress of the constants, for the label.
+
+        Returns:
+            The matplotlib axes.
         """
         drawn: Any = figure()[1] if axes is None else axes
         for mode in MODES:
@@ -260,12 +242,17 @@ class Material:
 
     def report(self, file: Any = "card.html", *, temperatures: Sequence[float] = (),
                rates: Sequence[float] = (0.1, 1.0, 10.0), unit: str = "", unit_of_time: str = "s") -> Any:
-        """Write one HTML page on the response of the material and its limits; return its path.
+        """Write an HTML page with the response and the limits of the material.
 
         Args:
-            temperatures: needed if constants or relaxation times depend on the temperature, in the unit of their laws.
-            rates: Hencky rates of forming, 1/time, of a material that relaxes.
-            unit, unit_of_time: units of stress and of time of the constants, for the labels.
+            file: name of the file.
+            temperatures: temperatures of the curves; needed if constants or relaxation times depend on the temperature.
+            rates: Hencky rates of forming, 1/time, for a material that relaxes.
+            unit: unit of stress of the constants, for labels.
+            unit_of_time: unit of time of the constants, for labels.
+
+        Returns:
+            Path of the file.
 
         Raises:
             InputError: a constant depends on the position, or on a temperature that is not given.
@@ -275,11 +262,16 @@ class Material:
         return write(self, file, temperatures, rates, unit, unit_of_time)
 
     def check(self, sample: Sample | None = None) -> None:
-        """Raise an InputError unless the constants are admissible: finite, with a positive stiffness in the
-        reference configuration.
+        """Check that the constants are finite and give a positive stiffness in the reference configuration.
 
-        Numbers of any type are kept as floats.
-        sample: points at which varying constants are checked; None: only constants that do not vary are checked.
+        Numbers of any type are converted to floats.
+
+        Args:
+            sample: points at which varying constants are checked; None: only constants that do not vary are checked.
+
+        Raises:
+            InputError: a constant is not admissible, or the reference configuration is not stress-free or has no
+                stiffness.
         """
         self.parameters = {name: value if varying(value) is not None else finite(f"{self}: {name}", value)
                            for name, value in self.parameters.items()}
@@ -299,26 +291,63 @@ class Material:
                              " removed")
 
     def check_constants(self, **constants: Any) -> None:
-        """Raise an InputError unless these values of the constants are admissible."""
+        """Raise an InputError unless these values of the constants are admissible.
+
+        Args:
+            constants: values of the constants by name.
+        """
         for name, value in constants.items():
             finite(f"{self}: {name}", value)
 
     @classmethod
     def guesses(cls, modulus: float, I1: float, terms: int | None) -> list[Material]:
-        """Materials from which a fit may start, for data with about this shear modulus and this largest I1."""
+        """Return initial materials for a fit.
+
+        Args:
+            modulus: approximate shear modulus of the data, stress.
+            I1: largest I1 of the data.
+            terms: number of terms of a series, or None.
+
+        Returns:
+            The materials.
+
+        Raises:
+            InputError: the class defines none.
+        """
         raise InputError(f"fit: {cls.__name__} has no first guess of its own: give a material with constants near the"
                          f" wanted ones instead of the class")
 
     def coordinates(self) -> list[tuple[float, float, float]]:
-        """[(value, lowest, highest)]: the variables of a fit. All constants within are admissible."""
+        """Return the variables of a fit; all constants within their bounds are admissible.
+
+        Returns:
+            List of (value, lowest, highest).
+        """
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
     def constants_at(self, coordinates: Sequence[float] | np.ndarray) -> list[float]:
-        """Return the constants at coordinates."""
+        """Return the constants for values of the fit variables.
+
+        Args:
+            coordinates: values of the variables of `coordinates`.
+
+        Returns:
+            Constants, in the order of `parameters`.
+        """
         return list(coordinates)
 
     def with_constants(self, constants: Sequence[Any]) -> Material:
-        """Return the same kind of material with other constants, in the order of `parameters`."""
+        """Return a material of the same kind with other constants.
+
+        Args:
+            constants: the constants, in the order of `parameters`.
+
+        Returns:
+            The material.
+
+        Raises:
+            InputError: another number of constants, or constants that are not admissible.
+        """
         if len(constants) != len(self.parameters):
             raise InputError(f"{self}: with_constants: {len(constants)} numbers for {', '.join(self.parameters)}")
         other = copy.copy(self)                             # with its `response`, which holds for any constants
@@ -327,7 +356,13 @@ class Material:
         return other
 
     def at_temperature(self, temperature: float) -> Material:
-        """Return the material at one temperature: constants that depend on it are numbers there.
+        """Return the material at one temperature, with numbers in place of temperature-dependent constants.
+
+        Args:
+            temperature: the temperature.
+
+        Returns:
+            The material.
 
         Raises:
             InputError: a constant depends on the position, or has no value at this temperature.
@@ -346,6 +381,7 @@ class Material:
             raise InputError(f"{self} is not isotropic: its stresses depend on the direction that is pulled")
 
     def _beyond(self, mode: str, stretch: float) -> str:
+        """Return the message for a stretch beyond the limit of the material."""
         k = MODES[mode]
         if math.isfinite(self.largest_I1):
             I1 = stretch**2 + stretch**(2 * k) + stretch**(-2 - 2 * k)
@@ -361,5 +397,12 @@ class Material:
 
 
 def brief(value: Any) -> str:
-    """Return a constant as text: a number with six digits."""
+    """Return a constant as text, numbers with six digits.
+
+    Args:
+        value: the constant.
+
+    Returns:
+        The text.
+    """
     return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

@@ -1,4 +1,4 @@
-"""Published constants of materials, each with its source: to begin with, not to design with."""
+"""Published material constants with their sources, as a starting point, not for design."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,13 +8,16 @@ from .material import Material
 
 
 class Published(NamedTuple):
-    """A material as published.
+    """Material as published.
 
-    material: constants in `unit`, c10 of I1.
-    substance: the tested material.
-    temperature: in degrees Celsius, or None: not stated by the source.
-    rate: of the tests, as text. mode: the tests that the constants come from, as text.
-    source: who published the constants, and the work that quotes them if they are quoted.
+    Attributes:
+        material: the material, constants in `unit`, c10 belongs to I1.
+        unit: unit of the constants.
+        substance: the tested substance.
+        temperature: temperature in degrees Celsius; None if the source does not state it.
+        rate: rate of the tests, as text.
+        mode: tests from which the constants were fitted, as text.
+        source: publication of the constants, and the work that quotes them if they are quoted.
     """
 
     material: Material
@@ -35,20 +38,26 @@ _MORE: list[Callable[[], dict[str, Published]]] = []
 
 
 def register_published(constants: Callable[[], dict[str, Published]]) -> Callable[[], dict[str, Published]]:
-    """Add the published constants of an extension to the constants that `published` returns; usable as a decorator.
+    """Add the published constants of an extension to the result of `published`; usable as a decorator.
 
     Args:
-        constants: a function without arguments, which returns {name: `Published`}.
+        constants: function without arguments that returns {name: `Published`}.
+
+    Returns:
+        The same function.
     """
     _MORE.append(constants)
     return constants
 
 
 def published() -> dict[str, Published]:
-    """Return {name: constants that can be cited}, in MPa; for melts in Pa and s.
+    """Return material constants that can be cited, in MPa; for melts in Pa and s.
 
-    They hold for the stretches, temperatures and rates of their tests, which are given as far as the source states
-    them. Quoted ones were not read in the original. Test data to fit to: `treloar1944`.
+    They are valid for the stretches, temperatures and rates of their tests, which are given as far as the source states
+    them. Quoted constants were not read in the original. `treloar1944` has test data for fits.
+
+    Returns:
+        {name: `Published`}.
 
     >>> acrylic = fx.published()["PMMA 160 C"]
     >>> acrylic.material, acrylic.temperature

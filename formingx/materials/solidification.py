@@ -1,4 +1,4 @@
-"""A material that solidifies: as it cools a glassy network forms, free of stress in the shape of the body then."""
+"""Solidifying material: on cooling a glassy network forms, stress-free in the current shape of the body."""
 
 import copy
 from typing import Any
@@ -16,50 +16,63 @@ _BEFORE, _LAST, _GLASS, _FRACTION = "C_before", "C_last", "A_glass", "fraction"
 
 
 class Solidification(Material):
-    """A material that sets as it cools, and softens when it is heated again.
+    r"""Material that solidifies when it cools, and softens when it is heated again.
 
-    Of the fraction phi(T) that has set, the part added in a cooling step is stress-free in the shape of that moment:
+    Let phi(T) be the solidified fraction. The part added in a cooling step is stress-free in the shape at that time:
 
-        W = W_base + (G/2) [tr(C A) - 3 phi],   dA = C^-1 dphi as phi grows,   A in proportion to phi as it falls,
+    .. math::
+        W = W_{base} + \frac{G}{2} \left[\mathrm{tr}(C A) - 3 \varphi\right], \qquad
+        dA = C^{-1} d\varphi \;\; (d\varphi > 0), \qquad A \propto \varphi \;\; (d\varphi < 0)
 
-    the single-integral network with birth by temperature (Green and Tobolsky, J. Chem. Phys. 14 (1946) 80, with no
-    relaxation time). A modulus that only rises as the temperature falls pulls a formed part back to its reference
-    configuration. Solidified material keeps its shape, but for the small strain at which it balances the base.
-    The scene needs a temperature, and `heat=Cooling(...)` for it to change.
+    This is the single-integral network with birth by temperature (Green and Tobolsky, J. Chem. Phys. 14 (1946) 80,
+    without relaxation). A modulus that only increases on cooling would pull a formed part back to its reference
+    configuration. Solidified material keeps its shape, except for the small strain at which it balances the base. The
+    scene needs a temperature, and `heat=Cooling(...)` for changes of it.
 
     Args:
         base: any material, also one that relaxes.
-        modulus: G, the shear modulus of the solidified part, above 0; stress.
-        between: two temperatures; all has set at the lower, nothing at the higher, phi is linear between.
-        fraction: phi(T) instead, a `table` from 1 to 0; beyond its ends phi stays as it is there.
+        modulus: shear modulus G of the solidified part, positive, stress.
+        between: two temperatures; phi is 1 at the lower, 0 at the higher, and linear between.
+        fraction: phi(T) instead, a `table` from 1 to 0; constant beyond its ends.
+
+    Raises:
+        InputError: an argument that is not allowed.
 
     >>> fx.Solidification(fx.NeoHookean(c10=0.4), modulus=800.0, between=(90.0, 110.0))
     Solidification(NeoHookean(c10=0.4), modulus=800.0, between=(90, 110))
     """
 
     def __init__(self, base: Material, modulus: float, between: Any = None, fraction: Table | None = None):
-        instance("Sets: base", base, Material, "a material")
+        instance("Solidification: base", base, Material, "a material")
         if isinstance(base, Solidification):
-            raise InputError(f"Sets: base = {base}: sets already: give its base, with one fraction")
+            raise InputError(f"Solidification: base = {base}: solidifies already: give its base, with one fraction")
         self._base, self._phi = base, _fraction(between, fraction)
         for name in {"G_set", "set_end", "set_middle"} & base.parameters.keys():
-            raise InputError(f"Sets: the base has a constant {name!r}: that is one of Sets; give it another name")
-        # a step takes the logarithm of a constant to go on in proportion to time: so phi goes on, also from 0
+            raise InputError(f"Solidification: the base has a constant {name!r}: the name belongs to a constant of"
+                             f" Solidification; give it another name")
+        # a step extrapolates the logarithm of a constant in proportion to time: here phi itself, also from 0
         exp_phi = OfTemperature(lambda T: np.exp(self._phi(T)), f"exp({self._phi})")
         self.integral, self.stores_energy, self.symmetric = base.integral, base.stores_energy, base.symmetric
-        self.parameters = {**base.parameters, "G_set": positive("Sets: modulus", modulus), "set_end": exp_phi,
+        self.parameters = {**base.parameters, "G_set": positive("Solidification: modulus", modulus), "set_end": exp_phi,
                            "set_middle": exp_phi}
         self.check()
 
     @property
     def base(self) -> Material:
-        """The material that has not set."""
+        """Material that has not solidified."""
         base = copy.copy(self._base)
         base.parameters = self._of_base(self.parameters)
         return base
 
     def fraction(self, temperature: Any) -> Any:
-        """phi, the fraction that has set at temperatures of any shape."""
+        """Return the solidified fraction phi.
+
+        Args:
+            temperature: temperatures, any shape.
+
+        Returns:
+            phi, the same shape.
+        """
         return self._phi(np.asarray(temperature, float))
 
     def check(self, sample: Sample | None = None) -> None:
@@ -70,11 +83,11 @@ class Solidification(Material):
     def check_constants(self, **constants):
         self._base.check_constants(**self._of_base(constants))
         if "G_set" in constants:
-            positive("Sets: modulus", constants["G_set"])
+            positive("Solidification: modulus", constants["G_set"])
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
-        """See `Material`: the variables of the base, C of the last two states, A, and the fraction phi that A includes.
+        """Variables of the base, C of the last two states, A, and the fraction phi that A includes.
 
         A includes the part that solidifies in a step from the beginning of the next step on, when the temperature at
         its end is known.
@@ -84,17 +97,17 @@ class Solidification(Material):
 
     @property
     def of_flow(self) -> tuple[str, ...]:
-        """See `Material`."""
+        """Names of the base's constants that set a rate of flow, and the fraction at the middle of a step."""
         return (*self._base.of_flow, "set_middle")
 
     @property
     def of_motion(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
-        """See `Material`."""
+        """Names of the base's variables of motion."""
         return self._base.of_motion
 
     @property
     def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
-        """See `Material`."""
+        """Signs of the tensors of the base, and of C of the last two states; see `Material`."""
         return {**self._base.shapes, _BEFORE: 1, _LAST: 1}
 
     @property
@@ -102,17 +115,37 @@ class Solidification(Material):
         return self.base.largest_I1
 
     def strain_energy(self, F, **constants):
-        """See `Material`: the response of a body that was never strained before."""
+        """Return the strain energy of a body from the reference configuration.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            constants: values of the constants by name.
+
+        Returns:
+            Energy (UFL, stress).
+        """
         phi = ufl.max_value(ufl.min_value(ufl.ln(constants["set_end"]), 1.0), 0.0)
         return self._base.strain_energy(F, **self._of_base(constants)) \
             + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """See `Material`. Half of the part that solidifies in the step is free of stress in the shape at its beginning,
-        half in the shape at its end."""
+        """Return the potential of a step per reference volume.
+
+        Half of the part that solidifies in the step is stress-free in the shape at its beginning, half in the shape at
+        its end.
+
+        Args:
+            F: deformation gradient at the end (UFL, shape (3, 3)).
+            internal: internal variables at the beginning.
+            time_step: length of the step (UFL scalar, time).
+            constants: values of the constants by name.
+
+        Returns:
+            Potential (UFL, stress).
+        """
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2
-        M = plus(tuple(_left(begin, end) * a for a in A), cofactor(entries(internal[_LAST])), born)
+        M = plus(tuple(_remaining(begin, end) * a for a in A), cofactor(entries(internal[_LAST])), born)
         return self._base.step_energy(F, self._of_base_internal(internal), time_step, **self._of_base(constants)) \
             + constants["G_set"] / 2 * (inner(isochoric(F), M) - (M[0] + M[1] + M[3]))
 
@@ -137,19 +170,21 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Return (A and phi at the beginning of the step, phi as it will be at its end)."""
+        """Return A and phi at the beginning of the step, and phi at its end."""
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))
-        A = tuple(_left(before, begin) * a for a in entries(internal[_GLASS]))
+        A = tuple(_remaining(before, begin) * a for a in entries(internal[_GLASS]))
         for shape in (_BEFORE, _LAST):
             A = plus(A, cofactor(entries(internal[shape])), ufl.max_value(begin - before, 0) / 2)
         return A, begin, end
 
     def _of_base(self, constants: dict[str, Any]) -> dict[str, Any]:
+        """Return the constants of the base."""
         return {name: constants[name] for name in self._base.parameters if name in constants}
 
     def _of_base_internal(self, internal: dict[str, Any]) -> dict[str, Any]:
+        """Return the internal variables of the base."""
         return {name: value for name, value in internal.items() if name not in (_BEFORE, _LAST, _GLASS, _FRACTION)}
 
     def __repr__(self) -> str:
@@ -160,7 +195,7 @@ class Solidification(Material):
 
 
 class _Fraction:
-    """phi(T): a table, constant beyond its ends, or linear between two temperatures."""
+    """Solidified fraction phi(T): a table, constant beyond its ends, or linear between two temperatures."""
 
     def __init__(self, low: float, high: float, table: Table | None = None):
         self._low, self._high, self._table = low, high, table
@@ -174,20 +209,23 @@ class _Fraction:
 
 
 def _fraction(between: Any, table: Any) -> _Fraction:
+    """Return the solidified fraction as a function; raise an InputError unless exactly one of both is given."""
     if (between is None) == (table is None):
-        raise InputError(f"Sets: between = {between!r}, fraction = {table!r}: give one of them: the temperatures"
-                         f" between=(75, 85) of all and of nothing set, or a table of the fraction over temperature")
+        raise InputError(f"Solidification: between = {between!r}, fraction = {table!r}: give one of them: the"
+                         f" temperatures between=(75, 85) at which all and nothing has solidified, or a table of the"
+                         f" fraction over temperature")
     if table is not None:
-        y = instance("Sets: fraction", table, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
+        y = instance("Solidification: fraction", table, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
         if np.any(np.diff(y) > 0) or abs(y[0] - 1) > 1e-12 or abs(y[-1]) > 1e-12:
-            raise InputError(f"Sets: fraction = {table!r}: must fall from 1 to 0 as the temperature rises")
+            raise InputError(f"Solidification: fraction = {table!r}: must fall from 1 to 0 as the temperature rises")
         return _Fraction(table.x[0], table.x[-1], table)
-    ends = several("Sets: between", between, "two temperatures")
-    if len(ends) != 2 or finite("Sets: between", ends[0]) >= finite("Sets: between", ends[1]):
-        raise InputError(f"Sets: between = {between!r}: must be two temperatures, the lower first, as (75, 85)")
+    ends = several("Solidification: between", between, "two temperatures")
+    if len(ends) != 2 or finite("Solidification: between", ends[0]) >= finite("Solidification: between", ends[1]):
+        raise InputError(f"Solidification: between = {between!r}: must be two temperatures, the lower first, as"
+                         f" (75, 85)")
     return _Fraction(float(ends[0]), float(ends[1]))
 
 
-def _left(before: Any, after: Any) -> Any:
-    """Return the part of the glass that is left when the solidified fraction falls; 1 when it grows."""
+def _remaining(before: Any, after: Any) -> Any:
+    """Return the factor of the glassy network when the solidified fraction decreases; 1 when it increases."""
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

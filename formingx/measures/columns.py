@@ -1,4 +1,4 @@
-"""The measures that every run records: the columns of a path."""
+"""Output quantities that every run records: the columns of a path."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -22,41 +22,40 @@ from .targets import (
 )
 
 Measure = Target | Callable[[Any], float]
-"""Quantity of a user's own column, see `formingx.trace`."""
+"""Quantity of a user-defined column, see `formingx.trace`."""
 
 
 class _Recorded(Bound):
-    """A measure that depends on more than the displacements: between two states it cannot be evaluated for a guessed
-    body."""
+    """Quantity that depends on more than the displacements; it cannot be interpolated between two states."""
 
     smooth = False
 
 
 class _Scalar(_Recorded):
-    """of(v), where v is the value of a scalar form."""
+    """Function of the value of a scalar form."""
 
-    def __init__(self, problem, form, of):
-        self._problem, self._form, self._of = problem, problem.forms.compile(form), of
+    def __init__(self, problem, form, function):
+        self._problem, self._form, self._function = problem, problem.forms.compile(form), function
 
     def value(self, x, control):
         self._problem.set_state(x, control)
-        return self._of(self._problem.assemble_scalar(self._form))
+        return self._function(self._problem.assemble_scalar(self._form))
 
 
 class _Nodal(_Recorded):
-    """over([0, of(contact), ...]) of the active contacts."""
+    """Reduction of [0, quantity of each active contact] to a number."""
 
-    def __init__(self, problem, of, over, contacts=None):
-        self._problem, self._of, self._over = problem, of, over
+    def __init__(self, problem, quantity, reduce, contacts=None):
+        self._problem, self._quantity, self._reduce = problem, quantity, reduce
         self._contacts = problem.contacts if contacts is None else contacts
 
     def value(self, x, control):
         active = [c for c in self._contacts if c in self._problem.present]
-        return float(self._over([0.0, *(self._of(contact, x.array_r, control) for contact in active)]))
+        return float(self._reduce([0.0, *(self._quantity(contact, x.array_r, control) for contact in active)]))
 
 
 class _Reaction(_Recorded):
-    """Force of the body on a driven support (by its number in the scene)."""
+    """Force of the body on a driven support, given by its number in the scene."""
 
     def __init__(self, problem, number):
         self._problem, self._number = problem, number
@@ -66,7 +65,7 @@ class _Reaction(_Recorded):
 
 
 class _Ratio(_Recorded):
-    """See `PoleStressRatio`."""
+    """Relaxation of the pole stress, see `PoleStressRatio`."""
 
     def __init__(self, problem):
         self._problem, self._ratio = problem, PoleStressRatio(problem)
@@ -77,7 +76,7 @@ class _Ratio(_Recorded):
 
 
 class _Own(_Recorded):
-    """A function of the problem, by the user."""
+    """User-defined function of the problem."""
 
     def __init__(self, problem, name, function):
         self._problem, self._name, self._function = problem, name, function
@@ -92,10 +91,18 @@ class _Own(_Recorded):
 
 
 def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
-    """Return the user's columns.
+    """Return the user-defined columns.
+
+    Args:
+        problem: the `Problem`.
+        columns: {name: target, or function of the problem}.
+        taken: existing columns.
+
+    Returns:
+        {name: quantity}.
 
     Raises:
-        InputError: a name that is taken or not a word, or a column that is neither a target nor a function.
+        InputError: a name that exists or is no word, or a column that is neither a target nor a function.
     """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")
@@ -114,24 +121,40 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
 
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
-    """Return the measures that every run records, by column name.
+    """Return the output quantities that every run records, by column name.
 
-    Energies, volumes, areas and forces belong to the whole part, the whole tool and the whole support, also
-    where a half or a quarter is modelled (`Scene.symmetry_factor`); in plane strain they are per unit depth.
+    Energies, volumes, areas and forces belong to the whole part, the whole tool and the whole support, also where a
+    half or a quarter is modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
 
-    pressure (or travel: a length), pole_height (length), pole_stretch, enclosed_volume (length^3), strain_energy
-    (stress length^3), mass_error (volume over its original value, minus 1), volume_error (root mean square of J - 1),
-    both over what thermal expansion makes of the volume. Pole and volume are there where the scene has an axis and a
-    driven pressure. With `Gravity`: sag, the largest downward displacement (length). With contacts: contact_length
-    (reference length in touch), in three dimensions contact_area (of the deformed sheet) and reference_contact_area
-    (of the flat one), penetration (of the deepest node, length) and the force of the body on each tool: along
-    its travel, positive when it resists; of a tool that stays along Z, positive when the body pushes it up. It is
-    plug_force for one named "plug" (tool_1_force for one without a name), and tool_force where there is one tool. With
-    a driven support: support_force (of the body on it, along its component). Where several items can be driven each
-    has its column, plug_travel for one named "plug" (`Scene.column`), a support plug_force. `timed`: process_time too.
-    With materials that relax: dissipated_power (stress length^3 over time), and from it, in a run, dissipated_energy
-    (stress length^3); with an axis and a known equilibrium, pole_stress_ratio: the Mises stress at the pole over the
-    one in equilibrium (`PoleStressRatio`). With a rate-independent history: damage_energy (stress length^3).
+    - pressure, travel (length): controlled quantities. Several controls have a column each, such as plug_travel
+      (`Scene.column`).
+    - pole_height (length), pole_stretch: with an axis.
+    - enclosed_volume (length^3): with a controlled pressure.
+    - strain_energy (stress length^3).
+    - mass_error: volume over its original value, minus 1; volume_error: root mean square of J - 1. Both are relative to
+      the thermally expanded volume.
+    - sag (length): with `Gravity`, the largest downward displacement.
+    - contact_length: with contacts, the reference length in contact; in three dimensions contact_area (deformed) and
+      reference_contact_area.
+    - penetration (length): with contacts, of the deepest node.
+    - tool_force: force of the body on the only tool, otherwise plug_force for a tool named "plug", tool_1_force for one
+      without a name. The force counts along the travel, positive when it resists; for a fixed tool along Z, positive
+      upwards.
+    - support_force: with a driven support, force of the body on it along its component; plug_force if it is named
+      "plug" and there are several controls.
+    - process_time: with `timed`.
+    - dissipated_power (stress length^3 over time): with relaxing materials, and in a run its integral dissipated_energy
+      (stress length^3).
+    - pole_stress_ratio: with relaxing materials, an axis and a known equilibrium, the Mises stress at the pole over its
+      equilibrium value (`PoleStressRatio`).
+    - damage_energy (stress length^3): with a rate-independent history.
+
+    Args:
+        problem: the `Problem`.
+        timed: True for the column of the process time.
+
+    Returns:
+        {column: quantity}.
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     energy = scene.symmetry_factor * forms.stress * volume

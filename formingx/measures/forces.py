@@ -1,4 +1,4 @@
-"""Forces as targets: of the body on a controlled item, a support or a tool."""
+"""Force of the body on a controlled item, a support or a tool, as a target."""
 
 from typing import Any
 
@@ -12,31 +12,59 @@ from .targets import Bound, OfWholePart, Target
 
 
 def resisting(contact: Any) -> np.ndarray:
-    """Return the unit vector (r, z) along which the force of the body on a tool counts: against its travel, or +Z if
-    it stays."""
+    """Return the direction in which the force of the body on a tool counts.
+
+    Args:
+        contact: the `Contact`.
+
+    Returns:
+        Unit vector, shape (components,), against the travel; +Z for a fixed tool.
+    """
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
-    """Return the ratio of the force on the whole tool of a contact to the force on the part that is modelled."""
+    """Return the ratio of the force on a whole tool to the force on its modelled part.
+
+    Args:
+        scene: the `Scene`.
+        contact: contact of the tool.
+
+    Returns:
+        The ratio, a power of 2.
+    """
     return int(scene.symmetry.factor_of(contact.tool.bounds, resisting(contact)))
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the ratio of the force on a whole driven support to the force on the part that is modelled."""
-    (held,) = scene.kinematics.in_axes(support, support.constraints())
-    nodes = scene.first.mesh.nodes_of(held.on)
+    """Return the ratio of the force on a whole driven support to the force on its modelled part.
+
+    Args:
+        scene: the `Scene`.
+        support: the driven support.
+
+    Returns:
+        The ratio, a power of 2.
+    """
+    (constraint,) = scene.kinematics.in_axes(support, support.constraints())
+    nodes = scene.first.mesh.nodes_of(constraint.on)
     return int(scene.symmetry.factor_of(np.stack([nodes.min(0), nodes.max(0)]),
-                                        np.eye(scene.kinematics.components)[held.component]))
+                                        np.eye(scene.kinematics.components)[constraint.component]))
 
 
 def force(value: float, *, of: str | None = None) -> Target:
-    """Return the target: the force on the control, or on the item called `of`, reaches `value` (stress length^2).
+    """Return the target that the force of the body on a controlled support or tool reaches a value.
 
-    Of the body: on a driven support along its component; on a tool against its travel, positive when it resists. It is
-    the force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`); in
-    plane strain per unit depth (stress length).
+    The force on a support counts along its component, on a tool against its travel, positive when it resists. It is the
+    force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`).
+
+    Args:
+        value: the force, stress length^2; in plane strain per unit depth, stress length.
+        of: name of the support or tool; None for the controlled one.
+
+    Returns:
+        The target.
 
     >>> fx.Stage("press", control="plug", until=fx.force(100.0, of="plug"))
     Stage('press')
@@ -61,7 +89,7 @@ def force(value: float, *, of: str | None = None) -> Target:
 
 
 class _SupportForce(Bound):
-    """Force of the body on a driven support (by its number in the scene)."""
+    """Force of the body on a driven support, given by its number in the scene."""
 
     smooth = False
 

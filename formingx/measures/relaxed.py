@@ -1,4 +1,4 @@
-"""Relaxation of a body: its stress at the pole over the equilibrium stress, elastic strains of branches."""
+"""Relaxation of a body: pole stress over its equilibrium value, elastic stretches of branches."""
 
 from typing import Any
 
@@ -12,18 +12,24 @@ from .. import _compat
 from ..mesh.nodes import own_cells
 
 _NONE = 1e-10
-"""Stress over the shear modulus that counts as zero."""
+"""Stress over the shear modulus below which a stress counts as zero."""
 
 _STRAIN = 1e-6
 """Equibiaxial strain that is added where the stresses are zero: their ratio is then the ratio of the moduli."""
 
 
 class PoleStressRatio:
-    """Mises stress at the pole over the Mises stress in equilibrium, after all relaxation at the same F.
+    r"""Mises stress at the pole over its equilibrium value, after complete relaxation at the same F.
 
-    Both are means over the reference volume of the elements that touch the axis, at their quadrature points, of
-    sqrt(3/2) |dev(P F^T)|, P = dW/dF of the stored energy and of `Material.equilibrium_energy`. In the equibiaxial
-    state of a pole that is the stress along the sheet less the one through its thickness.
+    Both stresses are means over the reference volume of the elements at the axis, at their quadrature points:
+
+    .. math:: \sigma = \sqrt{\tfrac{3}{2}} \, |\mathrm{dev}(P F^T)|, \qquad P = \frac{\partial W}{\partial F}
+
+    W is the stored energy or `Material.equilibrium_energy`. In the equibiaxial state of a pole, sigma is the stress
+    along the sheet minus the stress through its thickness.
+
+    Args:
+        problem: the `Problem`.
     """
 
     def __init__(self, problem: Any):
@@ -42,13 +48,24 @@ class PoleStressRatio:
 
     @staticmethod
     def known(problem: Any) -> bool:
-        """Return True if the scene has a pole, and the equilibrium stress of all its materials is known."""
+        """Check whether the scene has a pole and a known equilibrium stress in all materials.
+
+        Args:
+            problem: the `Problem`.
+
+        Returns:
+            True if it has both.
+        """
         forms = problem.forms
         return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
                                                        for t in forms.terms)
 
     def now(self) -> float:
-        """Return the value at the state of the forms; collective."""
+        """Return the ratio for the current fields of the forms; collective.
+
+        Returns:
+            The ratio.
+        """
         now, left, modulus = self._integrals()
         if left < _NONE * modulus:
             self._strain.value = _STRAIN
@@ -57,7 +74,7 @@ class PoleStressRatio:
         return float(now / left)
 
     def _integrals(self) -> np.ndarray:
-        """Return the integrals over the elements at the pole of both stresses and of the largest modulus, all ranks."""
+        """Return the integrals of both stresses and of the largest modulus over the elements at the pole, all ranks."""
         totals = np.zeros(3)
         for expression, cells in self._parts:
             if len(cells):
@@ -66,7 +83,7 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """Return the integrands of a material for `_integrals`, with the weight of volumes."""
+        """Return the integrands of a material for `_integrals`, times the volume weight."""
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -78,10 +95,14 @@ class PoleStressRatio:
 
 
 class ElasticStretches:
-    """The largest principal elastic stretch of each branch, linear in each element, at places of the reference cell.
+    """Largest principal elastic stretch of each branch, projected to linear functions in each element.
 
     Args:
-        places: shape (n, dimension).
+        problem: the `Problem`.
+        places: positions in the reference cell, shape (n, dimension).
+
+    Attributes:
+        count: largest number of branches of a material.
     """
 
     def __init__(self, problem: Any, places: np.ndarray):
@@ -103,8 +124,14 @@ class ElasticStretches:
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def now(self, cells: int) -> np.ndarray:
-        """Return the stretches at the state of the forms in locally owned cells, shape (cells, n, branches); nan: no
-        branch."""
+        """Return the stretches for the current fields of the forms.
+
+        Args:
+            cells: number of locally owned cells.
+
+        Returns:
+            Stretches, shape (cells, n, branches); nan where a material has fewer branches.
+        """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:
             if len(own):

@@ -11,14 +11,14 @@ from ..forms.probes import probe
 from ..mesh.nodes import of_space
 
 _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
-"""Points of Gauss's rule from 0 to 1, both of weight 1/2."""
+"""Points of the two-point Gauss rule on [0, 1], each of weight 1/2."""
 
 
 class Bound:
     """Output quantity of one problem: its value, and the equation quantity = target for a run with this target.
 
     Attributes:
-        size: its scale, in the user's units: differences below 1e-12 of it are round-off.
+        size: scale of the quantity, in the user's units: differences below 1e-12 of it are round-off.
         smooth: True if it is a smooth function of the displacements and the control alone.
     """
 
@@ -26,16 +26,36 @@ class Bound:
     smooth = True
 
     def value(self, x: Any, control: float) -> float:
-        """Return the measure at a state, in the user's units."""
+        """Return the value in a state.
+
+        Args:
+            x: unknowns.
+            control: dimensionless control.
+
+        Returns:
+            The value, in the user's units.
+        """
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
-        """Return c(x, control, gradient) -> (c, dc/dcontrol), which sets `gradient` to dc/dx; c is 0 at the target."""
+        """Return the equation c = 0 of a target value.
+
+        Args:
+            target: the target value, in the user's units.
+
+        Returns:
+            Function (x, control, gradient) -> (c, dc/dcontrol) that sets the vector `gradient` to dc/dx.
+        """
         raise NotImplementedError
 
 
 class OfWholePart(Bound):
-    """A measure of the part as modelled, times the number of its images (`Scene.symmetry`)."""
+    """Quantity of the modelled part times a factor for its images (`Scene.symmetry`).
+
+    Args:
+        modelled: quantity of the modelled part.
+        factor: factor for the images.
+    """
 
     def __init__(self, modelled: Bound, factor: int):
         self._modelled, self._factor = modelled, factor
@@ -49,9 +69,13 @@ class OfWholePart(Bound):
 
 
 class Amplitude(Bound):
-    """Amplitude of an item (by its number in the scene), of the process time (-1), or of the control (None).
+    """Amplitude of an item, given by its number in the scene; -1 for the process time, None for the control.
 
     For a load it is the active part of the amplitude, 0 while a stage makes the load inactive.
+
+    Args:
+        problem: the `Problem`.
+        number: number of the item.
     """
 
     def __init__(self, problem: Any, number: int | None):
@@ -67,10 +91,11 @@ class Amplitude(Bound):
 
     @property
     def moves(self) -> bool:
-        """True if the control changes it now."""
+        """True if the control changes the amplitude in the present stage."""
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
+        """Return the dimensionless amplitude at a control."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -95,17 +120,17 @@ class Amplitude(Bound):
 
 
 class _Linear(Bound):
-    """value = of(offset + row . x); `back` is the inverse of `of`."""
+    """Function of a linear form, f(offset + row . x), with its inverse."""
 
-    def __init__(self, problem, row, offset=0.0, of=lambda y: y, back=lambda v: v):
-        self._row, self._offset, self._of, self._back = problem.x.duplicate(), offset, of, back
+    def __init__(self, problem, row, offset=0.0, function=lambda y: y, inverse=lambda v: v):
+        self._row, self._offset, self._function, self._inverse = problem.x.duplicate(), offset, function, inverse
         problem.fill(self._row, row)
 
     def value(self, x, control):
-        return self._of(self._offset + self._row.dot(x))
+        return self._function(self._offset + self._row.dot(x))
 
     def equation(self, target):
-        y = self._back(target)
+        y = self._inverse(target)
 
         def c(x, control, gradient):
             self._row.copy(gradient)
@@ -114,7 +139,7 @@ class _Linear(Bound):
 
 
 class _Form(Bound):
-    """scale times the value of a scalar form, and an offset."""
+    """Offset plus scale times the value of a scalar form."""
 
     def __init__(self, problem, form, scale, offset=0.0):
         self._problem, self._scale, self._offset = problem, scale, offset
@@ -138,7 +163,11 @@ class _Form(Bound):
 
 
 class Sag(Bound):
-    """See `sag`: displacement of the node that has sunk the most, of several the first."""
+    """Downward displacement of the lowest node; among equal ones the first.
+
+    Args:
+        problem: the `Problem`.
+    """
 
     smooth = False
 
@@ -156,7 +185,7 @@ class Sag(Bound):
             self._so_far = (nodes_at - brought.first_places(nodes_at))[:, -1] / forms.length
 
     def _deepest(self, x: Any) -> tuple[float, int]:
-        """Return (sag over length, the rank that has the node)."""
+        """Return the sag over length, and the rank of the node."""
         mine = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
         found = self._problem.comm.allgather(float(mine))
         return max(found), int(np.argmax(found))
@@ -195,7 +224,14 @@ class Target(NamedTuple):
 
 
 def pressure(value: float, *, of: str | None = None) -> Target:
-    """Return the target: the controlled pressure, or the one called `of`, reaches `value` (stress).
+    """Return the target that a controlled pressure reaches a value.
+
+    Args:
+        value: the pressure, stress.
+        of: name of the load; None for the controlled one.
+
+    Returns:
+        The target.
 
     >>> round(float(path.at(fx.pressure(0.02)).measures["pole_height"]), 3)
     4.795
@@ -204,7 +240,14 @@ def pressure(value: float, *, of: str | None = None) -> Target:
 
 
 def travel(value: float, *, of: str | None = None) -> Target:
-    """Return the target: the controlled support or tool, or the one called `of`, has moved by `value` (a length).
+    """Return the target that a controlled support or tool has moved by a length.
+
+    Args:
+        value: the travel, length.
+        of: name of the support or tool; None for the controlled one.
+
+    Returns:
+        The target.
 
     >>> fx.travel(6.0, of="plug").name
     'plug_travel'
@@ -213,7 +256,13 @@ def travel(value: float, *, of: str | None = None) -> Target:
 
 
 def process_time(value: float) -> Target:
-    """Return the target: the process time reaches `value`.
+    """Return the target that the process time reaches a value.
+
+    Args:
+        value: the time.
+
+    Returns:
+        The target.
 
     >>> blow = fx.Stage("blow", amplitudes={scene.driven: [(0.0, 0.0), (2.0, 0.02)]}, until=fx.process_time(1.0))
     """
@@ -221,11 +270,16 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """Return the target: the change of the scene between two stages is complete (`StepData.fading`)."""
+    """Return the target that the change of the scene between two stages is complete (`StepData.fading`).
+
+    Returns:
+        The target.
+    """
     return Target("change", 1.0, lambda problem: Amplitude(problem, None))
 
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
+    """Return the target of a controlled quantity."""
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
         found = [i for i, t in enumerate(scene.items)
@@ -243,7 +297,13 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
 
 
 def pole_height(value: float) -> Target:
-    """Return the target: u_z of the mid-thickness point on the axis reaches `value` (a length).
+    """Return the target that u_z of the mid-thickness point on the axis reaches a value.
+
+    Args:
+        value: the height, length.
+
+    Returns:
+        The target.
 
     >>> round(float(path.at(fx.pole_height(6.0)).measures["pressure"]), 4)
     0.0289
@@ -252,12 +312,19 @@ def pole_height(value: float) -> Target:
 
 
 def pole_stretch(value: float) -> Target:
-    """Return the target: the stretch at the pole reaches `value`.
+    r"""Return the target that the stretch at the pole reaches a value.
 
-    In a solid of revolution it is (thickness/original)^(-1/2), the stretch along the sheet; in plane strain, where the
-    sheet is stretched one way only, (thickness/original)^(-1).
+    It is computed from the thickness h; in plane strain the sheet is stretched in one direction only:
 
-    A run raises an InputError if no material of the scene can be stretched so far (Gent, Arruda-Boyce).
+    .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
+
+    A run raises an InputError if a material of the scene cannot reach the stretch (Gent, Arruda-Boyce).
+
+    Args:
+        value: the stretch, positive.
+
+    Returns:
+        The target.
 
     >>> round(float(path.at(fx.pole_stretch(1.5)).measures["pole_stretch"]), 9)
     1.5
@@ -266,10 +333,16 @@ def pole_stretch(value: float) -> Target:
 
 
 def enclosed_volume(value: float) -> Target:
-    """Return the target: the volume swept by the loaded face reaches `value` (length^3; per depth in plane strain).
+    """Return the target that the volume swept by the loaded face reaches a value.
 
-    It lies between the face in the reference configuration and now; where an end of the face has moved, straight
-    lines close it. Where a half or a quarter is modelled it belongs to the whole part (`Scene.symmetry_factor`).
+    The volume lies between the reference and the deformed face; straight lines close it where an end of the face has
+    moved. Where a half or a quarter is modelled it belongs to the whole part (`Scene.symmetry_factor`).
+
+    Args:
+        value: the volume, length^3; in plane strain per unit depth, length^2.
+
+    Returns:
+        The target.
 
     >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
     500.0
@@ -278,10 +351,18 @@ def enclosed_volume(value: float) -> Target:
 
 
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
-    """Return the target: the displacement component ("r" or "z") of the reference point `at` = (R, Z) reaches
-    `value` (a length).
+    """Return the target that a displacement component of a reference point reaches a value.
 
-    Of a sheet in three dimensions "x", "y" or "z", `at` = (x, y).
+    Args:
+        value: the displacement, length.
+        at: reference position (R, Z), for a sheet in three dimensions (x, y), length.
+        component: "r" or "z"; in three dimensions "x", "y" or "z".
+
+    Returns:
+        The target.
+
+    Raises:
+        InputError: an unknown component.
 
     >>> fx.displacement(3.0, at=(5.0, 0.0)).name
     'u_z_at_5_0'
@@ -298,7 +379,13 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
 
 def sag(value: float) -> Target:
-    """Return the target: the largest downward displacement (along -Z) of the body reaches `value` (a length above 0).
+    """Return the target that the largest downward displacement (along -Z) of the body reaches a value.
+
+    Args:
+        value: the displacement, length, positive.
+
+    Returns:
+        The target.
 
     >>> fx.Stage("heat", duration=60.0, until=fx.sag(30.0))                              # until it hangs 30 mm
     Stage('heat')
@@ -307,13 +394,27 @@ def sag(value: float) -> Target:
 
 
 def bind_pole_height(problem: Any) -> Bound:
-    """See `pole_height`."""
+    """Return the pole height of a problem as an output quantity.
+
+    Args:
+        problem: the `Problem`.
+
+    Returns:
+        The quantity.
+    """
     low, high = _pole(problem)
     return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
 
 
 def bind_pole_stretch(problem: Any) -> Bound:
-    """See `pole_stretch`."""
+    """Return the pole stretch of a problem as an output quantity.
+
+    Args:
+        problem: the `Problem`.
+
+    Returns:
+        The quantity.
+    """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
     row, power = pole.across()
@@ -322,12 +423,19 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 
 def bind_volume(problem: Any) -> Bound:
-    """See `enclosed_volume`."""
+    """Return the enclosed volume of a problem as an output quantity.
+
+    Args:
+        problem: the `Problem`.
+
+    Returns:
+        The quantity.
+    """
     return OfWholePart(_volume(problem), problem.scene.symmetry_factor)
 
 
 def _volume(problem: Any) -> Bound:
-    """Return the volume swept by the body as modelled."""
+    """Return the volume swept by the modelled part as an output quantity."""
     so_far = 0.0
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
@@ -337,14 +445,24 @@ def _volume(problem: Any) -> Bound:
 
 
 def _unit_of_volume(forms: Any) -> float:
+    """Return length^3, or length^2 per unit depth, in the user's units."""
     return forms.length**forms.scene.kinematics.dimension_of_volume
 
 
 def swept_volume(problem: Any) -> Any:
-    """Return the scalar form of the volume that the body as modelled sweeps, over the unit of volume.
+    """Return the scalar form of the volume that the modelled part sweeps, over the unit of volume.
 
-    It is minus the integral of u . n da over the driven face. The face goes from X to X + u. The area vector of X + t u
-    is of degree 2 in t (axisymmetric): Gauss's rule with two points in t is exact.
+    It is minus the integral of u . n da over the loaded face. The face moves from X to X + u. The area vector of
+    X + t u is of degree 2 in t (axisymmetric), so the two-point Gauss rule in t is exact.
+
+    Args:
+        problem: the `Problem`.
+
+    Returns:
+        The form (UFL, rank 0).
+
+    Raises:
+        InputError: no controlled pressure with a face.
     """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
@@ -357,6 +475,7 @@ def swept_volume(problem: Any) -> Any:
 
 
 def _displacement(problem, points, factors):
+    """Return a weighted sum of displacements of points as an output quantity."""
     found = probe(problem, points)
     return _Linear(problem, found.row(np.asarray(factors)) * problem.forms.length,
                    float(np.sum(factors * found.so_far)))
@@ -373,5 +492,14 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    """Return True if a value of the quantity equals the target to round-off. size: see `Bound`."""
+    """Check whether a value equals a target to round-off.
+
+    Args:
+        target: the target.
+        size: scale of the quantity, see `Bound`.
+        value: the value.
+
+    Returns:
+        True if it does.
+    """
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

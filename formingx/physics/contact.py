@@ -66,7 +66,7 @@ class Contact(Part):
     Args:
         on: name of the boundary that faces the tool.
         tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
-        friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), at least 0. A coefficient
+        friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), 0 or larger. A coefficient
             that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`; its
             value is taken at the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
@@ -147,7 +147,7 @@ class Contact(Part):
 
     @property
     def sticks(self) -> bool:
-        """True if points never slide, under "stick" and for mu of at least 100."""
+        """True if points never slide, under "stick" and for mu of 100 or larger."""
         return not self.friction_by_temperature and self.mu >= _STICKS
 
     @property

@@ -13,7 +13,7 @@ from .part import Part
 
 
 class Load(Part):
-    """Base class of loads, also of user-defined ones; a subclass defines at least `virtual_work`.
+    """Base class of loads, also of user-defined ones; a subclass must define `virtual_work`.
 
     Args:
         on: name of the boundary on which it acts; None for a body force.

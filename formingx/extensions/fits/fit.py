@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError, finite, place
 from ...figures import Axes
 from ...materials.material import Material
-from ...materials.viscoelastic import RelaxingMaterial
+from ...materials.relaxing import RelaxingMaterial
 from .fit_in_time import TimedTest, fitted_in_time
 from .fit_plot import plotted
 from .measured import read_tests

@@ -16,7 +16,7 @@ from ...errors import InputError, count, positive, several
 from ...materials import branches, homogeneous
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
-from ...materials.viscoelastic import RelaxingMaterial
+from ...materials.relaxing import RelaxingMaterial
 from .uncertainty import Uncertainty, uncertainty
 from .weights import in_range, scales
 

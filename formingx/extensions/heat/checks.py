@@ -14,7 +14,8 @@ from .cooling import CoolingHistory
 from .layers import graded, height_at
 from .run import checked_materials
 
-_FROZEN = ", where the material does not relax any more: give Sets or a modulus that rises, if it turns into glass"
+_FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
+           " glass")
 _RISES = 2.0               # modulus of the coldest over the modulus of the hottest body
 
 
@@ -102,8 +103,8 @@ def springs_back(body: Any) -> Iterator[Finding]:
                 yield Finding("warning", f"layer {layer!r}",
                               f"{name}, of the relaxed material, is {cold / hot:.3g} times as large at {low:.4g}"
                               f" degrees as at {high:.4g}: as the stretched part cools, it pulls back with that much"
-                              f" more force, instead of setting in its shape. For a material that sets see fx.Sets and"
-                              f" docs/heat.md")
+                              f" more force, instead of solidifying in its shape. For a material that solidifies see"
+                              f" fx.Solidification and docs/heat.md")
 
 
 @register("start")

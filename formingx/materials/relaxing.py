@@ -1,0 +1,354 @@
+r"""Relaxing materials: an equilibrium energy and branches, each a spring that flows.
+
+A branch has a modulus mu, a relaxation time tau, and an energy of its elastic strain; A is the inverse of its internal
+variable Cv, or its variable itself:
+
+.. math:: W_{branch} = \frac{\mu}{2} \left[\mathrm{tr}(\bar C A) - 3\right], \qquad \bar C = J^{-2/3} C
+
+Cbar keeps the branches stress-free in the reference configuration. A step of length dt from a known state has a
+potential, whose derivative by F is the stress at its end. Its tangent is therefore symmetric and consistent, without
+iterations at a point. With x = dt/tau the potential is regular at dt = 0, where it is the elastic energy. For infinite
+dt it has no contribution of the branch.
+
+A symmetric tensor with the block structure of F (`physics.kinematics`) is stored as its entries (11, 22, 12, 33).
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import ufl
+from numpy.typing import ArrayLike
+
+from ..errors import InputError, known, positive
+from ..figures import Axes, figure
+from ..physics import kinematics
+from . import branches as tests
+from .constants import OfTemperature, Sample
+from .homogeneous import MODES
+from .in_time import Relaxing, checked_pairs, checked_shift
+from .material import Material, brief
+from .tensors import IDENTITY, Entries, entries, inner, isochoric
+
+
+class RelaxingMaterial(Relaxing):
+    """Equilibrium energy and relaxing branches, for any law of the branches.
+
+    Its constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2, ... Without times,
+    `strain_energy`, `shear_modulus` and `stress` give the instantaneous response, before any relaxation.
+
+    Args:
+        equilibrium: material that describes the relaxed state, or None.
+        branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
+        shift: temperature dependence of the relaxation times: `WLF`, `Arrhenius`, or any function aT(T) of an array.
+            The taus, which must be numbers, are the values where aT = 1. None: no dependence.
+
+    Raises:
+        InputError: an argument that is not allowed.
+    """
+
+    _tensor = ""                    # name of the branches' state
+    _stores_C = True               # the last state's C is needed, too
+    _sign = 1                       # of the branches' state: see `Material.shapes`
+
+    def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
+        super().__init__(equilibrium)
+        name = type(self).__name__
+        for k, values in enumerate(checked_pairs(f"{name}: branches", branches, "mu, tau"), 1):
+            for constant, value in zip((f"mu_{k}", f"tau_{k}"), values):
+                if constant in self.parameters:
+                    raise InputError(f"{name}: the equilibrium energy has a constant {constant!r}: that is the name of"
+                                     f" a branch's; give it another")
+                self.parameters[constant] = value
+            if shift is not None:
+                self.parameters[f"tau_{k}"] = _shifted(f"{name}: tau_{k}", values[1], shift)
+        self.check()
+
+    def check(self, sample: Sample | None = None) -> None:
+        if sample is None and (rest := self.equilibrium) is not None:
+            rest.check()
+        super().check(sample)
+
+    def check_constants(self, **constants):
+        for k, mu, tau in self._branches(constants):
+            positive(f"{type(self).__name__}: mu_{k}", mu)
+            positive(f"{type(self).__name__}: tau_{k}", tau)
+        super().check_constants(**constants)
+
+    @property
+    def branches(self) -> list[tuple[float, float]]:
+        """List of (mu, tau), stress and time."""
+        return [(mu, tau) for _, mu, tau in self._branches(self.parameters)]
+
+    @property
+    def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
+        """{name: value in the reference configuration} of the history variables, entries (11, 22, 12, 33) of tensors.
+        """
+        return dict.fromkeys(self.shapes, IDENTITY)
+
+    @property
+    def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
+        """Signs of the tensors; see `Material`."""
+        branches = {f"{self._tensor}_{k}": self._sign for k, *_ in self._branches(self.parameters)}
+        return {"C": 1} | branches if self._stores_C else branches
+
+    @property
+    def of_flow(self) -> tuple[str, ...]:
+        """Names of the relaxation times."""
+        return tuple(f"tau_{k}" for k, *_ in self._branches(self.parameters))
+
+    def elastic_stretches(self, F, internal, **constants):
+        r"""Return the largest principal elastic stretch of each branch.
+
+        .. math:: \sqrt{\max \mathrm{eig}(J^{-2/3} F M F^T)}, \qquad M = C_v^{-1} \text{ or } A
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            internal: internal variables in the same state.
+            constants: values of the constants by name.
+
+        Returns:
+            List of stretches (UFL scalars).
+        """
+        scale = kinematics.volume_ratio(F) ** (-2 / 3)
+        found = []
+        for k, *_ in self._branches(constants):
+            M = self._metric(entries(internal[f"{self._tensor}_{k}"]))
+            B = scale * F * ufl.as_tensor([[M[0], M[2], 0], [M[2], M[1], 0], [0, 0, M[3]]]) * F.T
+            radius = ufl.sqrt((B[0, 0] - B[1, 1]) ** 2 + 4 * B[0, 1] ** 2)
+            found.append(ufl.sqrt(ufl.max_value((B[0, 0] + B[1, 1] + radius) / 2, B[2, 2])))
+        return found
+
+    def strain_energy(self, F, **constants):
+        """Return the instantaneous strain energy per reference volume, before any flow.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            constants: values of the constants by name.
+
+        Returns:
+            Energy (UFL, stress).
+        """
+        mu = sum(mu for _, mu, _ in self._branches(constants))
+        return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
+
+    def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """Return the stored energy per reference volume for given internal variables.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            internal: internal variables in the same state.
+            constants: values of the constants by name.
+
+        Returns:
+            Energy (UFL, stress).
+        """
+        C = isochoric(F)
+        return self._relaxed_energy(F, constants) + sum(
+            mu / 2 * self._stored(C, entries(internal[f"{self._tensor}_{k}"]))
+            for k, mu, _ in self._branches(constants))
+
+    def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
+        """Return the dissipated power per reference volume.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            internal: internal variables in the same state.
+            constants: values of the constants by name.
+
+        Returns:
+            Power (UFL, stress over time), 0 or larger.
+        """
+        C = isochoric(F)
+        return sum(mu / (2 * tau) * ufl.max_value(self._dissipated(C, entries(internal[f"{self._tensor}_{k}"])), 0)
+                   for k, mu, tau in self._branches(constants))
+
+    def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
+        """Return the potential of a step: its derivative by F is the stress at the end of the step.
+
+        Args:
+            F: deformation gradient at the end (UFL, shape (3, 3)).
+            internal: {name: entries, shape (4,)} at the beginning, names as in `internal`.
+            time_step: length of the step (UFL scalar, time), 0 or larger.
+            constants: values of the constants by name.
+
+        Returns:
+            Potential (UFL, stress).
+        """
+        C = isochoric(F)
+        past = self._past(internal, time_step)
+        return self._relaxed_energy(F, constants) + sum(
+            mu / 2 * self._step(C, past, entries(internal[f"{self._tensor}_{k}"]), time_step / tau)
+            for k, mu, tau in self._branches(constants))
+
+    def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
+        """Return the internal variables at the end of a step.
+
+        It must be called after steps of length 0 too, because the next step begins with the stored C.
+
+        Args:
+            F: deformation gradient at the end (UFL, shape (3, 3)).
+            internal: {name: entries, shape (4,)} at the beginning.
+            time_step: length of the step (UFL scalar, time), 0 or larger.
+            constants: values of the constants by name.
+
+        Returns:
+            {name: entries, shape (4,)} (UFL).
+        """
+        C = isochoric(F)
+        past, after = self._past(internal, time_step), self._next_step_data(C, internal, time_step)
+        for k, _, tau in self._branches(constants):
+            name = f"{self._tensor}_{k}"
+            after[name] = self._advanced(C, past, entries(internal[name]), time_step / tau)
+        return {name: ufl.as_vector(value) if isinstance(value, tuple) else value for name, value in after.items()}
+
+    def _modulus(self, times):
+        return sum(mu * np.exp(-times / tau) for mu, tau in self.branches)
+
+    def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
+               between: str = "stretch", *, true: bool = False) -> np.ndarray:
+        """Return the nominal stress, force over reference area, in a homogeneous test.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial" too.
+            stretches: stretches, any shape without times, shape (n,) with times.
+            times: times of the stretches, shape (n,), not descending. The first stretch is applied suddenly to a body
+                in the reference configuration; two stretches at the same time are a jump. None: every stretch is
+                applied suddenly.
+            between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
+            true: True for the true stress, force over current area.
+
+        Returns:
+            Stress of the shape of `stretches`, in the unit of the constants.
+
+        Raises:
+            InputError: as without times; descending times, or another number of times than of stretches.
+        """
+        if times is None:
+            return super().stress(mode, stretches, true=true)
+        t, l = tests.checked(f"{self}: stress", mode, times, stretches, between)
+        mu, tau = np.array(self.branches).T
+        P = self._relaxed_stress(mode, l) + self.unit_stress(mode, tau, t, l, between) @ mu
+        return P * l if true else P
+
+    @classmethod
+    def unit_stress(cls, mode: str, tau: Any, times: np.ndarray, stretches: np.ndarray,
+                    between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
+        """Return the nominal stress over mu of branches; see `branches.elastic_strains`.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            tau: relaxation times, shape (branches,), time.
+            times: times, shape (n,).
+            stretches: stretches at these times, shape (n,).
+            between: "stretch" or "strain".
+            accuracy: relative accuracy of a time step.
+
+        Returns:
+            Stress over mu, shape (n, branches).
+        """
+        w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
+        return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
+
+    def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "",
+             mode: str = "uniaxial", rates: ArrayLike | None = None, unit_of_time: str = "s") -> Any:
+        """Draw nominal stress against stretch at constant Hencky rates, instantaneous and relaxed.
+
+        Args:
+            axes: matplotlib axes; default a new figure.
+            stretches: stretches above 1, shape (n,); default 1 to 6, or to 95 % of the limit.
+            unit: unit of stress of the constants, for the label.
+            mode: the test.
+            rates: rates, 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
+            unit_of_time: unit of time of the constants, for labels.
+
+        Returns:
+            The matplotlib axes.
+        """
+        known(f"{self}: plot: mode", mode, MODES)
+        drawn: Any = figure()[1] if axes is None else axes
+        l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else np.asarray(
+            stretches, dtype=float)
+        if rates is None:
+            tau = [tau for _, tau in self.branches]
+            rates = 10.0 ** np.arange(math.floor(-math.log10(max(tau))) - 1, math.ceil(-math.log10(min(tau))) + 2)
+        drawn.plot(l, self.stress(mode, l), "k", label="at once")
+        for rate in sorted(np.atleast_1d(np.asarray(rates, dtype=float)), reverse=True):
+            drawn.plot(l, self.constant_rate(mode, rate, l), label=f"{rate:g}/{unit_of_time}")
+        if (rest := self.equilibrium) is not None:
+            drawn.plot(l, rest.stress(mode, l), "k--", label="relaxed")
+        drawn.set(xlabel="stretch", ylabel="nominal stress" + f" ({unit})" * bool(unit),
+                 title=f"{mode.replace('_', ' ')} tension at constant Hencky rates")
+        drawn.legend()
+        return drawn
+
+    def coordinates(self):
+        """Return the variables of a fit: variables of the equilibrium energy, then the logarithms of mu and tau.
+
+        Returns:
+            List of (value, lowest, highest).
+        """
+        first = [] if (rest := self.equilibrium) is None else rest.coordinates()
+        return first + [(math.log(value), -math.inf, math.inf) for pair in self.branches for value in pair]
+
+    def constants_at(self, coordinates):
+        if (rest := self.equilibrium) is None:
+            return list(np.exp(coordinates))
+        n = len(rest.parameters)
+        return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
+
+    def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
+        """Yield (number, mu, tau) of every branch."""
+        k = 0
+        while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
+            yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
+
+    def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
+        """Return the data of earlier states that a step of the branches needs, independent of tau."""
+        return entries(internal["C"]) if self._stores_C else None
+
+    def _next_step_data(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
+        """Return the history variables besides the states of the branches that the next step needs."""
+        return {"C": C} if self._stores_C else {}
+
+    # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
+    # the elastic strain F M F^T
+
+    def _metric(self, A: Entries) -> Entries:
+        """Return M of the elastic strain F M F^T, as entries."""
+        raise NotImplementedError
+
+    def _stored(self, C: Entries, A: Entries) -> Any:
+        """Return the stored energy over mu/2 for C with det C = 1."""
+        raise NotImplementedError
+
+    def _dissipated(self, C: Entries, A: Entries) -> Any:
+        """Return the dissipated power over mu/(2 tau) for C with det C = 1."""
+        raise NotImplementedError
+
+    def _step(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Any:
+        """Return the potential of a step of length x = dt/tau, over mu/2."""
+        raise NotImplementedError
+
+    def _advanced(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Entries:
+        """Return the state of a branch after a step of length x = dt/tau."""
+        raise NotImplementedError
+
+    @staticmethod
+    def _flow(w: np.ndarray) -> np.ndarray:
+        """Return f of `branches` for elastic strains w, shapes (branches, 3)."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.equilibrium!r}, branches={self.branches!r})"
+
+    def __str__(self) -> str:
+        branches = ", ".join(f"({brief(mu)}, {brief(tau)})" for mu, tau in self.branches)
+        return f"{type(self).__name__}({self.equilibrium}, branches=[{branches}])"
+
+
+def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
+    """Return the relaxation time aT(T) tau."""
+    shift, tau = checked_shift(name, shift), positive(name, tau)
+    return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))
