@@ -8,18 +8,9 @@ from ..contact.tooling import Tooling
 from ..errors import InputError
 from ..physics.loads import Gravity
 from .forces import resisting, support_factor, tool_factor
+from .quantities import Bound, OfWholePart, Sag
 from .relaxed import PoleStressRatio
-from .targets import (
-    Amplitude,
-    Bound,
-    OfWholePart,
-    Sag,
-    Target,
-    bind_pole_height,
-    bind_pole_stretch,
-    bind_volume,
-    swept_volume,
-)
+from .targets import Amplitude, Target, bind_pole_height, bind_pole_stretch, bind_volume, swept_volume
 
 Measure = Target | Callable[[Any], float]
 """Quantity of a user-defined column, see `formingx.trace`."""

@@ -8,7 +8,8 @@ from dolfinx import fem
 
 from ..contact import resultants
 from ..errors import InputError, finite, known
-from .targets import Bound, OfWholePart, Target
+from .quantities import Bound, OfWholePart
+from .targets import Target
 
 
 def resisting(contact: Any) -> np.ndarray:

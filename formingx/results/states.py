@@ -12,7 +12,8 @@ import numpy as np
 
 from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
-from ..measures.targets import Bound, Target, is_met, process_time
+from ..measures.quantities import Bound
+from ..measures.targets import Target, is_met, process_time
 from ..solve import predictor
 from ..solve.branches import branch_points
 from ..solve.newton import Failure
