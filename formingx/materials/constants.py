@@ -63,9 +63,9 @@ class Varying(ABC):
         """Return the constant in a form.
 
         Args:
-            fields: possible arguments of the constant: `fields.X`, the reference position (UFL, shape (2,)), and
-                `fields.of_position(f)` and `fields.of_temperature(f)`, coefficients with the values f(R, Z) and f(T) at
-                the quadrature points of the energy. The latter follows changes of the temperature.
+            fields: possible arguments of the constant: `fields.X` is the reference position (UFL, shape (2,)).
+                `fields.of_position(f)` and `fields.of_temperature(f)` are coefficients with the values f(R, Z) and f(T)
+                at the quadrature points of the energy. The latter follows changes of the temperature.
 
         Returns:
             The constant (UFL scalar).

@@ -1,12 +1,12 @@
 r"""Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
 
-A material has named constants and one energy, and may have a history: internal variables at every quadrature point,
+A material has named constants and one energy. It may have a history: internal variables at every quadrature point,
 which are updated from one accepted state to the next. Where the energy is used, its isotropic stress in the reference
 configuration is removed:
 
 .. math:: W(F) - \sigma_0 \ln J, \qquad \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
 
-On a thin sheet Newton's method takes half as many iterations with this form as with the isochoric part of F: see the
+On a thin sheet Newton's method takes half as many iterations with this form as with the isochoric part of F. See the
 notes on incompressibility.
 """
 
@@ -44,7 +44,7 @@ class Material(Energies):
         internal: {name: value in the reference configuration}, a number or nested tuples of the shape of the variable,
             per quadrature point. Empty: no history.
         of_motion: names of internal variables that describe the motion in the last step and predict the rate in the
-            next; with their values in the reference configuration they predict no motion.
+            next. With their values in the reference configuration they predict no motion.
         shapes: {name: 1 or -1} of internal variables that are positive definite tensors, like C or its inverse, with
             entries 11, 22, 12, 33. They are transferred to another mesh relative to the deformed body, others as
             numbers.

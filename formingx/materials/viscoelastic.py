@@ -26,8 +26,8 @@ class Viscoelastic(RelaxingMaterial):
 
     In steady extension the stress of a branch is proportional to the rate, with the viscosity 3 mu tau.
 
-    A step of implicit Euler has a closed form (Shutov, Landgraf and Ihlemann 2013). With G = Cv_n, x' = dt/tau, a = det
-    G and b = det(G + x' C) the new variable and the potential, which is regular at dt = 0, are
+    A step of implicit Euler has a closed form (Shutov, Landgraf and Ihlemann 2013). Let G = Cv_n, x' = dt/tau, a = det
+    G and b = det(G + x' C). The new variable, and the potential, which is regular at dt = 0, are
 
     .. math::
         C_v = \frac{G + x' C}{b^{1/3}}, \qquad
@@ -107,8 +107,9 @@ class TransientNetwork(RelaxingMaterial):
     .. math:: \frac{\mu}{2} \left[\mathrm{tr}(C A) - 3 - \ln \det A\right].
 
     A step is exact if C^-1 is a parabola in time, through its value at the end of the step and two earlier values. It
-    is therefore of third order, and of second order for small tau: for dt >> tau the stress follows the rate at the end
-    of the step, by BDF2 with variable steps. With x = dt/tau, and the ratio s of the step to the previous one,
+    is therefore of third order in time, and of second order however small tau is. For dt >> tau the stress follows the
+    rate at the end of the step, by BDF2 with variable steps. With x = dt/tau, and the ratio s of the step to the
+    previous one,
 
     .. math::
         W_{step} &= \frac{\mu}{2} \mathrm{tr}(C M), \qquad A = M + (1 - m - p) C^{-1}, \\

@@ -114,8 +114,8 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """Return the output quantities that every run records, by column name.
 
-    Energies, volumes, areas and forces belong to the whole part, the whole tool and the whole support, also where a
-    half or a quarter is modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
+    Energies, volumes, areas and forces belong to the whole part, tool and support, also where a half or a quarter is
+    modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
 
     - pressure, travel (length): controlled quantities. Several controls have a column each, such as plug_travel
       (`Scene.column`).

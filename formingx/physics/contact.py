@@ -11,20 +11,20 @@ the tangential traction for stick and for Coulomb's law
 .. math:: T_{stick} = k F'(d)\, g, \qquad T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g.
 
 The elastic slip g is the tangential motion since gap closure, minus the sliding. Stick is mu = inf, frictionless
-contact mu = 0. The slip of a point that was open at the last accepted state begins at its gap closure within the step,
-which the tangent of the path predicts. A point whose gap closes at the end of the step, or later, carries no shear
+contact mu = 0. A point that was open at the last accepted state slips from its gap closure on. The tangent of the path
+predicts the closure. A point whose gap closes at the end of the step, or later, carries no shear
 until then.
 
 Coulomb's law is regularised: points slide after the same small elastic slip g_s at every pressure. Their stiffness
 therefore grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus
-Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes: slip under N1 and
+Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes. Slip under N1 and
 back under N2 gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
 For a tool from which the body does not separate, a point that has been in contact has F(d) = d + theta of either sign.
 The other points have max(d + theta, 0), which is continuous at gap closure.
 
-Contact acts at the nodes of six-node triangles, which are the points of the Gauss-Lobatto rule on a facet (exact for
-the lumped area), or at Gauss points of the facets. History variables belong to the same points.
+Contact acts at nodes or at Gauss points of the facets. The nodes of six-node triangles are the points of the
+Gauss-Lobatto rule on a facet (exact for the lumped area). History variables belong to the same points.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Contact(Part):
         on: name of the boundary that faces the tool.
         tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
         friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), 0 or larger. A coefficient
-            that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`; its
+            that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`. Its
             value is taken at the last accepted state.
         penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
         ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick.
@@ -78,8 +78,8 @@ class Contact(Part):
             tension separate, for materials that do not relax.
         nodes_per_step: number of nodes that come into contact in one step (an element edge has two); in three
             dimensions a percentage of all nodes, default 1. The results of stick, friction and heat exchange depend on
-            the time of gap closure. None: where points stick, and on faces that slide beside them, up to 5 % of the
-            nodes, whose gap closures are predicted in order; elsewhere one node with friction or heat.
+            the time of gap closure. None: up to 5 % of the nodes where points stick, and on faces that slide beside
+            them. Their gap closures are predicted in order. Elsewhere one node with friction or heat.
         present_area: True: the penalty refers to area and wall at the beginning of a step instead of the reference
             configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed one. Only
             without friction. The penetration then depends on the steps.

@@ -133,8 +133,8 @@ class Gravity(Load):
     .. math:: \delta W = -\int_{V} \rho \, g \, \delta u_z \, dV
 
     Args:
-        density: density in the reference configuration, positive, or {layer: density} for layers with weight: kg/m3
-            with Pa, m and s; t/mm3 with MPa, mm and s.
+        density: density in the reference configuration, positive, or {layer: density} for layers with weight. Its unit
+            is kg/m3 with Pa, m and s, and t/mm3 with MPa, mm and s.
         value: acceleration g, length/time^2 (9.81 m/s2 or 9810 mm/s2; negative: upward); None: a control of the run.
         name: name in a process and in columns.
 

@@ -172,8 +172,8 @@ class MixedPressure(Model):
               constant decreases with width over height, and the element locks (`locking`). A scene with an expected
               error of 5 % is refused.
         volume_stiffness: k over the shear modulus of an additional energy k (J - 1)^2/2 at each point, for example 10.
-            Pressures preserve the volume of an element, not of its parts. If the pressure varies within an element by
-            more than the shear modulus, as in a block pressed very flat, one part collapses and another opens. The
+            Pressures preserve the volume of an element, not of its parts. The pressure may vary within an element by
+            more than the shear modulus, as in a block pressed very flat. Then one part collapses and another opens. The
             additional energy prevents this; thin sheets on coarse meshes become stiffer. (The grad-div stabilisation of
             mixed methods: Olshanskii and Reusken, Mathematics of Computation 73, 2004.)
 
@@ -250,8 +250,8 @@ class DisplacementPenalty(Model):
         eps: dimensionless penalty parameter, positive (thesis: 2e-2 to 1e-7).
         points: 3 (interior, degree 2: the usable rule), 4 (degree 3, one weight negative: the tangent becomes
             indefinite in bending for eps <= 1e-3) or 7 (full: locks).
-        stress_free: False keeps the energy as printed in (3.4.1), which has a stress in the reference configuration:
-            the unloaded body then swells or shrinks to I3 - 1 of the order of eps.
+        stress_free: False keeps the energy as printed in (3.4.1), which has a stress in the reference configuration.
+            The unloaded body then swells or shrinks to I3 - 1 of the order of eps.
 
     >>> fx.DisplacementPenalty(eps=1e-4)
     DisplacementPenalty(eps=0.0001)

@@ -103,7 +103,7 @@ class _OneComponent(Support):
 class Symmetry(_OneComponent):
     """Symmetry line along Z (an axis, `normal="r"`) or R (`normal="z"`), without displacement across it.
 
-    If a flat end of the body lies in it, the part continues behind it as the mirror image of the body, and results
+    If a flat end of the body lies in it, the part continues behind it as the mirror image of the body. Results then
     belong to the whole part: see `Scene.symmetry_factor`.
 
     Args:
@@ -154,7 +154,7 @@ class SimplySupported(Support):
     Args:
         on: name of the boundary.
         weight: "area": plain mean, every layer carries the same traction; "stiffness": mean weighted with the shear
-            modulus of the layers, for soft layers that could not carry that traction.
+            modulus of the layers. Soft layers may need it if they cannot carry that traction.
 
     >>> scene.supports
     [Symmetry('axis', 'r'), SimplySupported('rim')]

@@ -127,8 +127,8 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
     """Return the volume between a flat body and its mould, and an upper bound of its error as a factor.
 
-    The volume, infinite if the mould is open, is the sum over the squares outside the tool that are connected with the
-    body in the reference configuration. `_room_of_tube` treats a closed tube.
+    Squares outside the tool are counted if they are connected with the body in the reference configuration. The volume
+    is infinite if the mould is open. `_room_of_tube` treats a closed tube.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)

@@ -16,7 +16,7 @@ _MOST = 1000           # largest number of points of a tool in three dimensions 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
     """Check that tools do not overlap in a stage, and that none passes through a constrained boundary.
 
-    If a travel is unknown before the run, as in a stage that ends at a pole height, its tool is not checked from there
+    A travel may be unknown before the run, as in a stage that ends at a pole height. Its tool is not checked from there
     on.
 
     Args:

@@ -46,9 +46,9 @@ class Scene:
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; for a sheet in three dimensions `ThreeD()`.
         quadrature_degree: degree of the quadrature of the energy, at most 30; default 5 (seven points), the thesis'
             rule; in three dimensions 1.
-        temperature: temperature of the body, on which material constants may depend: a number, a `table` over R, a
-            function of arrays (R, Z), a CSV file with columns R, Z, T, the result of `formingx.heat`, or a DOLFINx
-            Function.
+        temperature: temperature of the body, on which material constants may depend. It is a number, a `table` over R,
+            a function of arrays (R, Z), or a CSV file with columns R, Z, T. It may also be the result of
+            `formingx.heat`, or a DOLFINx Function.
         heat: `Cooling(...)` for a temperature that changes with time.
         expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}.
         thickness: thickness of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either}.
@@ -72,7 +72,7 @@ class Scene:
 
     Raises:
         InputError: an unknown or empty tag; a layer without material; insufficient support; a mesh with R < 0,
-            overlapping or inverted elements; two controlled items with the same name or without names.
+            overlapping or inverted elements. Also two controlled items with the same name or without names.
 
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top

@@ -89,7 +89,7 @@ class MirrorPlanes:
         """Return the ratio of the force on a whole tool or support to the force on its modelled part.
 
         A plane counts if the tool reaches it, because the tool then continues on the other side. It does not count if
-        the force has a component across it: the images of this component cancel, and the force on one side is meant.
+        the force has a component across it. The images of this component cancel, so the force on one side is used.
 
         Args:
             extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),
