@@ -331,12 +331,7 @@ def swept_volume(problem: Any) -> Any:
     kinematics, forms = problem.scene.kinematics, problem.forms
     N, face = forms.face(driven.on, 5)
     swept = sum(ufl.inner(forms.u, kinematics.area_vector(forms.constant(t) * forms.u, forms.X, N)) for t in _GAUSS)
-    so_far = 0.0
-    if problem.scene.preformed is not None:
-        old, state = problem.scene.preformed.before
-        with old.state_context(state):
-            so_far = _volume(old).value(old.x, state.control)
-    return Form(problem, -swept / forms.constant(2 * scale) * face, scale, so_far)
+    return -swept / forms.constant(2 * _unit_of_volume(forms)) * face
 
 
 def _displacement(problem, points, factors):
