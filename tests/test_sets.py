@@ -110,7 +110,7 @@ def test_without_cold_it_is_its_base():
     (lambda: fx.Solidification(BASE, 1.0, between=(85, 75)), "the lower first"),
     (lambda: fx.Solidification(BASE, 1.0), "give one of them"),
     (lambda: fx.Solidification(BASE, 1.0, fraction=fx.table({20: 0, 80: 1})), "must fall from 1 to 0"),
-    (lambda: fx.Solidification(fx.Solidification(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "solidifies already"),
+    (lambda: fx.Solidification(fx.Solidification(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "fies already"),
     (lambda: block(fx.Solidification(BASE, 1.0, between=(1, 2)), [], temperature=None, heat=False), "temperature"),
 ])
 def test_what_is_refused(make, words):
