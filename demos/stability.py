@@ -196,11 +196,11 @@ def main():
     summary["switched"] = {"mirror_error": error}
     say(f"sheet: {summary['sheet']}", f"switched: mirror error {error:.1e}")
     drawing, axes = figure()
-    off = [max(abs(found / reference - 1), 1e-12) for _, found, reference in rows]
-    axes.semilogx(off, range(len(rows)), "o")
-    axes.set(yticks=range(len(rows)), xlabel="difference from the exact bifurcation, relative")
-    axes.set_yticklabels([name.replace("/inner_radius_ratio", " ratio").replace("/pressure_over_mu", " pressure")
-                          for name, *_ in rows], fontsize=5)
+    bodies = list(dict.fromkeys(name.split("/")[0] for name, *_ in rows))
+    axes.semilogx([max(abs(found / reference - 1), 1e-12) for _, found, reference in rows],
+                  [bodies.index(name.split("/")[0]) for name, *_ in rows], "o", alpha=0.6)
+    axes.set(yticks=range(len(bodies)), xlabel="difference from the exact bifurcation, relative")
+    axes.set_yticklabels([body.replace("_", " ") for body in bodies])
     save(drawing, out / "accuracy.png")
     if not quick:
         for name in ("cylinder_nu_0.5_n_1", "tube_0.8_n_3"):
