@@ -1,4 +1,4 @@
-"""The command line: python -m formingx [demo NAME | check SCRIPT | compare OURS THEIRS | COMMAND FOLDER]."""
+"""Command line: python -m formingx [demo NAME | check SCRIPT | compare OURS THEIRS | COMMAND FOLDER]."""
 
 from __future__ import annotations
 
@@ -17,13 +17,20 @@ from .results.files import checkpoint_data, status
 from .results.show import report
 from .units import NONE, Units
 
-_ROWS = 20                    # of states that `open` shows, about
+_ROWS = 20                    # approximate number of states that `open` shows
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0, or 2 if something that was given is not allowed."""
+    """Run the command line.
+
+    Args:
+        arguments: command line arguments; default those of the process.
+
+    Returns:
+        The exit status: 0, or 2 for an argument that is not allowed.
+    """
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         if words[:1] == ["demo"]:
@@ -32,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
             options = _parser().parse_args(words)
             {"compare": _compare, "check": _check, "open": _open, "report": _report, "status": _status,
              "watch": _watch, None: lambda _: _say(_overview())}[options.command](options)
-    except BrokenPipeError:                                 # a reader, such as head, has seen enough
+    except BrokenPipeError:                                 # the reading program, such as head, has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (InputError, OSError) as error:
         if MPI.COMM_WORLD.rank == 0:
@@ -42,6 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
     parser = argparse.ArgumentParser(prog="python -m formingx", description=_overview(),
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
@@ -85,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _overview() -> str:
+    """Return the overview that is printed without arguments."""
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
              "  check SCRIPT               look over the scene of a script before it runs",
@@ -100,11 +109,12 @@ def _overview() -> str:
 
 
 def _folder() -> Path:
+    """Return the folder of the demos."""
     return Path(__file__).resolve().parents[1] / "demos"
 
 
 def _demos() -> dict[str, str]:
-    """{name: first line of its docstring} of the scripts that can be run."""
+    """Return {name: first line of the docstring} of the demos."""
     found = {}
     for file in sorted(_folder().glob("*.py")):
         tree = ast.parse(file.read_text(encoding="utf-8"))
@@ -114,7 +124,11 @@ def _demos() -> dict[str, str]:
 
 
 def _demo(words: list[str]) -> None:
-    """Run a demo in this process, as `python demos/NAME.py OPTIONS` would: also under mpirun."""
+    """Run a demo in this process, like `python demos/NAME.py OPTIONS`, also under mpirun.
+
+    Raises:
+        InputError: there is no such demo.
+    """
     demos = _demos()
     listed = ", ".join(demos) or f"none; {os.fspath(_folder())} holds no demo"
     if not words:
@@ -135,11 +149,13 @@ def _demo(words: list[str]) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
+    """Print the findings on a script."""
     from .checks.scripts import check_script
     _say(str(check_script(options.script, options.arguments)))
 
 
 def _compare(options: argparse.Namespace) -> None:
+    """Compare two tables."""
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
     units: dict[str, float | str] = {}
@@ -157,6 +173,7 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _open(options: argparse.Namespace) -> None:
+    """Print the content of a checkpoint."""
     about, states = checkpoint_data.contents(options.folder)
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
@@ -165,7 +182,7 @@ def _open(options: argparse.Namespace) -> None:
 
 
 def _states(record: report.Record) -> list[str]:
-    """States as rows, a screenful: evenly spread ones, limit points, jumps, and the last of each stage."""
+    """Return some states as rows: evenly spaced ones, limit points, jumps, and the last of each stage."""
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -179,6 +196,7 @@ def _states(record: report.Record) -> list[str]:
 
 
 def _report(options: argparse.Namespace) -> None:
+    """Write the report of a checkpoint."""
     out = options.out or Path(options.folder) / "report.html"
     record = report.of_checkpoint(*checkpoint_data.contents(options.folder))
     report.write(record, out, options.title, None, MPI.COMM_WORLD, _units(options.units), options.density,
@@ -187,6 +205,11 @@ def _report(options: argparse.Namespace) -> None:
 
 
 def _units(given: str | None) -> Units:
+    """Return the units from an option such as mm,MPa.
+
+    Raises:
+        InputError: the option has another form.
+    """
     if given is None:
         return NONE
     length, comma, stress = given.partition(",")
@@ -196,10 +219,12 @@ def _units(given: str | None) -> Units:
 
 
 def _status(options: argparse.Namespace) -> None:
+    """Print the status of a run."""
     _say(str(status.of_folder(options.folder)))
 
 
 def _watch(options: argparse.Namespace) -> None:
+    """Print the status of a run after each new state."""
     if not checkpoint_data.begun(options.folder):
         _say(f"waiting up to {options.patience:g} s for a run to write its first state to {options.folder}")
     for found in status.watch(options.folder, options.every, options.patience):
@@ -207,6 +232,11 @@ def _watch(options: argparse.Namespace) -> None:
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
+    """Return the two parts of an option OURS=THEIRS.
+
+    Raises:
+        InputError: the option has another form.
+    """
     left, equals, right = word.partition("=")
     if not left or (equals or both) and not right:
         raise InputError(f"{option} {word!r}: must be {'COLUMN=UNIT or COLUMN=FACTOR' if both else 'OURS=THEIRS'}")
@@ -214,6 +244,7 @@ def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
 
 
 def _say(text: str) -> None:
+    """Print a text on rank 0."""
     if MPI.COMM_WORLD.rank == 0:
         print(text, flush=True)
 

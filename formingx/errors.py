@@ -1,4 +1,4 @@
-"""The errors that formingx raises, and the checks that raise them."""
+"""Errors of formingx, and checks of arguments that raise them."""
 
 import math
 import os
@@ -12,10 +12,10 @@ import numpy as np
 
 
 class InputError(ValueError):
-    """Something that the user gave is not allowed: the message names it, its value and the allowed values.
+    """Argument that is not allowed; the message gives its name, its value and the allowed values.
 
     Attributes:
-        path: of a process that refuses a stage when it reaches it, the path computed before; else None.
+        path: path computed before, if a process refuses a stage during a run; else None.
 
     >>> fx.NeoHookean(c10=-1.0)
     Traceback (most recent call last):
@@ -26,11 +26,16 @@ class InputError(ValueError):
 
 
 class ConvergenceError(RuntimeError):
-    """A run could not go on.
+    """Failure of a run that could not be continued.
+
+    Args:
+        message: the message.
+        path: path computed so far.
+        diagnosis: cause of the failure.
 
     Attributes:
-        path: the path computed up to there (`formingx.Path`), its last state converged; or None.
-        diagnosis: why, in numbers and words, and as a picture (`formingx.solve.diagnose.Diagnosis`); or None.
+        path: path computed so far (`formingx.Path`), with a converged last state, or None.
+        diagnosis: cause as numbers, text and picture (`formingx.solve.diagnose.Diagnosis`), or None.
 
     >>> try:
     ...     fx.trace(scene, until=fx.pole_height(12.0), max_steps=3, progress=False)
@@ -45,10 +50,14 @@ class ConvergenceError(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was ended by Ctrl-C; one that no script catches prints one line.
+    """End of a run by Ctrl-C; uncaught, it prints one line.
+
+    Args:
+        message: the message.
+        path: path computed so far.
 
     Attributes:
-        path: the path computed up to there (`formingx.Path`), or None.
+        path: path computed so far (`formingx.Path`), or None.
     """
 
     def __init__(self, message: str, path: Any = None):
@@ -63,6 +72,7 @@ _usual: list[Any] = []
 
 
 def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
+    """Print an uncaught `Interrupted` as one line."""
     if isinstance(error, Interrupted):
         print(error, file=sys.stderr)
     else:
@@ -70,7 +80,15 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def positive(name: str, value: Any) -> float:
-    """`value` as a float, or an InputError unless it is finite and greater than 0."""
+    """Return a positive number as a float.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: it is not finite, or not above 0.
+    """
     number = finite(name, value)
     if number <= 0:
         raise InputError(f"{name} = {value!r}: must be greater than 0")
@@ -78,7 +96,15 @@ def positive(name: str, value: Any) -> float:
 
 
 def non_negative(name: str, value: Any) -> float:
-    """`value` as a float, or an InputError unless it is finite and at least 0."""
+    """Return a non-negative number as a float.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: it is not finite, or below 0.
+    """
     number = finite(name, value)
     if number < 0:
         raise InputError(f"{name} = {value!r}: must not be negative")
@@ -86,11 +112,19 @@ def non_negative(name: str, value: Any) -> float:
 
 
 def finite(name: str, value: Any) -> float:
-    """`value` as a float, or an InputError unless it is a finite number."""
+    """Return a finite number as a float.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: it is not a finite number.
+    """
     try:
         not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
         if not_a_number or isinstance(value, Complex) and not isinstance(value, Real):
-            raise TypeError
+            raise InputError(f"{name} = {value!r}: must be a number")
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} = {value!r}: must be a number") from None
@@ -102,7 +136,15 @@ def finite(name: str, value: Any) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """`value` as an int, or an InputError unless it is a whole number of at least 1."""
+    """Return a positive integer as an int.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: it is not an integer, or below 1.
+    """
     number = finite(name, value)
     if number != int(number) or number < 1:
         raise InputError(f"{name} = {value!r}: must be a whole number of at least 1")
@@ -110,14 +152,33 @@ def count(name: str, value: Any) -> int:
 
 
 def instance(name: str, value: Any, kind: Any, what: str) -> Any:
-    """`value`, or an InputError unless it is an instance of `kind`."""
+    """Return an argument of a given type.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+        kind: the type, or a union of types.
+        what: description of the type, for the message.
+
+    Raises:
+        InputError: it is of another type.
+    """
     if not isinstance(value, kind):
         raise InputError(f"{name} = {value!r}: must be {what}")
     return value
 
 
 def several(name: str, values: Any, what: str) -> list[Any]:
-    """`values` as a list, or an InputError unless it is a list, a tuple or the like."""
+    """Return a sequence as a list.
+
+    Args:
+        name: name of the argument, for the message.
+        values: the argument.
+        what: description of the items, for the message.
+
+    Raises:
+        InputError: it is not a list, a tuple or another sequence of items.
+    """
     alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
     if not isinstance(values, Iterable) or alone or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
@@ -125,19 +186,43 @@ def several(name: str, values: Any, what: str) -> list[Any]:
 
 
 def pair(name: str, values: Any) -> tuple[float, float]:
-    """`values` as two floats, or an InputError unless they are two finite numbers."""
+    """Return two finite numbers as floats.
+
+    Args:
+        name: name of the argument, for the message.
+        values: the argument.
+
+    Raises:
+        InputError: they are not two finite numbers.
+    """
     first, second = _finite(name, values, 2, "two numbers")
     return first, second
 
 
 def triple(name: str, values: Any) -> tuple[float, float, float]:
-    """`values` as three floats, or an InputError unless they are three finite numbers."""
+    """Return three finite numbers as floats.
+
+    Args:
+        name: name of the argument, for the message.
+        values: the argument.
+
+    Raises:
+        InputError: they are not three finite numbers.
+    """
     first, second, third = _finite(name, values, 3, "three numbers")
     return first, second, third
 
 
 def direction(name: str, values: Any) -> np.ndarray:
-    """`values` as a unit vector, shape (3,), or an InputError unless they are three finite numbers, not all 0."""
+    """Return a direction as a unit vector, shape (3,).
+
+    Args:
+        name: name of the argument, for the message.
+        values: three numbers.
+
+    Raises:
+        InputError: they are not three finite numbers, or all 0.
+    """
     way = np.array(triple(name, values))
     if not way.any():
         raise InputError(f"{name} = {values!r}: must not be 0 in all components")
@@ -145,6 +230,11 @@ def direction(name: str, values: Any) -> np.ndarray:
 
 
 def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
+    """Return n finite numbers as floats.
+
+    Raises:
+        InputError: they are not n finite numbers.
+    """
     found = several(name, values, what)
     if len(found) != n:
         raise InputError(f"{name} = {values!r}: must be {what}")
@@ -152,7 +242,15 @@ def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
 
 
 def finite_array(name: str, values: Any) -> np.ndarray:
-    """`values` as an array of floats, of any shape, or an InputError unless all are finite numbers."""
+    """Return an array of finite floats, of any shape.
+
+    Args:
+        name: name of the argument, for the message.
+        values: the argument.
+
+    Raises:
+        InputError: a value is not a finite number.
+    """
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -163,7 +261,16 @@ def finite_array(name: str, values: Any) -> np.ndarray:
 
 
 def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
-    """`values`, of shape (..., components), as an array of shape (n, components), or an InputError unless they are."""
+    """Return points as an array, shape (n, components).
+
+    Args:
+        name: name of the argument, for the message.
+        values: the points, shape (..., components).
+        components: number of coordinates.
+
+    Raises:
+        InputError: the argument has another shape, or is not numeric.
+    """
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -174,13 +281,15 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 
 
 def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the values of a user's function of arrays of one shape, as floats of that shape.
+    """Return the values of a user's function of arrays, as floats of their shape.
 
     Args:
-        at: {name: array}, the arguments of the function in order.
+        name: name of the function, for the message.
+        function: the function.
+        at: {name: array} of its arguments in order, all of one shape.
 
     Raises:
-        InputError: the function fails, or a value is not finite. An InputError of the function itself passes through.
+        InputError: the function fails, or a value is not finite. An InputError of the function itself is passed on.
     """
     arguments = ", ".join(at) if len(at) == 1 else f"({', '.join(at)})"
     try:
@@ -199,20 +308,45 @@ def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.nd
 
 
 def place(name: str, value: Any) -> Path:
-    """`value` as a path, or an InputError unless it is the name of a file or a folder."""
+    """Return the name of a file or a folder as a path.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: it is not a name of a file.
+    """
     if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in os.fsdecode(value):
         raise InputError(f"{name} = {value!r}: must be the name of a file or a folder")
     return Path(value)
 
 
 def known(kind: str, name: Any, names: Any) -> None:
-    """Raise an InputError that lists the known names unless `name` is one of them."""
+    """Check that a name is one of the known names.
+
+    Args:
+        kind: kind of the name, for the message.
+        name: the name.
+        names: the known names.
+
+    Raises:
+        InputError: it is unknown; the message lists the known names.
+    """
     if not isinstance(name, Hashable) or isinstance(name, bool) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 
 
 def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
-    """Call all of `calls`; an InputError on any rank is raised on all ranks, with one message; collective."""
+    """Call functions on all ranks, and raise an InputError of any rank on all of them; collective.
+
+    Args:
+        comm: MPI communicator.
+        calls: the functions, without arguments.
+
+    Raises:
+        InputError: a function raised it on some rank.
+    """
     refused = None
     for call in calls:
         try:

@@ -1,4 +1,4 @@
-"""Findings of checks on a scene, on a run and on its failure, on one scale of severity."""
+"""Findings of checks of a scene, of a run or of its failure, with one scale of severity."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ log = logging.getLogger("formingx")
 
 Severity = Literal["note", "warning", "serious"]
 SEVERITIES: tuple[Severity, ...] = ("serious", "warning", "note")
-"""Worst first. serious: the run is refused, or its results must not be used as they are. warning: the scene may be
-another than was meant, or a result less exact than usual. note: the results are as exact as usual."""
+"""Severities from the worst on. serious: the run is refused, or its results must not be used as they are. warning: the
+scene may differ from the intended one, or a result is less accurate than usual. note: the accuracy is as usual."""
 
 Moment = Literal["scene", "start", "end", "failure"]
-"""When a check runs. scene: a scene is looked over on request. start: before the first state of every run, too.
-end: a run has ended. failure: a run could not go on."""
+"""Moment of a check. scene: on request (`check`). start: on request, and before every run. end: after a run.
+failure: after a failed run."""
 
 Subject = TypeVar("Subject", contravariant=True)
 _Check = TypeVar("_Check", bound=Callable[..., Iterable["Finding"]])
 
 
 class Finding(NamedTuple):
-    """One finding of a check.
+    """Finding of a check.
 
     Attributes:
-        severity: "serious", "warning" or "note", see `SEVERITIES`.
-        about: the part of the scene or of the result that it concerns.
-        text: the finding as text, with numbers and the place.
-        advice: what to try, or "".
+        severity: "serious", "warning" or "note" (`SEVERITIES`).
+        about: part of the scene or of the result that is concerned.
+        text: description, with numbers and the place.
+        advice: advice, or "".
     """
 
     severity: Severity
@@ -43,45 +43,49 @@ class Finding(NamedTuple):
 
 
 class Check(Protocol[Subject]):
-    """A check of one subject: the body before a run (`Body`), a `Path` at its end, or the facts of a failure (dict)."""
+    """Interface of a check.
+
+    Its subject is the body before a run (`Body`), a `Path` at its end, or the facts of a failure (dict).
+    """
 
     def __call__(self, subject: Subject, /) -> Iterable[Finding]:
-        """Return the findings; collective."""
+        """Return the findings on a subject; collective."""
 
 
 _registered: dict[Moment, list[Check[Any]]] = {"scene": [], "start": [], "end": [], "failure": []}
 
 
 def register(moment: Moment) -> Callable[[_Check], _Check]:
-    """Return a decorator that registers a check for one moment; the order of registration is the order of calls.
+    """Return a decorator that registers a check for a moment; checks are called in the order of registration.
 
     Raises:
-        InputError: the moment is not known.
+        InputError: the moment is unknown.
     """
     known("register: moment", moment, _registered)
 
     def add(check: _Check) -> _Check:
+        """Return the check after registering it."""
         _registered[moment].append(check)
         return check
     return add
 
 
 def found_at(moment: Moment, subject: Any) -> list[Finding]:
-    """Return the findings of all checks that are registered for a moment, worst first; collective."""
+    """Return the findings of all checks that are registered for a moment, the worst first; collective."""
     return worst_first(finding for check in _registered[moment] for finding in check(subject))
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings sorted by severity; findings of one severity keep their order."""
+    """Return findings sorted by severity; the order within one severity is kept."""
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))
 
 
 def alarming(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings that are more than notes."""
+    """Return the warnings and serious findings."""
     return [finding for finding in findings if finding.severity != "note"]
 
 
 def tell(findings: Sequence[Finding], rank: int) -> None:
-    """Log each alarming finding once, on rank 0."""
+    """Log each warning and serious finding once, on rank 0."""
     for finding in dict.fromkeys(alarming(findings)) if rank == 0 else ():
         log.warning("%s: %s", finding.about, finding.text)

@@ -1,4 +1,4 @@
-"""Names of the units that a script is written in: for labels, and to weigh a part. Numbers stay as they are."""
+"""Names of the units of a script, for labels and for the weight of a part. Numbers are not converted."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,13 +24,13 @@ _COORDINATES = {*"rzxyRZXY", "r_bottom", "z_bottom", "r_top", "z_top", "sag"}
 class Units:
     """Units of the numbers of a script.
 
-    Args:
-        length: "m", "cm", "mm", "um", "in" or "ft"; None: it is not said.
-        stress: "Pa", "kPa", "MPa", "GPa", "N/mm2", "bar", "atm", "psi" or "kg/cm2"; None: it is not said.
-        time: a word for the unit of process time.
+    Attributes:
+        length: "m", "cm", "mm", "um", "in" or "ft"; None if not given.
+        stress: "Pa", "kPa", "MPa", "GPa", "N/mm2", "bar", "atm", "psi" or "kg/cm2"; None if not given.
+        time: name of the unit of process time.
 
     Raises:
-        InputError: a unit that is not known.
+        InputError: a unit is unknown.
 
     >>> units = fx.Units(length="mm", stress="MPa")
     >>> units.force
@@ -53,36 +53,36 @@ class Units:
 
     @property
     def area(self) -> str:
-        """The unit of areas, "" if the unit of length is not given."""
+        """Unit of areas; "" if the unit of length is not given."""
         return self._whole(f"{self.length}2" if self.length else "")
 
     @property
     def volume(self) -> str:
-        """The unit of volumes, "" if the unit of length is not given."""
+        """Unit of volumes; "" if the unit of length is not given."""
         return self._whole(f"{self.length}3" if self.length else "")
 
     @property
     def weight(self) -> str:
-        """The unit of weights: "g"."""
+        """Unit of weights, "g"."""
         return self._whole("g")
 
     @property
     def force(self) -> str:
-        """The unit of forces, stress length^2: "N" of mm and MPa, "lbf" of in and psi; "" if one is not said."""
+        """Unit of forces, stress length^2: "N" for mm and MPa, "lbf" for in and psi; "" if a unit is not given."""
         return self._whole(self._derived(_FORCES, 2))
 
     @property
     def tension(self) -> str:
-        """The unit of forces by length, stress length: "MPa mm"; "" if one is not said."""
+        """Unit of forces per length, stress length: "MPa mm"; "" if a unit is not given."""
         return self._derived({}, 1).removesuffix("1")
 
     @property
     def energy(self) -> str:
-        """The unit of energies, stress length^3: "mJ" of mm and MPa; "" if one is not said."""
+        """Unit of energies, stress length^3: "mJ" for mm and MPa; "" if a unit is not given."""
         return self._whole(self._derived(_ENERGIES, 3))
 
     def per_depth(self) -> "Units":
-        """Return the units of a body in plane strain, whose forces, energies, volumes and areas are per unit depth.
+        """Return the units in plane strain, where forces, energies, volumes and areas are per unit depth.
 
         >>> fx.Units(length="mm", stress="MPa").per_depth().force
         'N/mm'
@@ -90,26 +90,35 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """Return the unit of a quantity of the whole body; in plane strain `_UnitsPerDepth` divides it by a length."""
+        """Return the unit of a quantity of the whole body; `_UnitsPerDepth` divides it by a length."""
         return unit
 
     @property
     def power(self) -> str:
-        """The unit of an energy over process time: "mJ/s" of mm, MPa and s; "" if one is not said."""
+        """Unit of energies per process time: "mJ/s" for mm, MPa and s; "" if a unit is not given."""
         return f"{self.energy}/{self.time}" if self.energy else ""
 
     def mass(self, volume: float, density: float) -> float:
-        """Grams of a volume (length^3) of a density in g/cm3; a length that is not said is taken for cm.
+        """Return the mass of a volume in grams, in plane strain per unit depth.
 
-        In plane strain grams per unit depth.
+        Args:
+            volume: volume, length^3; without a unit of length, cm^3.
+            density: density, g/cm3.
+
+        Raises:
+            InputError: a number is not finite, or the density is above 25 g/cm3.
         """
         volume, density = finite("mass: volume", volume), finite("mass: density", density)
-        if density > _DENSEST:
-            raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_DENSEST:g}")
+        if density > _MAX_DENSITY:
+            raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_MAX_DENSITY:g}")
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
     def of(self, column: str) -> str:
-        """Return the unit of a column of results by its name, "" of numbers without one, or where it is not said."""
+        """Return the unit of a column of results; "" for dimensionless columns, or if a unit is not given.
+
+        Args:
+            column: name of the column.
+        """
         if column in _COORDINATES or column.startswith("u_"):
             return self.length or ""
         if column.endswith(("ratio", "stretch", "error")):
@@ -118,16 +127,26 @@ class Units:
         return {"temperature": ""}.get(kind, getattr(self, kind) or "") if kind else ""
 
     def label(self, column: str, words: str = "") -> str:
-        """Return a column's name as text, with its unit: "plug force, N"."""
+        """Return the name of a column with spaces and its unit, such as "plug force, N".
+
+        Args:
+            column: name of the column.
+            words: text in place of the name.
+        """
         unit = self.of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
 
     def heading(self, column: str) -> str:
-        """Return a column's name in a file, with its unit: "plug_force [N]"."""
+        """Return the name of a column with its unit for a file, such as "plug_force [N]".
+
+        Args:
+            column: name of the column.
+        """
         unit = self.of(column)
         return f"{column} [{unit}]" if unit else column
 
     def _derived(self, names: dict[str, float], power: int) -> str:
+        """Return the unit of a power of length times stress, from a table of named units."""
         if not (self.length and self.stress):
             return ""
         size = STRESSES[self.stress] * LENGTHS[self.length] ** power
@@ -139,11 +158,12 @@ class _UnitsPerDepth(Units):
     """Units of a body in plane strain."""
 
     def _whole(self, unit: str) -> str:
+        """Return the unit divided by a length."""
         return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 
-_DENSEST = 25.0
-"""g/cm3: no body on Earth is denser."""
+_MAX_DENSITY = 25.0
+"""Largest density, g/cm3."""
 
 NONE: Any = Units()
-"""Units that are not said."""
+"""Units that are not given."""

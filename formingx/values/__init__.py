@@ -1,1 +1,1 @@
-"""Values that depend on others: tables, functions of the temperature."""
+"""Constants that depend on another quantity: tables, functions of the temperature."""

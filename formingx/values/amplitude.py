@@ -1,4 +1,4 @@
-"""A function of time as a table that a machine can follow."""
+"""Approximation of a function of time by a table with few points."""
 
 from collections.abc import Callable
 
@@ -6,20 +6,25 @@ import numpy as np
 
 from ..errors import InputError, finite, positive, values
 
-_MOST = 2000           # points: a function that jumps, or rattles, has no table
+_MAX_POINTS = 2000  # a discontinuous or noisy function needs more
 
 
 def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
               ) -> list[tuple[float, float]]:
-    """[(time, value), ...] of a function of time, for `Stage(amplitudes={item: ...})`; straight between its points.
+    """Return a table of a function of time, for `Stage(amplitudes={item: ...})`.
 
     Args:
-        function: f(t), called with an array of times, or made of numbers; the value of the controlled quantity then.
-        until, start: process times.
-        tolerance: how far a straight piece may be off f, over the span of its values.
+        function: function of time that returns the controlled quantity. It is called with an array of times, or with a
+            number if it does not accept arrays.
+        until: last process time.
+        start: first process time.
+        tolerance: largest error of the table, linear between its points, over the range of the values.
+
+    Returns:
+        [(time, value), ...].
 
     Raises:
-        InputError: times in the wrong order, a value that is not finite, a function that needs more than 2000 points.
+        InputError: the times are in the wrong order, a value is not finite, or more than 2000 points are needed.
 
     >>> stroke = fx.amplitude(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
     >>> len(stroke), stroke[0], round(stroke[-1][1], 6)
@@ -30,19 +35,20 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
     if not start < until:
         raise InputError(f"amplitude: until = {until:g}: must be after start = {start:g}")
     t = np.linspace(start, until, 9)
-    f = _at(function, t)
-    while len(t) <= _MOST:
+    f = _evaluate(function, t)
+    while len(t) <= _MAX_POINTS:
         middle = (t[:-1] + t[1:]) / 2
-        there = _at(function, middle)
-        bent = np.abs(there - (f[:-1] + f[1:]) / 2) > tolerance * max(np.ptp(np.append(f, there)), 1e-300)
+        samples = _evaluate(function, middle)
+        bent = np.abs(samples - (f[:-1] + f[1:]) / 2) > tolerance * max(np.ptp(np.append(f, samples)), 1e-300)
         if not bent.any():
             return [(float(a), float(b)) for a, b in zip(t, f)]
-        t, f = np.append(t, middle[bent]), np.append(f, there[bent])
+        t, f = np.append(t, middle[bent]), np.append(f, samples[bent])
         order = np.argsort(t)
         t, f = t[order], f[order]
-    raise InputError(f"amplitude: the function is not smooth near t = {middle[bent][0]:.6g}: {_MOST} points do not"
-                     f" follow it to {tolerance:g} of its range: give Stage a table")
+    raise InputError(f"amplitude: the function is not smooth near t = {middle[bent][0]:.6g}: {_MAX_POINTS} points do"
+                     f" not follow it to {tolerance:g} of its range: give Stage a table")
 
 
-def _at(function: Callable, t: np.ndarray) -> np.ndarray:
+def _evaluate(function: Callable, t: np.ndarray) -> np.ndarray:
+    """Return the values of the function at times, shape (n,)."""
     return values("amplitude: function", function, {"t": t})

@@ -1,4 +1,4 @@
-"""A quantity given by a few points of another, such as a modulus at some temperatures."""
+"""Monotone interpolation of a quantity between a few points, such as a modulus at some temperatures."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -12,14 +12,16 @@ from ..errors import InputError, finite
 
 
 class Table:
-    """A smooth curve through points, monotone between each two of them (see `table`).
+    """Smooth curve through points, monotone between successive points (see `table`).
 
-    Call it with numbers, shape (...), for values of that shape, or with a UFL expression for one. Numbers outside the
-    table are refused. An expression cannot refuse: it goes on straight beyond the ends, so that an iteration may pass
-    there; who accepts a state calls `check`.
+    Call it with numbers, shape (...), for values of this shape, or with a UFL expression for an expression. Numbers
+    outside the table are refused. An expression is extrapolated linearly, because an iteration may pass there; `check`
+    is called before a state is accepted.
 
     Attributes:
-        x, y: the points, sorted by x, shape (n,). limits: the first and the last x.
+        x: points in ascending order, shape (n,).
+        y: values at these points, shape (n,).
+        limits: the first and the last x.
     """
 
     def __init__(self, points: Mapping[float, float]):
@@ -32,10 +34,13 @@ class Table:
         self.limits = float(self.x[0]), float(self.x[-1])
 
     def __call__(self, x: Any) -> Any:
-        """Return the values at x: numbers, or an expression for an expression.
+        """Return the values at x.
+
+        Args:
+            x: numbers, shape (...), or a UFL expression.
 
         Raises:
-            InputError: a number outside the table.
+            InputError: a number lies outside the table.
         """
         if isinstance(x, ufl.core.expr.Expr):
             return self._expression(x)
@@ -43,7 +48,15 @@ class Table:
         return self._curve(np.clip(x, self.x[0], self.x[-1]))
 
     def check(self, x: Any, name: str = "x") -> None:
-        """Raise an InputError unless all numbers x lie in the table; `name`: name of x in the message."""
+        """Check that all numbers x lie in the table.
+
+        Args:
+            x: numbers.
+            name: name of x in the message.
+
+        Raises:
+            InputError: a number lies outside.
+        """
         x = np.asarray(x, dtype=float)
         near = 1e-9 * (self.x[-1] - self.x[0])
         outside = ~((x >= self.x[0] - near) & (x <= self.x[-1] + near))
@@ -58,7 +71,8 @@ class Table:
         return PchipInterpolator(self.x, self.y)
 
     def _expression(self, x: Any) -> Any:
-        # numbers as constants: tables of as many points share one compiled form
+        # as UFL constants: tables with as many points share one compiled form
+        """Return the curve as a UFL expression."""
         domain = ufl.domain.extract_unique_domain(x)
         slopes = self._curve.derivative()(self.x[[0, -1]])
         ends = fem.Constant(domain, np.array([self.x[[0, -1]], self.y[[0, -1]], slopes]).T.copy())
@@ -77,13 +91,16 @@ class Table:
 
 
 def table(points: Mapping[float, float]) -> Table:
-    """Return a curve through points {x: y}, for a constant that depends on temperature, or a temperature that does
-    on R.
+    """Return a smooth curve through points, such as a modulus that depends on the temperature.
 
-    Between two points it is a cubic that neither overshoots nor turns (Fritsch and Butland 1984).
+    Between two points it is a monotone cubic without overshoot (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5
+    (1984) 300).
+
+    Args:
+        points: {x: y}.
 
     Raises:
-        InputError: fewer than two points, or one that is not two finite numbers.
+        InputError: there are fewer than two points, or one is not two finite numbers.
 
     >>> modulus = fx.table({100.0: 2.0, 120.0: 1.0, 140.0: 0.4})
     >>> float(modulus(120.0)), bool(modulus(110.0) > 1.0)

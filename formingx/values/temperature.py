@@ -1,4 +1,4 @@
-"""Functions of the temperature, and time-temperature superposition: how much slower a material relaxes at another."""
+"""Functions of the temperature, and time-temperature superposition."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,24 +11,25 @@ from ..errors import InputError, finite, known, positive, values
 from .table import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
-"""By unit of temperature."""
+"""{unit: absolute zero}."""
 EVERYWHERE = (-np.inf, np.inf)
-"""Limits of what is known at all temperatures."""
-_FROZEN = 30.0
-"""log10 of a shift from which on a material is taken as one that does not relax at all."""
+"""Limits of a function that is known at all temperatures."""
+_MAX_LOG_SHIFT = 30.0
+"""log10 of the shift factor above which a material counts as one that does not relax."""
 GAS_CONSTANT = 8.31446261815324
 """J/(mol K)."""
 
 
 class FunctionOfTemperature:
-    """f(T) of the temperature of the scene; arrays of shape (n,) go in and come out.
+    """Function f(T) of the temperature of the scene, for arrays of shape (n,).
 
     Args:
-        function: f. words: its name in messages.
-        limits: lowest and highest temperature at which it is known; None: the limits of f, if it has any.
+        function: the function f.
+        words: its name in messages.
+        limits: lowest and highest temperature at which it is known; default the limits of f, if it has any.
 
     Attributes:
-        limits: the same; infinite where there are none.
+        limits: lowest and highest temperature; infinite if unlimited.
     """
 
     def __init__(self, function: Callable, words: str | None = None, limits: tuple[float, float] | None = None):
@@ -38,17 +39,21 @@ class FunctionOfTemperature:
                                 else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
 
     def __call__(self, temperature: ArrayLike) -> np.ndarray:
-        """Values at temperatures, of their shape, all finite."""
+        """Return the values at temperatures, of their shape.
+
+        Raises:
+            InputError: the function fails, or a value is not finite.
+        """
         T = np.asarray(temperature, dtype=float)
         if isinstance(self.function, Table):
             self.function.check(T, "temperature")
         return values(f"the constant {self!r}", self.function, {"temperature": T})
 
     def clamped(self, temperature: ArrayLike) -> np.ndarray:
-        """Values at temperatures, of their shape; beyond `limits` those at the nearer limit.
+        """Return the values at temperatures, of their shape; beyond `limits` the values at the nearer limit.
 
-        A run uses them: the temperature of a body changes in it. A scene refuses a temperature beyond the limits, and
-        a check before the run names those to which its tools and its air may bring the body.
+        This is used during a run, in which the temperature of a body changes. A scene refuses an initial temperature
+        beyond the limits. A check before the run reports temperatures of tools and air beyond them.
         """
         return self(np.clip(temperature, *self.limits))
 
@@ -57,20 +62,22 @@ class FunctionOfTemperature:
 
 
 class WLF:
-    r"""Shift factor of Williams, Landel and Ferry (1955): relaxation times at T are aT times the times at Tr.
+    r"""Shift factor of Williams, Landel and Ferry (J. Am. Chem. Soc. 77 (1955) 3701).
+
+    Relaxation times at the temperature T are aT times those at the reference temperature Tr.
 
     .. math:: \log_{10} a_T = -\frac{c_1 (T - T_r)}{c_2 + T - T_r}
 
-    Call it with numbers, shape (...), or a UFL expression of the temperature. It has a meaning above Tr - c2 only,
-    where aT becomes infinite: in a run, a body that is colder than `limits` has the aT of 1e30 at the lower limit, with
-    which it does not relax.
+    Call it with numbers, shape (...), or with a UFL expression of the temperature. It is defined above Tr - c2, where
+    aT becomes infinite. In a run, a colder body has the value at the lower limit, 1e30, and does not relax.
 
     Attributes:
         limits: the temperature at which aT is 1e30, and infinity.
 
     Args:
-        c1: number; c2: temperature difference; both above 0, for logarithms to the base 10.
-        reference: Tr, temperature.
+        c1: dimensionless constant for logarithms to base 10, above 0.
+        c2: temperature difference, above 0.
+        reference: reference temperature Tr.
 
     >>> slower = fx.WLF(c1=17.44, c2=51.6, reference=100.0)
     >>> round(float(np.log10(slower(110.0))), 4)
@@ -80,15 +87,18 @@ class WLF:
     def __init__(self, c1: float, c2: float, reference: float):
         self.c1, self.c2 = positive("WLF: c1", c1), positive("WLF: c2", c2)
         self.reference = finite("WLF: reference", reference)
-        self.limits = self.reference - self.c2 + self.c1 * self.c2 / (_FROZEN + self.c1), np.inf
+        self.limits = self.reference - self.c2 + self.c1 * self.c2 / (_MAX_LOG_SHIFT + self.c1), np.inf
 
     def __call__(self, temperature: ArrayLike) -> Any:
-        """aT.
+        """Return aT.
+
+        Args:
+            temperature: numbers, shape (...), or a UFL expression.
 
         Raises:
-            InputError: a number that is not above Tr - c2.
+            InputError: a number is not above Tr - c2.
         """
-        above = _above(self, temperature, self.reference - self.c2, "reference - c2")
+        above = _difference(self, temperature, self.reference - self.c2, "reference - c2")
         return _exp(-np.log(10) * self.c1 * (above - self.c2) / above)
 
     def __repr__(self) -> str:
@@ -96,14 +106,14 @@ class WLF:
 
 
 class Arrhenius:
-    r"""Shift factor of Arrhenius, with temperatures from absolute zero; called as `WLF`.
+    r"""Shift factor of Arrhenius with absolute temperatures T and Tr; called like `WLF`.
 
     .. math:: \ln a_T = \frac{E}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
 
     Args:
         activation_energy: E, J/mol, above 0.
-        reference: Tr, temperature.
-        unit: of temperatures, "C" or "K".
+        reference: reference temperature Tr.
+        unit: unit of temperatures, "C" or "K".
 
     >>> slower = fx.Arrhenius(80e3, 180.0, unit="C")
     >>> round(float(slower(170.0)), 4)
@@ -114,24 +124,31 @@ class Arrhenius:
         known("Arrhenius: unit", unit, ABSOLUTE_ZERO)
         self.activation_energy, self.unit = positive("Arrhenius: activation_energy", activation_energy), unit
         self.reference = finite("Arrhenius: reference", reference)
-        _above(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
+        _difference(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
 
     def __call__(self, temperature: ArrayLike) -> Any:
-        """aT.
+        """Return aT.
+
+        Args:
+            temperature: numbers, shape (...), or a UFL expression.
 
         Raises:
-            InputError: a number that is not above absolute zero.
+            InputError: a number is not above absolute zero.
         """
         zero = ABSOLUTE_ZERO[self.unit]
-        kelvin = _above(self, temperature, zero, "absolute zero")
+        kelvin = _difference(self, temperature, zero, "absolute zero")
         return _exp(self.activation_energy / GAS_CONSTANT * (1 / kelvin - 1 / (self.reference - zero)))
 
     def __repr__(self) -> str:
         return f"Arrhenius({self.activation_energy!r}, {self.reference!r}, unit={self.unit!r})"
 
 
-def _above(shift: Any, temperature: Any, limit: float, what: str) -> Any:
-    """Temperature less a limit that numbers must be above."""
+def _difference(shift: Any, temperature: Any, limit: float, what: str) -> Any:
+    """Return a temperature minus a limit.
+
+    Raises:
+        InputError: a number is not above the limit.
+    """
     if isinstance(temperature, ufl.core.expr.Expr):
         return temperature - limit
     temperature = np.asarray(temperature, dtype=float)
@@ -143,4 +160,5 @@ def _above(shift: Any, temperature: Any, limit: float, what: str) -> Any:
 
 
 def _exp(x: Any) -> Any:
+    """Return the exponential of numbers or of a UFL expression."""
     return ufl.exp(x) if isinstance(x, ufl.core.expr.Expr) else np.exp(x)
