@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from .errors import InputError
 from .measures.targets import Target
 from .mesh.mesh import Mesh
 from .results.path import Path
 from .scene.scene import Scene
-from .solve.newton import Tolerances
 
 
-@runtime_checkable
-class StopCondition(Protocol):
-    """Condition that ends a run as a result, for `trace(stop_at=...)`, such as `formingx.instability`."""
-
-    def watch(self, path: Path) -> None:
-        """Register a function in `path.record.on_step` that ends the run by a text in `path.record.ended`."""
-
-
-@runtime_checkable
-class MeshRenewal(Protocol):
-    """Remeshing during a run, for `trace(remesh=...)`, such as `formingx.Remesh`."""
+class RunExtension:
+    """Extension of a run: `formingx.Remesh` for `trace(remesh=)`, `formingx.instability` for `trace(stop_at=)`."""
 
     def check(self, caller: str, scene: Scene, targets: Sequence[Target]) -> None:
-        """Check that the scene and its targets can be transferred to another mesh.
+        """Check that the extension can take part in a run.
 
         Args:
             caller: name of the calling function, for messages.
@@ -34,18 +24,18 @@ class MeshRenewal(Protocol):
             targets: targets of the run.
 
         Raises:
-            InputError: an item cannot be transferred.
+            InputError: it cannot.
         """
 
-    def follow(self, path: Path, tolerances: Tolerances, part: Callable[[], None], done: Callable[[], bool]) -> None:
-        """Continue a path on as many meshes as necessary.
+    def attach(self, path: Path) -> None:
+        """Register functions in `path.record.hooks` (`RunHooks`).
+
+        A function ends the run by a text in `path.record.ended`.
 
         Args:
-            path: the path; its record receives a new segment for each mesh.
-            tolerances: convergence criteria.
-            part: function that continues the run from its last state, on the mesh of this state.
-            done: function that returns True if the target is reached.
+            path: the path that the run continues.
         """
+        raise NotImplementedError
 
 
 class MeshAdaptation(Protocol):

@@ -121,8 +121,8 @@ def write_checkpoints(path: Path, checkpoint: Any) -> None:
     """
     if checkpoint is not None:
         writer = Checkpoint(checkpoint, path)
-        path.record.on_step.append(writer.write)
-        path.record.on_end.append(writer.end)
+        path.record.hooks.on_step.append(writer.write)
+        path.record.hooks.on_end.append(writer.end)
 
 
 def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
@@ -176,7 +176,7 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     except (ConvergenceError, InputError) as error:
         error.path = path = so_far()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
-            _call_listeners(path, str(error), path.findings() if path.record.on_end else [])
+            _call_listeners(path, str(error), path.findings() if path.record.hooks.on_end else [])
         if isinstance(error, ConvergenceError) and error.diagnosis is not None:
             without_traceback = copy.copy(error)            # the diagnosis names the cause
             raise without_traceback from None
@@ -198,5 +198,5 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 def _call_listeners(path: Path, failure: str, found: list[Finding]) -> None:
     """Call the listeners at the end of a run with the error message, or "", and the findings."""
-    for listener in path.record.on_end:
+    for listener in path.record.hooks.on_end:
         listener(failure, found)

@@ -17,7 +17,7 @@ from .physics.contact import Contact
 from .problem.problem import Problem
 from .results.files.checkpoint import read
 from .results.path import Path
-from .run_hooks import MeshRenewal, StopCondition
+from .run_hooks import RunExtension
 from .run_parts import check_start, first_path, new_path, run_errors, run_on_adapted_mesh, write_checkpoints
 from .scene import aims, clearance
 from .scene.scene import Scene
@@ -38,8 +38,8 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
           tolerances: Tolerances | None = None, max_steps: int | None = None, progress: bool = True,
           start: Path | None = None, checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
           at_limit_point: str | None = None, resume: bool = False, allow_inadmissible: bool = False,
-          adapt_mesh: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None,
-          stop_at: StopCondition | None = None) -> Path:
+          adapt_mesh: bool | Mapping[str, float] = False, remesh: RunExtension | None = None,
+          stop_at: RunExtension | None = None) -> Path:
     """Follow the equilibrium path from the unloaded body to a target, through limit points.
 
     Args:
@@ -89,7 +89,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
-        instance("trace: remesh", remesh, MeshRenewal, "a formingx.Remesh")
+        instance("trace: remesh", remesh, RunExtension, "a formingx.Remesh")
         remesh.check("trace", scene, [*intermediate, until])
         if adapt_mesh is not False or stop_at is not None:
             raise InputError("trace: remesh: cannot be combined with adapt_mesh or stop_at")
@@ -108,7 +108,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     instance("trace: progress", progress, bool, "True or False")
-    instance("trace: stop_at", stop_at, StopCondition | None, "fx.instability(modes=...) or None")
+    instance("trace: stop_at", stop_at, RunExtension | None, "fx.instability(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
@@ -122,8 +122,8 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         path = register(new_path(Curve(problem, tolerances or Tolerances()), start, record, allow_inadmissible,
                              before_run(scene, [*intermediate, until])))
         write_checkpoints(path, checkpoint)
-        if stop_at is not None:
-            stop_at.watch(path)
+        for extension in filter(None, (remesh, stop_at)):
+            extension.attach(path)
 
         def part() -> None:
             """Continue the run from its last state, on the mesh of this state."""
@@ -131,11 +131,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
             targets = [(target, target.bind(path.problem)) for target in (*on_the_way, until)]
             run = Run(path.record, targets, step, at_limit_point)
             run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
-        if remesh is None:
-            part()
-        else:
-            remesh.follow(path, tolerances or Tolerances(), part,
-                          lambda: path.last.met is not None and path.last.met[:2] == until[:2])
+        path.record.hooks.renew(part, lambda: path.last.met is not None and path.last.met[:2] == until[:2])
     return path
 
 
@@ -214,7 +210,7 @@ class Process:
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
             checkpoint: Any = None, record: Mapping[str, Measure] | None = None,
             accuracy: str | float = "standard", resume: bool = False, allow_inadmissible: bool = False,
-            adapt_mesh: bool | Mapping[str, float] = False, remesh: MeshRenewal | None = None) -> Path:
+            adapt_mesh: bool | Mapping[str, float] = False, remesh: RunExtension | None = None) -> Path:
         """Run the stages in order.
 
         Args:
@@ -247,7 +243,7 @@ class Process:
         """
         stages = self._check_stages(stages)
         if remesh is not None:
-            instance("Process: remesh", remesh, MeshRenewal, "a formingx.Remesh")
+            instance("Process: remesh", remesh, RunExtension, "a formingx.Remesh")
             remesh.check("Process", self.scene, [t for s in stages for t in (*s.intermediate, s.until) if t])
             if adapt_mesh is not False:
                 raise InputError("Process: remesh: cannot be combined with adapt_mesh")
@@ -285,10 +281,9 @@ class Process:
                 execution = Execution(path.record, plans, uncertain, self._check_tool_paths, step,
                                       tolerances.residual, allowed)
                 execution.run(max_steps, progress)
-            if remesh is None:
-                part()
-            else:
-                remesh.follow(path, tolerances, part, lambda: is_done(path.record, plans))
+            if remesh is not None:
+                remesh.attach(path)
+            path.record.hooks.renew(part, lambda: is_done(path.record, plans))
         return path
 
     def _check_tool_paths(self, plan: Plan, travel: Callable[[int], float]) -> None:

@@ -56,7 +56,7 @@ class States:
         self.record, self._timed, self._own = record, timed, {} if columns is None else columns
         self._views = {} if views is None else views         # by id(problem)
         self._view(record.segments[-1])                      # compiles the forms before the run
-        record.on_state.append(self._measure)
+        record.hooks.on_state.append(self._measure)
         record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)
 
     @property

@@ -58,17 +58,33 @@ class Unusable(ConvergenceError):
     """A state was found, but none that a body can have."""
 
 
+class RunHooks:
+    """Functions that a run calls.
+
+    Attributes:
+        on_state: called with every accepted state, while the problem stands there (they fill `measures`).
+        on_step: called whenever a step is complete.
+        on_end: called when the run ends, with the text of the failure, or "", and the findings of the run.
+        renew: `renew(part, done)` calls `part`, which continues the run from its last state; with new meshes again,
+            until done() is True.
+    """
+
+    def __init__(self) -> None:
+        self.on_state: list[Callable[[State], None]] = []
+        self.on_step: list[Callable[[], None]] = []
+        self.on_end: list[Callable[[str, list[Finding]], None]] = []
+        self.renew: Callable[[Callable[[], None], Callable[[], bool]], None] = lambda part, done: part()
+
+
 class Record:
-    """The accepted states of a run, in order, and the functions that are called with them.
+    """The accepted states of a run, in order.
 
     Attributes:
         segments: list of `Segment`, the last of which grows.
         counts: cost of the run (`Counts`).
         stage: name of the stage of a process that is going on.
         ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
-        on_state: functions called with every accepted state, while the problem stands there (they fill `measures`).
-        on_step: functions called whenever a step is complete.
-        on_end: functions called when the run ends, with the text of the failure, or "", and the findings of the run.
+        hooks: functions that the run calls (`RunHooks`).
         findings: of the checks before the run.
         judge: function that returns the reason for which no body can have a state with known measures, or "".
         allow_inadmissible: keep such states, too.
@@ -77,9 +93,7 @@ class Record:
     def __init__(self, problem: Equations, curve: Curve):
         self.segments = [Segment(problem, curve)]
         self.counts, self.stage, self.ended = Counts(), "", ""
-        self.on_state: list[Callable[[State], None]] = []
-        self.on_step: list[Callable[[], None]] = []
-        self.on_end: list[Callable[[str, list[Finding]], None]] = []
+        self.hooks = RunHooks()
         self.findings: list[Finding] = []
         self.judge: Callable[[State], str] = lambda state: ""
         self.allow_inadmissible = False
@@ -143,7 +157,7 @@ class Record:
         state.time = problem.time_at(state.control)
         self.segments[-1].states.append(state)
         try:
-            for listener in self.on_state:
+            for listener in self.hooks.on_state:
                 listener(state)
             state.verdict = self.judge(state)
             if state.verdict and not self.allow_inadmissible:
@@ -160,7 +174,7 @@ class Record:
         """Complete a step: store in the last state the data with which the run continues."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
-        for listener in self.on_step:
+        for listener in self.hooks.on_step:
             listener()
 
     def describe(self, state: State) -> str:

@@ -286,6 +286,6 @@ def _of_one(state: Any, record: Record) -> Path:
     """Return a path of one state."""
     path = Path(record)
     record.segments[-1].states.append(state)
-    for listener in record.on_state:
+    for listener in record.hooks.on_state:
         listener(state)
     return path

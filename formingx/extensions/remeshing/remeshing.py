@@ -7,6 +7,7 @@ same travel and the kind "remesh".
 
 from __future__ import annotations
 
+import functools
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from ...measures.targets import Amplitude, Target
 from ...physics.contact import Contact
 from ...physics.supports import Support
 from ...problem.problem import Problem
+from ...run_hooks import RunExtension
 from ...solve.arc_length import Curve
 from ...solve.newton import Failure, Tolerances, fixed
 from ...solve.path_following import Run
@@ -64,7 +66,7 @@ _WORN = "the mesh is worn"
 
 
 @dataclass(frozen=True)
-class Remesh:
+class Remesh(RunExtension):
     """Remeshing criterion and element sizes, for `formingx.trace`.
 
     Args:
@@ -97,9 +99,9 @@ class Remesh:
         """Raise an InputError if the scene or a target cannot be transferred to another mesh."""
         _check(caller, scene, targets)
 
-    def follow(self, path: Any, tolerances: Tolerances, part: Callable[[], None], done: Callable[[], bool]) -> None:
-        """Continue a path with as many meshes as needed (`formingx.run_hooks.MeshRenewal`)."""
-        _follow(path, self, tolerances, part, done)
+    def attach(self, path: Any) -> None:
+        """Let a path continue with as many meshes as needed (`formingx.run_hooks.RunExtension`)."""
+        path.record.hooks.renew = functools.partial(_follow, path, self, path.record.curve.newton.tolerances)
 
 
 def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
@@ -147,7 +149,7 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
         ConvergenceError: the end of the path was not reached.
     """
     record = path.record
-    record.on_state.append(lambda state: _look(record, state, remesh))
+    record.hooks.on_state.append(lambda state: _look(record, state, remesh))
     worn = bool(record.states) and _worn(record, record.last, remesh)
     failed: list[State] = []
     while not (worn and done()):

@@ -15,6 +15,7 @@ from ...results.extend import method_of
 from ...results.numbers import without_round_off
 from ...results.path import Path
 from ...results.show.picture import Picture
+from ...run_hooks import RunExtension
 from ...solve.record import Record
 from ...solve.state import State
 from .modes import Kind, Located, Modes
@@ -279,13 +280,13 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
     return watch.look(modes, states)
 
 
-class InstabilityCondition:
+class InstabilityCondition(RunExtension):
     """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`."""
 
     def __init__(self, modes: Any):
         self.modes = modes
 
-    def watch(self, path: Any) -> None:
+    def attach(self, path: Any) -> None:
         """Examine the last state whenever a step of the path is complete."""
         watch, numbers = Watch(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[Kind, int] = {}
@@ -301,7 +302,7 @@ class InstabilityCondition:
                     path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
                                          f" path.stability(modes=[{kind.number:g}]) finds where")
                     return
-        path.record.on_step.append(look)
+        path.record.hooks.on_step.append(look)
 
 
 def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
