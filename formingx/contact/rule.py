@@ -6,7 +6,7 @@ Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a fa
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from dolfinx import fem, la
@@ -15,7 +15,7 @@ from ..forms.outline import ends_first
 from ..ranks import gathered
 
 
-class Rule:
+class Rule(Protocol):
     """The n locally owned points of a face.
 
     Attributes:
@@ -38,32 +38,44 @@ class Rule:
     def extent(self) -> np.ndarray:
         """Reference length of the face of each point, as in `contact_length`, shape (n,); in three dimensions an
         area."""
-        return self.lengths
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
         """Return the displacement of the points, shape (n, components), in the units of the owned unknowns;
         collective."""
-        raise NotImplementedError
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         """Add forces at the points, shape (n, components), to the owned residual; collective."""
-        raise NotImplementedError
 
     def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         """Stiffness of the points, shape (n, components, components), as the stiffness of their `dofs`, shape (n, m,
         m)."""
-        raise NotImplementedError
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
         """Return values at the points, shape (n,), from values at `nodes`."""
-        raise NotImplementedError
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
-        raise NotImplementedError
 
 
-class Lobatto(Rule):
+class _Nodes:
+    """Points at nodes, which the unknowns of the nodes move."""
+
+    dofs: np.ndarray
+
+    def displacement(self, values: np.ndarray) -> np.ndarray:
+        return values[self.dofs]
+
+    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
+        values[self.dofs] += forces
+
+    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        return stiffness
+
+    def at_points(self, values: np.ndarray) -> np.ndarray:
+        return values
+
+
+class Lobatto(_Nodes):
     """The nodes of the face. `lumped`, exact for cubics along a facet, gives the node on the axis no area."""
 
     def __init__(self, solid: Any, on: str, assemble: Any):
@@ -80,18 +92,6 @@ class Lobatto(Rule):
         self._comm, self._length, self._weight = solid.comm, solid.length, kinematics.weight
         self._vectors, self._X = vectors, vectors.tabulate_dof_coordinates()[:, :kinematics.components]
         self._facets = _own_facets(solid.scene.mesh, on)
-
-    def displacement(self, values: np.ndarray) -> np.ndarray:
-        return values[self.dofs]
-
-    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        values[self.dofs] += forces
-
-    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        return stiffness
-
-    def at_points(self, values: np.ndarray) -> np.ndarray:
-        return values
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Return the mean area ratio of the edges on both sides of a node, shape (n,).
@@ -150,7 +150,7 @@ class Lobatto(Rule):
                 self.area[np.abs(away - place) < 0.1] += share * whole
 
 
-class Vertices(Lobatto):
+class Vertices(_Nodes):
     """The nodes of a sheet in three dimensions, each with a third of the area of the triangles around it.
 
     `lengths` is the square root of this area.
@@ -161,7 +161,7 @@ class Vertices(Lobatto):
         own = np.flatnonzero(numbers[:, 0] < surface.space.dofmap.index_map.size_local)
         self.dofs = numbers[own]
         self.points = self.nodes = vectors.tabulate_dof_coordinates()[own].copy()
-        self.area = self.lumped = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
+        self.area = self.lumped = self.extent = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
         self.lengths = np.sqrt(self.area)
         self._surface, self._assemble = surface, assemble
 
@@ -179,12 +179,8 @@ class Vertices(Lobatto):
         w.array[:] = before
         return area / self.area
 
-    @property
-    def extent(self) -> np.ndarray:
-        return self.area
 
-
-class Gauss(Rule):
+class Gauss:
     """`count` Gauss points of each facet of a cell that this rank owns. Nodes of such a facet may be ghosts.
 
     Attributes:
@@ -206,7 +202,7 @@ class Gauss(Rule):
         self.nodes = np.repeat(X[nodes], q, axis=0)
         self.points = np.einsum("qa,fai->fqi", shapes, X[nodes]).reshape(-1, components)
         self._along = np.einsum("qa,fai->fqi", slopes, X[nodes]).reshape(-1, components)
-        self.lengths = np.linalg.norm(self._along, axis=1) * np.tile(weights / 2, len(nodes))
+        self.lengths = self.extent = np.linalg.norm(self._along, axis=1) * np.tile(weights / 2, len(nodes))
         self.area = self.lumped = self.lengths * self._kinematics.weight(self.points.T)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
