@@ -248,6 +248,8 @@ class Law(NormalLaw):
         shear_limit: see `Contact.shear_limit`; None: Coulomb's mu p.
     """
 
+    predictable = True
+
     def __init__(self, tool: PlaneTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
                  elastic_slip: float, shift: np.ndarray | float = 0.0, pulls: bool = False,
                  shear_limit: Callable | None = None):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -98,7 +98,7 @@ class Motion(NamedTuple):
         return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
 
 
-class ContactLaw(Protocol):
+class ContactLaw:
     """Tractions at n points, a function of their positions x and of their history variables (`None`: there are none).
 
     For each increment, in this order:
@@ -109,7 +109,8 @@ class ContactLaw(Protocol):
     * `stiffness_ahead`, at an accepted state: the tangent of the path, with the points that have just touched;
     * `distance`, `nearest`, `ramp`, for limits of the next step: when gaps close, and whether that was predicted.
 
-    If the law also has `friction` and `depth`, as `formingx.physics.contact.Law`, several gaps may close in one step.
+    A law derives from it and gives `theta`, `start`, `touching`, `tractions`, `distance` and `part`. The other members
+    have defaults, or are needed for friction, in a section or where a contact is left out.
 
     Attributes:
         theta: half-width of the ramp, length: contact begins at the distance -theta.
@@ -118,65 +119,77 @@ class ContactLaw(Protocol):
         has_friction: True if tractions depend on the slip.
         remembers: True if tractions depend on the history variables (`Touch`).
         pulls: True if the body may pull at the tool; `energy` is then the energy of the bond (`Path.work`).
+        predictable: True if the law has `friction` and `depth`, as `formingx.physics.contact.Law`; several gaps may
+            then close in one step.
     """
 
     theta: float
-    elastic_slip: float
-    shift: np.ndarray | float
-    has_friction: bool
-
-    @property
-    def remembers(self) -> bool: ...
-
-    @property
-    def pulls(self) -> bool: ...
+    elastic_slip: float = 0.0
+    shift: np.ndarray | float = 0.0
+    has_friction: bool = False
+    remembers: bool = False
+    pulls: bool = False
+    predictable: bool = False
 
     def start(self, x: np.ndarray) -> Touch:
         """Return the initial history variables of points at x."""
+        raise NotImplementedError
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
         """Return a mask of the points at x that touch or stick, shape (n,)."""
+        raise NotImplementedError
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """Return the distance and the slip of points at x, and their gradients."""
+        """Return the distance and the slip of points at x, and their gradients; default: zero, for a linear law."""
+        return Motion(x, np.zeros(len(x)), np.zeros_like(x), np.zeros(len(x)), np.zeros_like(x))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions at points x; `expected`: where to linearise (at x if None); `sense`: of the
         iteration before."""
+        raise NotImplementedError
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
         """Return the derivative of the tractions beyond a state, shape (n, c, c), stress/length; `arrived`: just
         now."""
+        return self.tractions(x, old).stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the circumferential traction by the circumferential motion, shape (n,),
         stress/length."""
+        raise NotImplementedError
 
     def distance(self, x: np.ndarray) -> np.ndarray:
         """Return the signed distance, length, of points x, shape (n, c), or of m positions of each point, (m, n, c)."""
+        raise NotImplementedError
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """`PlaneTool.nearest`, with these distances."""
+        raise NotImplementedError
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal traction over the penalty at distances d, and its derivative."""
+        """Return the normal traction over the penalty at distances d, and its derivative; default: no ramp."""
+        return np.zeros(len(d)), np.zeros(len(d))
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """Return the energy of the normal tractions per unit reference area, shape (n,), stress length."""
+        """Return the energy of the normal tractions per unit reference area, shape (n,), stress length; default: 0."""
+        return np.zeros(len(x))
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
         """Return the law of some of the points."""
+        raise NotImplementedError
 
     def without(self, points: np.ndarray) -> ContactLaw:
         """Return the same law, of which some points (a mask, shape (n,)) touch nothing."""
+        raise NotImplementedError
 
-    def with_friction(self, mu: np.ndarray | float) -> ContactLaw:
-        """Return the same law with other coefficients of friction."""
+    def with_friction(self, mu: np.ndarray | float) -> Self:
+        """Return the same law with other coefficients of friction; default: it has none."""
+        return self
 
 
-class NormalLaw:
-    """A `ContactLaw`, with its methods, without friction or memory: subclasses give `ramp` and `stored`.
+class NormalLaw(ContactLaw):
+    """A law without friction or memory: subclasses give `ramp` and `stored`.
 
     Args:
         tool: the tool, which gives the signed distance.
@@ -185,15 +198,9 @@ class NormalLaw:
             the ramp, free of stress.
     """
 
-    has_friction = remembers = pulls = False
-    elastic_slip = 0.0
-
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
         self._near: tuple[bytes, Nearest] | None = None     # positions last asked for, and the result
-
-    def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        raise NotImplementedError
 
     def stored(self, d: np.ndarray) -> np.ndarray:
         """Return the integral of the ramp over the distance, 0 where there is no contact, shape (n,), length^2."""
@@ -234,9 +241,6 @@ class NormalLaw:
         return Tractions(N[:, None] * n, N, zero, zero, lambda: outer(n, (self.k * slope)[:, None] * n)
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        return self.tractions(x, old).stiffness
-
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
         """See `ContactLaw`: N n_r/r, r being `radius`, infinite in plane strain."""
         turned = self.tractions(x, old).normal * self.nearest(x).normal[:, 0]
@@ -248,9 +252,6 @@ class NormalLaw:
 
     def without(self, points: np.ndarray) -> Self:
         return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
-
-    def with_friction(self, mu: np.ndarray | float) -> Self:
-        return self
 
     def _with(self, **other: Any) -> Self:
         """Return the same law with other attributes."""

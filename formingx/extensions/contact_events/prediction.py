@@ -39,7 +39,7 @@ class ContactEventPredictor:
         """True if a face sticks, so that its result depends on the order of the events."""
         present = self._limit.present
         return any(c.face.contact.sticks and self.allowed(c) > c.at_once for c in present) and all(
-            hasattr(c.face.law, "friction") and hasattr(c.face.law, "without") for c in present)
+            c.face.law.predictable for c in present)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
         """Return the events ahead of an accepted state; None at the start of a path where no point touches yet."""

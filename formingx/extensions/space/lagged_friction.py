@@ -153,9 +153,6 @@ class LaggedFriction(LaggedStick):
         d[rows], n[rows] = near.distance, near.normal
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        return self.tractions(x, old).stiffness
-
     def _near(self, x: np.ndarray) -> Near:
         """Return the geometry of points relative to the tool; the last result is kept."""
         if self._last is None or not np.array_equal(self._last[0], x):

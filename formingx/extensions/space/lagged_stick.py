@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...physics.contact_law import Motion, Touch, Tractions
-from ...tools.shapes import Nearest
+from ...physics.contact_law import ContactLaw, Motion, Touch, Tractions
 from ...tools.tool import RigidTool
 
 _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
@@ -32,7 +31,7 @@ SMALL_GAP = 1e-3
 """Distance outside the tool, over theta, that is negligible."""
 
 
-class LaggedStick:
+class LaggedStick(ContactLaw):
     """The `ContactLaw` of this module.
 
     For a sticking point, `Touch.position` is the sticking position, and `distance` is 0. For a free point they are its
@@ -45,10 +44,7 @@ class LaggedStick:
         separates: True if points in tension separate, see `pulling`.
     """
 
-    has_friction = False
     remembers = pulls = True
-    elastic_slip = 0.0
-    shift: np.ndarray | float = 0.0
     mu = np.inf
 
     def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):
@@ -57,13 +53,6 @@ class LaggedStick:
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
-
-    def without(self, points: np.ndarray) -> LaggedStick:
-        """See `ContactLaw`; not needed."""
-        raise NotImplementedError
-
-    def with_friction(self, mu: np.ndarray | float) -> LaggedStick:
-        return self
 
     def held(self, old: Touch) -> np.ndarray:
         """Return a mask of the sticking points, shape (n,)."""
@@ -100,34 +89,12 @@ class LaggedStick:
         assert old is not None
         held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
         force[held] = self.k * (x[held] - old.position[held])
-        return Tractions(force, held.astype(float), zero, zero, lambda: self.stiffness_ahead(x, old, held),
-                         lambda: self._touch(x, old, held))
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        assert old is not None
-        held, stiffness = self.held(old), np.zeros((*x.shape, x.shape[1]))
-        stiffness[held] = self.k * np.eye(x.shape[1])
-        return stiffness
-
-    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`; there is no axis."""
-        raise NotImplementedError
-
-    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """See `ContactLaw`; a linear law needs none."""
-        return Motion(x, np.zeros(len(x)), np.zeros_like(x), np.zeros(len(x)), np.zeros_like(x))
-
-    def nearest(self, x: np.ndarray) -> Nearest:
-        """See `ContactLaw`; not needed."""
-        raise NotImplementedError
-
-    def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """See `ContactLaw`; there is none."""
-        return np.zeros(len(d)), np.zeros(len(d))
-
-    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """See `ContactLaw`; no energy is stored by penetration."""
-        return np.zeros(len(x))
+        def stiffness() -> np.ndarray:
+            found = np.zeros((*x.shape, x.shape[1]))
+            found[held] = self.k * np.eye(x.shape[1])
+            return found
+        return Tractions(force, held.astype(float), zero, zero, stiffness, lambda: self._touch(x, old, held))
 
     def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:
         """Return the history variables of an accepted state."""
