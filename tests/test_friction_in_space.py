@@ -20,18 +20,18 @@ TOOLS = {
     "plug": fx.tools.box(half=(0.6, 1.0), depth=1.0, corner=0.3, fillet=0.25, draft=5.0, plug=True)}
 
 
-def pushed(mu, size=0.1, **contact):
+def pushed(mu, size=0.1, ball=BALL, **contact):
     """A quarter of a disc of radius 1 and a ball that is pushed into it."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=[
-        fx.Contact("top", fx.tools.revolved(BALL), mu, direction=(0, 0, -1), name="plug", **contact)])
+        fx.Contact("top", fx.tools.revolved(ball), mu, direction=(0, 0, -1), name="plug", **contact)])
 
 
-def pushed_solid(mu):
+def pushed_solid(mu, ball=BALL):
     """The same as an axisymmetric solid."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1)), materials=MATERIAL,
                     supports=[fx.SimplySupported("rim"), fx.Symmetry("axis")], contacts=[
-                        fx.Contact("top", BALL.moved(z=THICKNESS), mu, direction=(0, -1), name="plug")])
+                        fx.Contact("top", ball.moved(z=THICKNESS), mu, direction=(0, -1), name="plug")])
 
 
 def strip(mu, size, width):
@@ -139,6 +139,16 @@ def test_force_of_a_rough_ball(rough_ball):
         forces.append(path.last.measures["tool_force"])
         assert path.counts.iterations < 450 and path.last.measures["penetration"] < 1e-4 * THICKNESS
     assert forces[0] == pytest.approx(exact, rel=0.015) and forces[1] == pytest.approx(forces[0], rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu, radius, travel", [(0.2, 0.5, 0.9), (0.45, 0.4, 0.8)])
+def test_force_of_other_rough_balls(mu, radius, travel):
+    """Other frictions and radii: within 1.5 % of an axisymmetric solid."""
+    ball = fx.tools.sphere(radius=radius, z=0.0)
+    exact, found = (fx.trace(scene, until=fx.travel(travel), progress=False).last.measures["tool_force"]
+                    for scene in (pushed_solid(mu, ball), pushed(mu, ball=ball)))
+    assert found == pytest.approx(exact, rel=0.015)
 
 
 @pytest.mark.slow
