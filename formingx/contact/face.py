@@ -112,7 +112,6 @@ class FaceContact:
         return (self._base + self._rate * control) * self._way
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
-        """Change of `positions` by one of the unknowns (locally owned entries) and of the control, length."""
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
@@ -134,7 +133,6 @@ class FaceContact:
 
     @property
     def scale(self) -> np.ndarray:
-        """Factor of the tractions in the forces of F, shape (n,)."""
         return self._scale
 
     @property
@@ -155,7 +153,6 @@ class FaceContact:
         self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
 
     def leave_out(self, points: np.ndarray) -> None:
-        """Keep some points (a mask, shape (n,)) open until another increment begins."""
         law: Any = self.law                                  # see `ContactLaw`
         self.increment = Increment(law.without(points), self.touch)
 

@@ -71,7 +71,6 @@ class Increment:
 
     @property
     def arrivals(self) -> np.ndarray:
-        """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
         if self._touched is None:
             return np.zeros(len(self._now[0]), dtype=bool)
         return self._law.touching(self._now[0], self._touch) & ~self._touched
@@ -82,7 +81,6 @@ class Increment:
         return self._law.theta
 
     def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the forces and stiffnesses per area that `linearise` has taken, of m points: (m, c), (m, c, c)."""
         return self._now[1].force[points], self._now[1].stiffness[points]
 
     def foretold(self, by: np.ndarray) -> Tractions:
@@ -90,17 +88,11 @@ class Increment:
         return self.ahead(slice(None))(by)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
-        """Return a function that maps a motion of m points, shape (m, c), length, to their tractions."""
         touch = self._touch and Touch(*(part[points] for part in self._touch))
         law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
         return lambda by: law.tractions(x, touch, None, there(by))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return a function that maps motions of m points, shape (m, c), to their depth and path in the ramp.
-
-        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
-        (m, c), length. It is 0 where friction does not grow in the ramp: without friction, and on adhering points.
-        """
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
         before = Motion(*(part[points] for part in self._before))
@@ -117,7 +109,6 @@ class Increment:
         return lambda by: before.to(x + by)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
-        """Set the sense in which points (a mask, shape (n,)) begin to slide in the next iteration."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property

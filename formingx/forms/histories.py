@@ -10,7 +10,7 @@ from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
-    """Histories of a problem, in the order contact, materials, heat.
+    """Histories of a problem, in the order contact, materials, heat; see `formingx.solve.equations`.
 
     Attributes:
         forms: the `Formulation`.
@@ -42,7 +42,6 @@ class Histories:
 
     @property
     def has_history(self) -> bool:
-        """True if the residual depends on more than x and control."""
         return bool(self.histories)
 
     @property
@@ -76,14 +75,6 @@ class Histories:
         self.forms.clock = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a control, for the present step data.
-
-        Args:
-            control: dimensionless control.
-
-        Returns:
-            Process time.
-        """
         return self.forms.time_at(control)
 
     @property
@@ -98,12 +89,6 @@ class Histories:
             history.put(remembered)
 
     def advance(self, x: np.ndarray, control: float) -> None:
-        """Update the history variables to an accepted state.
-
-        Args:
-            x: unknowns of the state, locally owned entries, shape (n,).
-            control: control of the state.
-        """
         if self.forms.histories:
             self.look_at(x, control)
         known = self._predicted[1] if self._predicted[0] is x else []

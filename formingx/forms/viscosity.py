@@ -12,7 +12,7 @@ from .. import _compat
 
 
 class Viscosity:
-    """Viscous nodal forces eta V dx for a change dx of the unknowns.
+    """Viscous nodal forces eta V dx for a change dx of the unknowns; see `formingx.solve.equations`.
 
     Constrained unknowns neither cause nor receive forces.
 
@@ -30,15 +30,6 @@ class Viscosity:
         self._entries = self._matrix.getValuesCSR()
 
     def forces(self, change: np.ndarray, eta: float) -> np.ndarray:
-        """Return the viscous nodal forces eta V dx.
-
-        Args:
-            change: change dx of the unknowns, locally owned entries, shape (n,).
-            eta: viscosity factor.
-
-        Returns:
-            Forces, locally owned entries, shape (n,).
-        """
         found, n = np.zeros_like(change), len(self._rows)
         self._change.array_w[:] = change[:n]
         self._matrix.mult(self._change, self._forces)
@@ -46,17 +37,10 @@ class Viscosity:
         return found
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent.
-
-        Args:
-            tangent: PETSc matrix.
-            eta: viscosity factor.
-        """
         pointers, columns, values = self._entries
         tangent.setValuesIJV(pointers, columns, eta * values, PETSc.InsertMode.ADD_VALUES, self._rows)
         tangent.assemble()
 
     def destroy(self) -> None:
-        """Free the PETSc objects (collective)."""
         for item in (self._matrix, self._change, self._forces):
             item.destroy()

@@ -36,6 +36,8 @@ from .units import Units
 class Problem(Stages, Units):
     """Residual, tangent and derivative with respect to the control of a scene.
 
+    `formingx.solve.equations` describes the members that the solver calls.
+
     Args:
         scene: the `Scene`.
 
@@ -82,12 +84,10 @@ class Problem(Stages, Units):
 
     @property
     def has_kinks(self) -> bool:
-        """True if F may have kinks at a state, where the tangents ahead and behind differ (see `tangent`)."""
         return bool(self.present)
 
     @property
     def active_set(self) -> Any:
-        """Active set of the last residual as a hashable value, the same on all ranks; None without contact."""
         status = tuple(c.increment.status.tobytes() for c in self.present)
         return tuple(self.comm.allgather(status)) if self.present else None
 
@@ -97,28 +97,9 @@ class Problem(Stages, Units):
         return self.forms.temperature
 
     def examine(self, last: Any, attempt: Any) -> Examination:
-        """Examine the last good state and a failed attempt; collective.
-
-        Args:
-            last: the last good state, or None.
-            attempt: the failed attempt, or None.
-
-        Returns:
-            The examination.
-        """
         return Examination(self, last, attempt)
 
     def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
-        """Activate an item of the scene without history.
-
-        Args:
-            number: number of the item in `Scene.items`.
-            x: unknowns, locally owned entries, shape (n,).
-            control: dimensionless control.
-
-        Raises:
-            InputError: a tool would be activated inside the body.
-        """
         for contact in self.contacts:
             if contact.contact is self.scene.items[number]:
                 contact.come_in(x, control)
@@ -140,13 +121,6 @@ class Problem(Stages, Units):
         return points if preformed is None else preformed.followed(self, points)
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        """Compute the residual F(x, control); sets `force_scale`.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-            out: vector that receives F.
-        """
         stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self._n]
         values = self._forces(fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
@@ -270,22 +244,10 @@ class Problem(Stages, Units):
         return self.admissible.inside_out()
 
     def begin(self, old: Any = None) -> None:
-        """Prepare the contacts for Newton's method from a guess ahead of a state.
-
-        Args:
-            old: the state, or None.
-        """
         for contact in self.present:
             contact.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Prepare an iteration: linearise the contacts, and adapt the residual to the linearisation.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-            F: residual at x, changed in place.
-        """
         if self.contacts:
             values = F.array_r[: self._n].copy()
             for contact in self.present:
@@ -294,26 +256,11 @@ class Problem(Stages, Units):
             F.array_w[: self._n] = values
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """Assemble the tangent dF/dx.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-            ahead: True for the derivative towards the next step, where F has a kink at an accepted state.
-
-        Returns:
-            `matrix` with new values.
-        """
         self.set_state(x, control)
         fields = x.array_r[: self._n]
         return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
 
     def viscosity(self) -> Viscosity:
-        """Return the viscosity of the body with its present constraints; the caller destroys it.
-
-        Returns:
-            The viscosity.
-        """
         return Viscosity(self._viscosity, self._stage.active.bcs)
 
     @cached_property
@@ -321,17 +268,6 @@ class Problem(Stages, Units):
         return StepError(self)
 
     def step_error(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        """Estimate the time integration error of a step; see `StepError.estimate`.
-
-        Args:
-            past: k accepted states; the step begins at the last of them.
-            share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
-            x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: control at the end of the step.
-
-        Returns:
-            Error at the end of the step, and the part that persists after another step of this length.
-        """
         return self._step_error.estimate(past, share, x, control)
 
     @cached_property
@@ -339,26 +275,9 @@ class Problem(Stages, Units):
         return self.forms.compile(self.forms.viscosity())
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
-        """Return the difference between the tangent `ahead` and the last tangent for each active contact.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-
-        Returns:
-            Changes of the element matrices of each active contact.
-        """
         return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.present]
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
-        """Compute dF/dcontrol.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-            out: vector that receives the derivative.
-            ahead: see `tangent`.
-        """
         self.set_state(x, control)
         values = self._tangent.by_control(self.setting.rate, self.assemble, self._n)
         for contact in self.present:

@@ -39,7 +39,7 @@ class _Stage(NamedTuple):
 
 
 class Stages(Vectors):
-    """Equations of a problem for changing step data.
+    """Equations of a problem for changing step data; see `formingx.solve.equations`.
 
     Attributes:
         scene: the `Scene`.
@@ -57,13 +57,6 @@ class Stages(Vectors):
     _stage: Any
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        """Compute the residual F(x, control); sets `force_scale`.
-
-        Args:
-            x: unknowns.
-            control: dimensionless control.
-            out: vector that receives F.
-        """
         raise NotImplementedError
 
     @cached_property
@@ -77,12 +70,10 @@ class Stages(Vectors):
 
     @property
     def symmetric(self) -> bool:
-        """True if the tangent is symmetric, that is if all loads, contacts and materials are."""
         return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
 
     @property
     def setting(self) -> StepData:
-        """Step data of the present stage."""
         return self._stage.setting
 
     @property
@@ -92,7 +83,6 @@ class Stages(Vectors):
 
     @property
     def held(self) -> np.ndarray:
-        """Local numbers of the locally owned unknowns that are constrained in the present stage."""
         return self._stage.active.dofs[self._stage.active.owned]
 
     @property
@@ -179,16 +169,6 @@ class Stages(Vectors):
         return multipliers
 
     def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
-        """Set the step data: the equations then have (x, control) on their path.
-
-        Constrained unknowns keep their values in x; driven ones have these values at this control. Fading removes the
-        unbalanced forces at (x, control).
-
-        Args:
-            setting: the step data.
-            x: unknowns, locally owned entries, shape (n,).
-            control: dimensionless control.
-        """
         before = self._stage
         if before is not None and setting == before.setting:
             return

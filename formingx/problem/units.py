@@ -13,7 +13,7 @@ from ..scene.scene import Scene
 
 
 class Units:
-    """Units of a problem for its present step data.
+    """Units of a problem for its present step data; see `formingx.solve.equations`.
 
     Attributes:
         scene: the `Scene`.
@@ -25,26 +25,16 @@ class Units:
 
     @property
     def setting(self) -> StepData:
-        """Step data of the present stage."""
         raise NotImplementedError
 
     @property
     def why_not_finite(self) -> str:
-        """Possible reasons for a residual that is not finite, as text."""
         limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
                   for m in self.scene.materials.values() if m.largest_I1 < np.inf}
         strained = limits or ["a material was strained beyond what its law allows"]
         return ", or ".join(["an element turned inside out", *strained])
 
     def shown(self, control: float) -> tuple[str, float]:
-        """Return the controlled quantity at a control in the user's units.
-
-        Args:
-            control: dimensionless control.
-
-        Returns:
-            Name of the quantity and its value.
-        """
         number, items = self.setting.leading, self.scene.items
         if number is None:
             return "control", control
@@ -52,35 +42,23 @@ class Units:
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
-        """Return the reason why no process reaches a control.
-
-        Args:
-            control: dimensionless control.
-
-        Returns:
-            The reason as text, or None.
-        """
         return beyond_all(self.scene, self.drives, self.shown(control)[1])
 
     @property
     def drives(self) -> str | None:
-        """Kind of the control: "pressure", "travel", "time", or None for another one."""
         number, items = self.setting.leading, self.scene.items
         return None if number is None else "time" if number == len(items) else items[number].quantity
 
     @property
     def fixed_loads(self) -> list[str]:
-        """Loads with a fixed value, which act from the start, as text."""
         return [repr(load) for load in self.scene.loads if not load.driven]
 
     @property
     def main_columns(self) -> list[str]:
-        """Columns that describe a state in one line."""
         return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
 
     @property
     def scales(self) -> Sequence[float]:
-        """For each item of the scene, its value in the user's units over its amplitude; last, 1.0 for the time."""
         return self.forms.scales
 
     @property

@@ -15,7 +15,7 @@ from ..forms.histories import Histories
 
 
 class Vectors(Histories):
-    """Vectors of unknowns of a problem, and its fields.
+    """Vectors of unknowns of a problem, and its fields; see `formingx.solve.equations`.
 
     Attributes:
         comm: MPI communicator.
@@ -53,12 +53,6 @@ class Vectors(Histories):
         return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Compute the vector out with out . b = inner(a, b) for all b.
-
-        Args:
-            a: vector of unknowns.
-            out: vector that receives the product.
-        """
         self.fill(out, self._metric * a.array_r[: self._n])
 
     def place(self, x: np.ndarray) -> None:
@@ -73,13 +67,6 @@ class Vectors(Histories):
         self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
-        """Set a vector to a state near the reference configuration with a regular tangent.
-
-        The first direction of a path is computed there.
-
-        Args:
-            out: vector that receives the state.
-        """
         self.forms.set_stiff()
         self.fill(out, self.forms.w.x.array[: self._n])
 

@@ -1,6 +1,8 @@
 """Interfaces through which the solver sees a problem, F(x, control) = 0; it uses nothing else.
 
-x and the control are dimensionless; the rows of x are distributed over the ranks. The calls of a step, in order:
+In all members x is the vector of unknowns, and the control a number; both are dimensionless. The rows of x are
+distributed over the ranks; an array holds the locally owned entries, shape (n,). `out` is a vector that receives the
+result. The calls of a step, in order:
 
     limit.length, limit.prepare         Limit the step length. Prepare the contacts.
     begin                               Start Newton's method at the predicted state.
@@ -29,6 +31,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..contact.step_limit import StepLimit
+from ..forms.history import ConstitutiveHistory
 from ..forms.schedule import StepData
 
 Array: TypeAlias = npt.NDArray[Any]
@@ -199,17 +202,21 @@ class Residual(Protocol):
 
     @property
     def symmetric(self) -> bool:
-        """True if dF/dx is."""
+        """True if dF/dx is symmetric."""
         return False
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """out = F(x, control); sets `force_scale`."""
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """Compute dF/dx in `matrix`; `ahead`: on the far side of an accepted state, if F has a kink there."""
+        """Compute dF/dx in `matrix`, and return it.
+
+        Args:
+            ahead: True for the derivative towards the next step, where F has a kink at an accepted state.
+        """
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
-        """out = dF/dcontrol."""
+        """out = dF/dcontrol; `ahead`: see `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Product of two changes of x in a metric that knows neither mesh nor units: it measures arc length."""
@@ -222,7 +229,7 @@ class Residual(Protocol):
         return False
 
     def viscosity(self) -> Viscosity:
-        """Return the viscosity of a snap-through; to be destroyed."""
+        """Return the viscosity of a snap-through; the caller destroys it."""
 
     @property
     def slack_at_rest(self) -> bool:
@@ -266,10 +273,10 @@ class ActiveSet(Protocol):
         return None
 
     def begin(self, old: Standing | None = None) -> None:
-        """Newton's method begins at a guess ahead of a state (None: of none)."""
+        """Prepare the contacts for Newton's method from a guess ahead of a state (None: of no state)."""
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Ready the tangent at (x, control) for an iteration, and F, the residual there, for the solve with it."""
+        """Prepare an iteration: linearise the contacts, and adapt the residual F at (x, control), in place."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
         """Return for each face the stiffness `ahead` less that in the last tangent, shape (n, c, c), stress/length."""
@@ -293,6 +300,11 @@ class Histories(Protocol):
         return False
 
     @property
+    def materials(self) -> Sequence[ConstitutiveHistory]:
+        """Histories of the materials of a body."""
+        return []
+
+    @property
     def body_has_history(self) -> bool:
         """True if F depends on the states before by more than contact."""
         return False
@@ -303,7 +315,7 @@ class Histories(Protocol):
         return False
 
     def advance(self, x: Array, control: float) -> None:
-        """Update the history variables for an accepted state. x: locally owned entries."""
+        """Update the history variables to an accepted state."""
 
     def time_at(self, control: float) -> float:
         """Process time at a control."""
@@ -311,10 +323,16 @@ class Histories(Protocol):
 
     def step_error(self, past: Sequence[Standing], share: Array, x: Array,
                    control: float) -> tuple[float, float]:
-        """Error of the step in time from the last of `past` to (x, control), relative: at its end; its part that
-        persists.
+        """Estimate the time integration error of a step.
 
-        share: of each state, and of the new one, in x half-way in time.
+        Args:
+            past: k accepted states; the step begins at the last of them.
+            share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
+            x: unknowns at the end of the step.
+            control: control at the end of the step.
+
+        Returns:
+            Relative error at the end of the step, and the part that persists after another step of this length.
         """
         return 0.0, 0.0
 
@@ -327,7 +345,11 @@ class Stages(Protocol):
         """Step data: amplitudes of the controls, and inactive items."""
 
     def enter(self, setting: StepData, x: Array, control: float) -> None:
-        """Enter other step data at a state (x, control); x: locally owned entries."""
+        """Set the step data: the equations then have (x, control) on their path.
+
+        Constrained unknowns keep their values in x; driven ones have these values at this control. Fading removes the
+        unbalanced forces at (x, control).
+        """
 
     def restore(self, state: Standing) -> None:
         """Restore the stage data and history variables of an accepted state, to start a step from it."""
@@ -336,10 +358,10 @@ class Stages(Protocol):
         """Return a context in which the problem, with its x and control, is at a state."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
-        """Activate an item (its number in the setting), without history.
+        """Activate an item (its number in the step data) without history.
 
         Raises:
-            InputError: the tool overlaps the body.
+            InputError: a tool would be activated inside the body.
         """
 
 
