@@ -96,7 +96,7 @@ class Increment:
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
         before = Motion(*(part[points] for part in self._before))
-        grows = self._law.has_friction and not self._law.pulls
+        grows = np.reshape(self._law.has_friction and not self._law.pulls and self._law.part(points).sticks, (-1, 1))
 
         def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return before.distance_at(x + by) / width + 0.5, width * grows * before.normal

@@ -292,6 +292,11 @@ class Law(NormalLaw):
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
 
     @property
+    def sticks(self) -> np.ndarray | bool:  # type: ignore[override]
+        """See `ContactLaw.sticks`."""
+        return self.mu >= _STICKS
+
+    @property
     def friction(self) -> np.ndarray:
         """T/N of a point that slides under next to no pressure, shape () or (n,); infinite: it sticks."""
         sticks = np.asarray(self.mu >= _STICKS)
@@ -370,7 +375,7 @@ class Law(NormalLaw):
 
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
-        sticks, k = self.mu >= _STICKS, self.k
+        sticks, k = self.sticks, self.k
         if np.ndim(sticks) == 0 and not sticks:
             limit, grows = self.shear_limit(pressed, self.mu)
             return limit / self.elastic_slip, grows / self.elastic_slip * k * slope

@@ -131,6 +131,11 @@ class ContactLaw:
     pulls: bool = False
     predictable: bool = False
 
+    @property
+    def sticks(self) -> np.ndarray | bool:
+        """True, or a mask of shape (n,), for points that never slide; used only with friction."""
+        return False
+
     def start(self, x: np.ndarray) -> Touch:
         """Return the initial history variables of points at x."""
         raise NotImplementedError

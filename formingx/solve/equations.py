@@ -119,7 +119,7 @@ class Increment(Protocol):
         """Return a function that maps motions of m points to their depth and path in the ramp.
 
         The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
-        (m, c), length; 0 where friction does not grow in the ramp.
+        (m, c), length; 0 for points that slide, adhere or have no friction.
         """
 
     def expect(self, points: Array, sense: Array) -> None:

@@ -35,7 +35,9 @@ class LocalContact:
         most: largest number of points that are solved for together; with more points Newton's method goes on alone.
         few: number of changed points up to which Woodbury's formula costs less than another factorisation.
         iterations: largest number of local iterations.
-        full: number of full corrections, which may cycle. Later corrections stop near the outer edge of the ramp.
+        full: number of full corrections, which may cycle. Later corrections of sticking points stop near the outer edge
+            of the ramp. Others are halved where they increase the residual.
+        halved: largest number of times that a correction is halved; at a kink it would stall.
         stays: a point that would leave the ramp stops at this part of its depth.
         least: depth over the width of the ramp from which on a point may leave.
         behind: depth over the width at which a point that enters the ramp again stops.
@@ -47,6 +49,7 @@ class LocalContact:
     few: int = 3
     iterations: int = 40
     full: int = 8
+    halved: int = 4
     stays: float = 0.1
     least: float = 1e-9
     behind: float = 1e-6
@@ -192,23 +195,35 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
-        y, behind = y0, np.full(len(y0) // self._c, _LOCAL.behind)
+        y, by, behind = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.behind)
+        least, halved = np.inf, _LOCAL.halved
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
         for k in range(_LOCAL.iterations):
             f, S = self._law(laws, y)
             more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
             R = y - y0 + self._C @ more
-            if np.abs(R).max() < accuracy:
+            miss = np.abs(R).max()
+            if miss < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            by = self._within(S - S0, R)
-            if by is None:
+            if miss > least and halved < _LOCAL.halved:
+                by, halved = by / 2, halved + 1
+                y = y + by
+                continue
+            least, found = miss, self._within(S - S0, R)
+            if found is None:
                 return None
-            y = y - by if k < _LOCAL.full else self._to_foot(ramps, y, y - by, behind)
+            new = y - found
+            if k >= _LOCAL.full:
+                new, stopped = self._to_foot(ramps, y, new, behind)
+                halved = _LOCAL.halved if stopped else 0
+            y, by = new, y - new
         return None
 
-    def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> Array:
-        """Return the motions `new`, after y, stopped at the outer edge of the ramp; `behind` grows where points enter.
+    def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> tuple[Array, bool]:
+        """Return the motions `new`, after y, stopped at the outer edge of the ramp, and True if a point was stopped.
+
+        `behind` grows where points enter.
 
         The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero next to its outer edge. A
         point that is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot
@@ -218,7 +233,8 @@ class _Points:
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
         at = np.where(leaves, _LOCAL.stays * np.minimum(was, 1.0), np.where(enters, np.minimum(now, behind), now))
         behind[enters] *= _LOCAL.farther
-        return new + ((at - now)[:, None] * way).ravel()
+        stops = (at - now)[:, None] * way
+        return new + stops.ravel(), bool(stops.any())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
         """Return solutions V, locally owned rows, shape (n, m), for changed stiffnesses per area; None: singular."""
