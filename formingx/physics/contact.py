@@ -292,7 +292,7 @@ class Law(NormalLaw):
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
 
     @property
-    def sticks(self) -> np.ndarray | bool:  # type: ignore[override]
+    def sticks(self) -> np.ndarray | bool:
         """See `ContactLaw.sticks`."""
         return self.mu >= _STICKS
 

@@ -59,6 +59,7 @@ class LaggedFriction(LaggedStick):
     """
 
     tool: Any
+    sticks = False
 
     def __init__(self, tool: Any, mu: float, k: Any, theta: float, elastic_slip: float):
         super().__init__(tool, k, theta, True)

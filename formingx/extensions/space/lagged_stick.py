@@ -44,7 +44,7 @@ class LaggedStick(ContactLaw):
         separates: True if points in tension separate, see `pulling`.
     """
 
-    remembers = pulls = True
+    remembers = pulls = sticks = True
     mu = np.inf
 
     def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):
