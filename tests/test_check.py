@@ -6,12 +6,14 @@ import re
 import numpy as np
 import pytest
 import test_process
-from conftest import ROOT, treloar
+from conftest import ROOT, run_script, treloar
 from scipy.optimize import brentq
 
 import formingx as fx
+from formingx.checks import parallel
 from formingx.checks.scripts import check_script
 from formingx.materials.inflation import Inflated, first_peak
+from formingx.problem.problem import Problem
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}
 
@@ -345,3 +347,30 @@ def test_a_path_is_judged_as_when_its_run_ended(caplog):
     assert all(text in caplog.text for text in said) and any("the tool turns by" in text for text in said)
     path.last.verdict = "the body folds"
     assert [f.severity for f in fx.check(path).findings][0] == "serious"
+
+
+@pytest.mark.parametrize("model", [fx.MixedPressure(), fx.MixedPressure(space="P0"), fx.MixedPressure(space="P1"),
+                                   fx.DisplacementPenalty(eps=1e-2)], ids=["P1dg", "P0", "P1", "penalty"])
+def test_unknowns_are_counted_without_forms(model):
+    scene = treloar((6, 2), fx.Clamped("rim"), model=model)
+    assert parallel.unknowns(scene) == Problem(scene).n_unknowns
+
+
+FEW = """
+import sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from conftest import treloar
+from formingx.checks import parallel
+scene = treloar((6, 1))
+for parallel.PAYS in (100, 300_000):
+    report = fx.check(scene)
+    print(scene.mesh.comm.rank, len(report.findings), report)
+"""
+
+
+def test_ranks_that_save_no_time_are_noted():
+    """On two ranks, below the size from which they pay."""
+    lines = run_script(FEW, ranks=2).splitlines()
+    assert len(lines) == 4 and sum("0 no fault" in line for line in lines) == 2
+    assert sum("1 note: ranks: 2 ranks for " in line for line in lines) == 2

@@ -1,0 +1,36 @@
+"""Check of the number of ranks against the size of the mesh."""
+
+from collections.abc import Iterator
+
+from ..findings import Finding, register
+from ..scene.scene import Scene
+from .sizes import Body
+
+PAYS = 300_000
+"""Number of unknowns from which an iteration on two ranks takes less time than on one (benchmarks/ranks.py)."""
+
+
+def unknowns(scene: Scene) -> int:
+    """Return the number of unknowns, without multipliers and pressures of further layers; collective.
+
+    Args:
+        scene: the scene; of an axisymmetric membrane the solid of its mesh is counted.
+    """
+    topology = scene.mesh.domain.topology
+    topology.create_entities(1)
+    vertices, edges, cells = (topology.index_map(dim).size_global if dim <= topology.dim else 0 for dim in (0, 1, 2))
+    pressure, components = scene.model.pressure if scene.model.solid else None, scene.kinematics.components
+    if pressure is None:
+        return int(components * (vertices + edges))
+    per_field = vertices if pressure.continuous else cells * (1 + 2 * pressure.degree)
+    return int(components * (vertices + edges + cells * pressure.bubble) + per_field)
+
+
+@register("start")
+def _ranks(body: Body) -> Iterator[Finding]:
+    """Report ranks that save no time."""
+    size, number = body.scene.mesh.comm.size, unknowns(body.scene)
+    if size > 1 and number < PAYS:
+        yield Finding("note", "ranks", f"{size} ranks for {number} unknowns: below {PAYS} an iteration on two ranks"
+                      " takes as long as on one (benchmarks/ranks.py); run several scenes side by side instead, by"
+                      " fx.study(workers=...)")
