@@ -25,7 +25,7 @@ from formingx.solve.arc_length import Curve  # noqa: E402
 from formingx.solve.linear import DirectSolver  # noqa: E402
 
 SIZES = {"inflation": [(20, 1), (40, 2), (80, 4)], "cup": [(30, 1), (60, 2)]}
-LARGE = {"inflation": [(160, 8), (320, 16), (1000, 55)], "cup": []}
+LARGE = {"inflation": [(160, 8), (320, 16), (1000, 55)], "cup": [(120, 4), (240, 8)]}
 
 
 def inflation(elements):
@@ -85,8 +85,9 @@ def measure(case, elements, profile=None):
     tangent, factors, _ = (np.mean(calls[1:]) for calls in linear)                  # the first one is set-up
     solves = np.median(linear[2])                           # contact points that settle have more columns
     n = path.counts.iterations
-    return {"unknowns": path.problem.n_unknowns, "states": len(path), "iterations": n, "set-up": setup,
-            "path": spent_on_path, "tangent": tangent, "factors": factors, "two solves": solves,
+    return {"unknowns": path.problem.n_unknowns, "states": len(path), "failed": path.counts.failures, "iterations": n,
+            "set-up": setup, "path": spent_on_path, "tangent": tangent, "factors": factors, "two solves": solves,
+            "all solves": sum(linear[2]),
             "look ahead": sum(ahead) / len(path), "ratio": spent_on_path / (n * (tangent + factors + solves))}
 
 
@@ -94,12 +95,15 @@ def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--quick", action="store_true", help="the smallest of each")
     options.add_argument("--large", action="store_true", help="1e5 and 1e6 unknowns, too (minutes)")
+    options.add_argument("--case", choices=SIZES, help="one of them alone")
     options.add_argument("--profile", action="store_true", help="where the time goes")
     options.add_argument("--out", type=Path, default=Path("results/limit"))
     args = options.parse_args()
     results, head = [], f"{'':12}{'elements':>10}"
     for case in (inflation, cup):
         name = case.__name__
+        if args.case not in (None, name):
+            continue
         measure(case, (10, 1))                              # imports and forms
         for elements in SIZES[name][:1 if args.quick else None] + LARGE[name] * args.large:
             profile = cProfile.Profile(time.process_time) if args.profile else None
