@@ -26,7 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: command line arguments; default those of the process.
+        arguments: command line arguments; default the arguments of the process.
 
     Returns:
         The exit status: 0, or 2 for an argument that is not allowed.

@@ -45,7 +45,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     Args:
         scene: scene with one controlled load, support or tool.
         until: target that ends the run, such as `pole_stretch(8.5)`; it is met exactly.
-        intermediate: further targets to be met exactly; those that do not occur are skipped.
+        intermediate: further targets to be met exactly; a target that does not occur is skipped.
         step: step control; default `StepControl()`.
         tolerances: convergence criteria; default `Tolerances()`.
         max_steps: largest number of accepted states. Default: the run gives up when it comes no nearer to its target.

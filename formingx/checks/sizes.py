@@ -169,7 +169,7 @@ class PressurisedFace:
         return points, np.where(found, points + np.where(found, distance, 0.0) * directions, np.inf)
 
     def peak(self) -> Peak | None:
-        """Return the state of the free sheet at its maximum pressure, or None if there is none or it is unknown."""
+        """Return the state of the free sheet at its maximum pressure; None if there is none or it is unknown."""
         materials = self._body.scene.materials
         if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
@@ -177,9 +177,14 @@ class PressurisedFace:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def pressure_drop(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return (ratio, peak) of a free tube, or None if its pressure has no peak below a blow ratio.
+        """Return the drop of the pressure of a free tube behind its limit point.
 
-        The ratio is the smallest pressure between the peak and the blow ratio, over the peak pressure.
+        Args:
+            blow_ratio: largest stretch of the tube, mould over parison radius.
+
+        Returns:
+            The smallest pressure between the limit point and the blow ratio, over the pressure at the limit point, and
+            the state there. None if there is no limit point below the blow ratio.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -346,7 +351,7 @@ def _tool_paths(body: Body) -> Found:
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> float:
-    """Return the smallest gap between faces and tools at a travel, length."""
+    """Return the smallest gap between tools and nodes of their faces after a travel along a direction, length."""
     return min(float(-tool.signed_distance(nodes - travel * np.array(moves)).max()) for tool, nodes in faces)
 
 

@@ -165,11 +165,11 @@ class Body:
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
     def _strain_rate(self, s: float) -> np.ndarray:
-        """Return dw/ds without relaxation, flattened."""
+        """Return the derivative of the elastic strains by s without relaxation, flattened."""
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _flow(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """Return dw/dt, flattened."""
+        """Return the time derivative of the elastic strains, flattened."""
         return self._strain_rate(s) * ds - self._relaxing(w).ravel()
 
     def _relaxing(self, w: np.ndarray) -> np.ndarray:
@@ -178,7 +178,7 @@ class Body:
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 
     def _time_per_s(self, s: float, w: np.ndarray) -> float:
-        """Return dt/ds under a constant load."""
+        """Return the derivative of time by s under a constant load."""
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])

@@ -302,8 +302,17 @@ def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
     """Return the mesh of triangles on rows and columns of nodes.
 
-    The diagonals alternate in each layer as on a chessboard. `sides` are the names of left, right, bottom and top. For
-    place, ends and fixed see `Columns`.
+    The diagonals alternate in each layer as on a chessboard.
+
+    Args:
+        kind: name of the body, for messages.
+        place: see `Columns`.
+        ends: see `Columns`.
+        fixed: see `Columns`.
+        layers: names of the layers.
+        through: ends of the elements through each layer on [0, 1].
+        sides: names of the boundaries left, right, bottom and top.
+        comm: MPI communicator.
     """
     points = place(with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])

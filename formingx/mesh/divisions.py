@@ -132,7 +132,7 @@ def _layer_ends(kind: str, given: Any) -> np.ndarray:
 
 
 def is_row(values: Any) -> bool:
-    """Return True for a list, a tuple or an array."""
+    """Return True for a list, a tuple or a one-dimensional array."""
     return isinstance(values, tuple | list) or isinstance(values, np.ndarray) and values.ndim == 1
 
 

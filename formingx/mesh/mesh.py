@@ -106,8 +106,7 @@ class Mesh:
             along: the coordinate, "r" or "z".
 
         Raises:
-            InputError: `of` is unknown, `name` is not new, or no facet lies between the coordinates. One lies there
-                partly.
+            InputError: `of` is unknown, `name` is not new, no facet lies between the coordinates, or a facet is cut.
         """
         from dolfinx.mesh import meshtags
         caller = f"with_part({name!r}, {of!r})"

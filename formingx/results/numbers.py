@@ -17,7 +17,7 @@ def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
         points: all points of the body, shape (n, coordinates), length.
 
     Returns:
-        The coordinates; 0 replaces those of at most 1e-12 times the extent of `points`.
+        The coordinates. Values below 1e-12 times the extent of `points` are set to 0.
     """
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 

@@ -38,7 +38,7 @@ class Line(NamedTuple):
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Directions of travel at both ends, radians."""
+        """Angle between the line and the R axis at its first and last point (both equal), radians."""
         angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
         return angle, angle
 
@@ -72,7 +72,7 @@ class Arc(NamedTuple):
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Directions of travel at both ends, radians."""
+        """Angle between the tangent and the R axis at the first and the last point, radians."""
         quarter = math.copysign(math.pi / 2, self.sweep)
         return self.start + quarter, self.start + self.sweep + quarter
 

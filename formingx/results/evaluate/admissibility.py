@@ -60,7 +60,7 @@ class Depth(NamedTuple):
     """Penetration of a body into a tool.
 
     Attributes:
-        share: depth over the allowed depth.
+        ratio: depth over the allowed depth.
         depth: penetration depth, length.
         place: deformed position, shape (2,) or (3,), length.
         contact: the `FaceContact`.

@@ -88,7 +88,7 @@ class ContactFace:
         return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed over reference area at the nodes, the mean of the adjacent edges.
+        """Return deformed over reference area at each contact point; between two edges the mean of both.
 
         Args:
             points: deformed positions of the contact points, shape (n, 2), length.

@@ -80,7 +80,12 @@ class Patches:
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, some: slice, points: np.ndarray) -> np.ndarray:
-        """Return the monomials at points (cells, ..., 2), shape (cells, ..., 10)."""
+        """Return the ten monomials of a cubic for some of the patches, shape (cells, ..., 10).
+
+        Args:
+            some: numbers of the patches.
+            points: points of each patch, shape (cells, ..., 2).
+        """
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[some][between]) / self._size[some][between]
         powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)

@@ -194,7 +194,7 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return unit vectors, shape (n, 2)."""
+    """Return vectors scaled to unit length, shape (n, 2)."""
     return vectors / np.hypot(*vectors.T)[:, None]
 
 

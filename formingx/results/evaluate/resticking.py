@@ -61,7 +61,14 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return the shift of each locally owned point over its tributary length, shape (n,)."""
+    """Return for each locally owned point the distances between successive sticking positions, summed, shape (n,).
+
+    They are divided by the tributary length of the point.
+
+    Args:
+        contact: the `FaceContact`.
+        touches: history variables of its points in successive states.
+    """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
     for touch in touches:

@@ -14,13 +14,13 @@ _WALL = 0.05
 
 
 class Snap(NamedTuple):
-    """The snap-through of a run in which the wall changed most.
+    """Snap-through of a run in which the wall changed most.
 
     Attributes:
-        jumps: number of jumps in the run.
-        state: number of the state after the jump, in the path.
-        before: wall over original thickness before the jump, where it changed most.
-        after: wall over original thickness at the same place after the jump.
+        jumps: number of snap-throughs in the run.
+        state: number of the state after this one, in the path.
+        before: wall over original thickness before it, where the wall changed most.
+        after: wall over original thickness after it, at the same place.
         point: reference radius of this place, length.
     """
 
@@ -37,10 +37,13 @@ class Snap(NamedTuple):
 
 
 def largest(path: Any) -> Snap | None:
-    """Return the largest jump of a path with friction or a viscoelastic material; collective.
+    """Return the snap-through of a path in which the wall changed most; collective.
+
+    Only paths with friction or a viscoelastic material are examined. There the state after a snap-through depends on
+    the history.
 
     Returns:
-        The jump, or None if there was none or the body has no wall.
+        The snap-through, or None if there was none or the body has no wall.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:

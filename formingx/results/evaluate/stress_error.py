@@ -33,17 +33,22 @@ class StressError(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """Root mean square of |sigma* - sigma_h| in each cell, shape (n,), stress."""
+        """Root mean square, in each cell, of the difference between fitted and computed stress, shape (n,), stress."""
         return self.cells / np.sqrt(self.volume)
 
     @property
     def total(self) -> float:
-        """Root of the integral of |sigma* - sigma_h|^2 over all cells, stress * volume^(1/2)."""
+        """Root of the integral over all cells of the squared difference between fitted and computed stress.
+
+        Its unit is stress * volume^(1/2).
+        """
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
-        """`total` over the root of the integral of |sigma_h|^2 + |sigma* - sigma_h|^2; 0 without stress."""
+        """Relative error of the stress: `total` over the same root for computed stress and error together; 0 without
+        stress.
+        """
         whole = np.hypot(np.linalg.norm(self.stress), self.total)
         return float(self.total / whole) if whole > 0 else 0.0
 

@@ -1,9 +1,9 @@
 """Checkpoints: a folder with every accepted state of a run, from which it can continue on any number of ranks.
 
-    run/scene.json        description of the scene, and versions
-    run/0000/state.json   numbers of the state, and checksums
-    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, history variables
-    run/end.json          how the run ended, and its findings; missing while it runs, or if it was killed
+    run/scene.json        description of the scene, and versions.
+    run/0000/state.json   numbers of the state, and checksums.
+    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, history variables.
+    run/end.json          how the run ended, and its findings; missing while it runs, or if it was killed.
 
 A state is written under a temporary name and then renamed. So a state with its final name is complete, even if the run
 is killed. Fields and history variables are stored in the order of the cells in the script's mesh. This order does not

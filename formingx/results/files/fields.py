@@ -1,24 +1,23 @@
 """Fields of states on the whole body, as VTK's XML files for ParaView. Rank 0 writes.
 
-Every triangle has six nodes of its own, so nothing is averaged over an interface. The fields:
+Every triangle has six nodes of its own, so nothing is averaged over an interface. The fields are:
 
-    displacement            (u_r, u_z), in three dimensions (u_x, u_y, u_z), length
-    stretches               the larger and the smaller in the section, and the hoop stretch
-                            (`Stress.principal_stretches`)
-    principal_stresses      principal Cauchy stresses, from the largest to the smallest, stress
-    cauchy_rr, _zz, _rz, _hoop  components of the Cauchy stress, stress
-    hydrostatic_pressure    minus a third of its trace, stress
-    stress_error            its estimated error, constant in each triangle (`StressError.mean`), stress
-    elastic_stretch_1, _2   larger principal stretch of the elastic part of F in each relaxing branch (see below)
-    contact_pressure        normal traction per deformed area of all tools, stress; less accurate at the two nodes
-                            nearest the axis, which share their areas
-    thickness, thickness_ratio  thickness of a sheet at this place
+    displacement            (u_r, u_z), in three dimensions (u_x, u_y, u_z), length.
+    stretches               larger and smaller stretch in the section, hoop stretch (`Stress.principal_stretches`).
+    principal_stresses      principal Cauchy stresses in descending order, stress.
+    cauchy_rr, _zz, _rz, _hoop  components of the Cauchy stress, stress.
+    hydrostatic_pressure    minus a third of its trace, stress.
+    stress_error            estimated error, constant in each triangle (`StressError.mean`), stress.
+    elastic_stretch_1, _2   larger principal stretch of the elastic part of F in each relaxing branch, see below.
+    contact_pressure        normal traction per deformed area of all tools, stress.
+    thickness, thickness_ratio  thickness of a sheet at this place, length, and over its original thickness.
 
-The elastic stretch is the larger root of the eigenvalues of F Cv^-1 F^T in the section, for a `TransientNetwork` of F A
-F^T, without volume change. It is 1 if the branch has relaxed, and the largest stretch if it has not relaxed at all. It
-is linear in each triangle, and nan in layers without such a branch.
+The square of the elastic stretch is the larger eigenvalue of F Cv^-1 F^T in the section, without volume change. For a
+`TransientNetwork` it is the larger eigenvalue of F A F^T. The elastic stretch is 1 if the branch has relaxed, and the
+largest stretch if it has not relaxed at all. It is linear in each triangle, and nan in layers without such a branch.
 
-A membrane has displacement and thickness only.
+The contact pressure is less accurate at the two nodes nearest the axis, which share their areas. A membrane has
+displacement and thickness only.
 """
 
 from functools import partial

@@ -275,7 +275,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """Return the temperature at the nodes of profiles, from the history variables in a checkpoint."""
+    """Return for each state {"temperature": values at the nodes of the last profile}, shape (m,), from a checkpoint."""
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     numbers = None
     for values, state in zip(found, states):

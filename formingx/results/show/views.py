@@ -17,9 +17,14 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """Draw the sheet revolved about the axis by three quarters as a PNG, coloured by thickness ratio (rank 0 draws).
+    """Draw three quarters of the sheet of revolution as a PNG, coloured by thickness ratio (rank 0 draws).
 
     A sheet that is more than twice as high as wide, such as a parison, is cut along the middle.
+
+    Args:
+        profile: the `Profile`.
+        file: the picture.
+        comm: MPI communicator.
 
     Raises:
         InputError: there is neither a screen nor Xvfb.
@@ -35,6 +40,11 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
     """Draw a sheet in plane strain as a long part as a PNG, coloured by thickness ratio (rank 0 draws).
 
     A half sheet, which begins at R = 0, is completed by its mirror image. The part is 1.5 times as long as wide.
+
+    Args:
+        profile: the `Profile`.
+        file: the picture.
+        comm: MPI communicator.
 
     Raises:
         InputError: there is neither a screen nor Xvfb.
