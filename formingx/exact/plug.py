@@ -228,24 +228,36 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
 
 
 def _tensions(t: float, l2: float) -> tuple[float, float]:
-    """Return the meridional stretch and T2 for T1 = t; tensions over 2 c10 h0."""
+    """Return the meridional stretch and the tension T2, for a given T1 and circumferential stretch.
+
+    Tensions are over 2 c10 h0.
+    """
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
 def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
-    """Return y = (R, r, z, phi, T1) at a distance from a given y; lengths over the radius, tensions over 2 c10 h0."""
+    """Return the state (R, r, z, phi, T1) at a distance from a given one.
+
+    Lengths are over the radius, tensions over 2 c10 h0.
+    """
     return y if length == 0 else _integrated(length, y, slopes).y[:, -1]
 
 
 def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
-    """Return the solution of `solve_ivp` that starts at y."""
+    """Return the solution of `solve_ivp` over a length, from the state y."""
     from scipy.integrate import solve_ivp
     return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 
 
 def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
-    """Return the function dy/ds on the rounded edge, or, without a fillet, on the side of the plug."""
+    """Return the function that gives the derivative of (R, r, z, phi, T1) by arc length where the membrane touches.
+
+    Args:
+        mu: coefficient of friction.
+        h0: reference thickness.
+        fillet: radius of the edge; infinite on the side of the plug.
+    """
     def slopes(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
         half = h0 * R / (l1 * r) / 2                        # half of the thickness
@@ -256,6 +268,6 @@ def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
 
 
 def _free(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
-    """Return dy/dR on the free part of the membrane."""
+    """Return the derivative of (R, r, z, phi, T1) by R on the free part of the membrane."""
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

@@ -81,7 +81,9 @@ class Depth(NamedTuple):
 
 
 class AdmissibilityCheck:
-    """Admissibility check of the states of one problem.
+    """Check whether a body can have the states of one problem.
+
+    Inadmissible are, for example, inverted elements, a face inside a tool, or forces that penetration falsifies.
 
     Args:
         problem: the discretised problem.

@@ -114,9 +114,9 @@ class StressField:
     def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
         """Estimate the error of the stresses at the quadrature points, per cell and in total; collective.
 
-        The error is the difference between the computed stress and the stress from the fitted F and S (see the module).
-        The integrals are sums over the quadrature points. For a smooth solution the estimate tends to the true error on
-        refined meshes. At a loaded sharp corner it does not decrease.
+        The error is the difference between the computed stress and a smoother stress, from a fit to patches of cells
+        (see the module). The integrals are sums over the quadrature points. For a smooth solution the estimate tends to
+        the true error on refined meshes. At a loaded sharp corner it does not decrease.
 
         Args:
             layer: name of a layer; default all.
@@ -166,7 +166,7 @@ class StressField:
 
     @cached_property
     def _fitted(self) -> Fitted:
-        """F and S fitted to the patches of all locally owned cells."""
+        """Deformation gradient and stress fitted to the patches of all locally owned cells."""
         return self._recovery.fit(self._state)
 
 
@@ -219,12 +219,18 @@ class Stresses:
         return name
 
     def project(self, state: Any) -> np.ndarray:
-        """Return the nodal values of F and S, shape (nodes, layers, _COUNT), ghosts included; collective."""
+        """Return nodal values of the deformation gradient F and the second Piola-Kirchhoff stress S; collective.
+
+        They are projected on piecewise linear fields, one for each layer.
+
+        Returns:
+            Entries of F and S, shape (nodes, layers, _COUNT), ghosts included.
+        """
         with self.problem.state_context(state):
             return self._projected()
 
     def _projected(self) -> np.ndarray:
-        """Return the L2 projection of F and S in the present state of the problem."""
+        """Return the projected entries of F and S at the nodes, shape (nodes, layers, _COUNT)."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -238,12 +244,12 @@ class Stresses:
         return nodes
 
     def raw(self, state: Any, layer: str) -> Stress:
-        """Return F and S at the quadrature points of a layer, of all ranks; collective."""
+        """Return the stresses as computed at the quadrature points of a layer, of all ranks; collective."""
         points, values, _ = self._at_quadrature(state, layer)
         return _unpack(*(gathered(self.problem.comm, v).reshape(-1, v.shape[-1]) for v in (points, values)))
 
     def fit(self, state: Any) -> Fitted:
-        """Return F and S fitted to their values at the quadrature points; collective."""
+        """Return deformation gradient and stress fitted to their values at the quadrature points; collective."""
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
@@ -281,7 +287,8 @@ class Stresses:
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return quadrature points, F and S, and reference volumes in this rank's m cells of a layer.
+        """Return points, entries of F and S, and reference volumes at the quadrature points of this rank's m cells of a
+        layer.
 
         The shapes are (m, q, 2), (m, q, _COUNT) and (m, q).
         """
@@ -372,7 +379,7 @@ class Stresses:
 
 
 def _cauchy(values: np.ndarray) -> np.ndarray:
-    """Return the Cauchy stress, shape (m, q, 3, 3), from F and S, shape (m, q, _COUNT)."""
+    """Return the Cauchy stress, shape (m, q, 3, 3), from the entries of F and S, shape (m, q, _COUNT)."""
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 

@@ -46,8 +46,9 @@ class StressError(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Relative error of the stress: `total` over the same root for computed stress and error together; 0 without
-        stress.
+        """Relative error of the stress, between 0 and 1; 0 without stress.
+
+        It is `total` over the root of the integral of the squared computed stress and the squared error.
         """
         whole = np.hypot(np.linalg.norm(self.stress), self.total)
         return float(self.total / whole) if whole > 0 else 0.0
@@ -106,10 +107,10 @@ def _show(point: np.ndarray) -> str:
 
 
 class Fitted(NamedTuple):
-    """Fitted F and S of m locally owned cells with q quadrature points each.
+    """Fitted deformation gradient F and second Piola-Kirchhoff stress S of m locally owned cells.
 
     Attributes:
-        points: quadrature points (R, Z), reference positions, shape (m, q, 2), length.
+        points: reference positions (R, Z) of the q quadrature points of each cell, shape (m, q, 2), length.
         volume: reference volumes of the quadrature points, shape (m, q).
         raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
         smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.

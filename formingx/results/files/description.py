@@ -83,7 +83,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return {name: weighted sum over a layer} of functions of a `Sample`; it changes with the value at any point."""
+    """Return {name: sum over a layer} of functions of a `Sample`, weighted so that a change at any point changes it."""
     at = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(at.places)))).ravel()

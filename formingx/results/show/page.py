@@ -83,7 +83,9 @@ def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
 
     Args:
         lines: positive values; empty lines are left out.
-        x: label of the horizontal axis; y: of the vertical axis.
+        x: label of the horizontal axis.
+        y: label of the vertical axis.
+        caption: text below the figure.
     """
     values = [value for line in lines for value in line]
     low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
