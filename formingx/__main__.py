@@ -237,10 +237,10 @@ def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
     Raises:
         InputError: the option has another form.
     """
-    left, equals, right = word.partition("=")
-    if not left or (equals or both) and not right:
+    ours, equals, theirs = word.partition("=")
+    if not ours or (equals or both) and not theirs:
         raise InputError(f"{option} {word!r}: must be {'COLUMN=UNIT or COLUMN=FACTOR' if both else 'OURS=THEIRS'}")
-    return left, right
+    return ours, theirs
 
 
 def _say(text: str) -> None:

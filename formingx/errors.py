@@ -179,8 +179,8 @@ def several(name: str, values: Any, what: str) -> list[Any]:
     Raises:
         InputError: it is not a list, a tuple or another sequence of items.
     """
-    alone = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
-    if not isinstance(values, Iterable) or alone or getattr(values, "ndim", 1) == 0:
+    is_item = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
+    if not isinstance(values, Iterable) or is_item or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
     return list(values)
 
@@ -223,10 +223,10 @@ def direction(name: str, values: Any) -> np.ndarray:
     Raises:
         InputError: they are not three finite numbers, or all 0.
     """
-    way = np.array(triple(name, values))
-    if not way.any():
+    vector = np.array(triple(name, values))
+    if not vector.any():
         raise InputError(f"{name} = {values!r}: must not be 0 in all components")
-    return way / np.linalg.norm(way)
+    return vector / np.linalg.norm(vector)
 
 
 def _finite(name: str, values: Any, n: int, what: str) -> list[float]:

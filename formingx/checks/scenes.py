@@ -72,10 +72,10 @@ def _layers(body: Body) -> Iterator[Finding]:
     bends = scene.contacts or not any(isinstance(s, Symmetry | PrescribedDisplacement) and s.component == 1
                                       for s in scene.supports)
     for name in scene.mesh.layers if bends else ():          # a slice between symmetry planes does not bend
-        mine = body.layer == name
-        depth = body.area[mine].sum() / body.length
-        span = np.ptp(body.corners[mine][:, :, 1], axis=1).max(initial=0.0)
-        if depth > 0.2 * body.length and span > 0.99 * np.ptp(body.corners[mine][:, :, 1]):
+        in_layer = body.layer == name
+        depth = body.area[in_layer].sum() / body.length
+        span = np.ptp(body.corners[in_layer][:, :, 1], axis=1).max(initial=0.0)
+        if depth > 0.2 * body.length and span > 0.99 * np.ptp(body.corners[in_layer][:, :, 1]):
             yield Finding("warning", f"layer {name!r}", f"it is {depth / body.length:.3g} of the body's length thick,"
                                                         f" with one element through it: use two or more")
     hard, soft = (pick(body.moduli, key=body.moduli.__getitem__) for pick in (max, min))
@@ -132,8 +132,8 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
         traction = max([stress * body.thickness / body.length, *presses])
         depth = traction / (contact.penalty * stress)
         if depth > _PENETRATION:
-            why = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
-            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {why}, {traction:.3g}, press"
+            cause = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause}, {traction:.3g}, press"
                           f" the face {100 * depth:.2g} % of the thickness into the tool: use"
                           f" {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
@@ -196,9 +196,9 @@ def _units(body: Body) -> Iterator[Finding]:
 def _targets(body: Body) -> Iterator[Finding]:
     """Report targets that cannot be reached."""
     for target in body.targets:
-        why = unreachable(body.scene, target)
-        if why is not None:                                  # a stage may have made an obstacle inactive
-            yield Finding("serious" if body.scene.driven is not None else "warning", str(target), why)
+        reason = unreachable(body.scene, target)
+        if reason is not None:                                  # a stage may have made an obstacle inactive
+            yield Finding("serious" if body.scene.driven is not None else "warning", str(target), reason)
         is_length = target.name.endswith(("pole_height", "travel")) or target.name.startswith("u_")
         if is_length and abs(target.value) > 20 * body.length:
             yield Finding("warning", str(target), f"that is {abs(target.value) / body.length:.3g} times the length of"

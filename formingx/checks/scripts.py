@@ -87,11 +87,11 @@ def _no_runs() -> Iterator[None]:
                if name.partition(".")[0] == "formingx" and inspect.unwrap(getattr(module, "trace", len)) is inner]
     others: list[Any] = [*((module, "trace", trace) for module in tracing), (formingx, "solve", solve),
                          (runs.Process, "run", run), *((formingx, name, other) for name, other in dry_runs.items())]
-    kept = [getattr(owner, name) for owner, name, _ in others]
+    originals = [getattr(owner, name) for owner, name, _ in others]
     try:
         for owner, name, other in others:
             setattr(owner, name, other)
         yield
     finally:
-        for (owner, name, _), original in zip(others, kept):
+        for (owner, name, _), original in zip(others, originals):
             setattr(owner, name, original)

@@ -274,21 +274,21 @@ def _open_moulds(body: Body) -> Found:
         aims = [aim for aim in body.pressures() if peak is not None and abs(aim.value) > _ABOVE_PEAK * peak.pressure]
         deep = not body.goals and depth > _MOULD_DEPTH * np.ptp(points, axis=0).max()
         if aims or deep:
-            why = "a sheet bears little alone"
+            reason = "a sheet bears little alone"
             if aims and peak:
                 limit = body.format(peak.pressure, "pressure")
-                why = f"{aims[0].text} is more than the {limit} that the sheet bears alone"
+                reason = f"{aims[0].text} is more than the {limit} that the sheet bears alone"
             yield Finding("warning", repr(face.tools[0]),
                           f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
-                          f" {open_at[0, 1]:.4g}) it has no surface, and {why}: the body would be"
+                          f" {open_at[0, 1]:.4g}) it has no surface, and {reason}: the body would be"
                           f" blown past its end. Give the profile a floor to R = 0, or a pole height"
                           f" or a volume as the target")
 
 
 def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray:
     """Return the mean direction in which the pressure pushes points of the opposite face."""
-    away = points.mean(0) - face.line.mean(0)
-    return np.array([0.0, np.sign(away[1])]) if not face.tall else np.array([1.0, 0.0])
+    offset = points.mean(0) - face.line.mean(0)
+    return np.array([0.0, np.sign(offset[1])]) if not face.tall else np.array([1.0, 0.0])
 
 
 @register("start")

@@ -254,11 +254,11 @@ class ThickWallState:
         """
         radial = np.broadcast_to(np.asarray(direction, dtype=float), (len(self.R), 2))
         radial = radial / np.linalg.norm(radial, axis=1)[:, None]
-        along = np.column_stack([-radial[:, 1], radial[:, 0]])
+        tangent = np.column_stack([-radial[:, 1], radial[:, 0]])
         sigma = np.zeros((len(self.R), 3, 3))
         sigma[:, 2, 2] = self.hoop
-        for value, way in ((self.radial, radial), (self.third, along)):
-            sigma[:, :2, :2] += np.einsum("n,ni,nj->nij", value, way, way)
+        for value, unit in ((self.radial, radial), (self.third, tangent)):
+            sigma[:, :2, :2] += np.einsum("n,ni,nj->nij", value, unit, unit)
         return sigma
 
 

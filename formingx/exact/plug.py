@@ -207,11 +207,11 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     edge_length = edge.t[-1]                        # arc length of the edge
 
     def separation_point(u):                              # y at the arc length u of contact
-        return _along(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _touching(mu))
+        return _state_after(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _touching(mu))
 
     def rim_error(u):                            # 0 if the membrane ends at the rim
         y = separation_point(u)
-        return _along(1 - y[0], y, _free)[1] - 1 if y[0] < 1 else 1.0
+        return _state_after(1 - y[0], y, _free)[1] - 1 if y[0] < 1 else 1.0
 
     lengths = np.concatenate([np.linspace(0.01, 1, 30) * edge_length, edge_length + np.linspace(0.01, 3, 60)])
     found = [rim_error(lengths[0])]
@@ -222,7 +222,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         raise InputError(f"face_stretch = {face_stretch!r}: this plug does not draw the membrane so far")
     u = brentq(rim_error, lengths[len(found) - 2], lengths[len(found) - 1], xtol=1e-13)
     _, r, _, phi, t = y = separation_point(u)
-    travel = _along(1 - y[0], y, _free)[2] * radius + thickness * (1 - l0**-2) / 2
+    travel = _state_after(1 - y[0], y, _free)[2] * radius + thickness * (1 - l0**-2) / 2
     force = 4 * np.pi * c10 * thickness * radius * r * t * np.sin(phi)
     return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - edge_length, 0.0) * radius))
 
@@ -236,7 +236,7 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
-def _along(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
+def _state_after(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
     """Return the state (R, r, z, phi, T1) at a distance from a given one.
 
     Lengths are over the radius, tensions over 2 c10 h0.

@@ -34,10 +34,10 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         earlier = target.stat() if target.exists() else None
         if earlier and not stat.S_ISREG(earlier.st_mode):
-            with tempfile.TemporaryFile(f"{mode}+", **options) as whole, open(target, mode, **options) as stream:
-                write(whole)
-                whole.seek(0)
-                shutil.copyfileobj(whole, stream)
+            with tempfile.TemporaryFile(f"{mode}+", **options) as buffer, open(target, mode, **options) as stream:
+                write(buffer)
+                buffer.seek(0)
+                shutil.copyfileobj(buffer, stream)
             return
         with open(temporary, mode, **options) as stream:
             write(stream)

@@ -39,8 +39,8 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
             continue
         a, b = (2 * a[:, None] + (0, 0, 1, 1)).ravel(), (2 * b[:, None] + (0, 1, 0, 1)).ravel()
         lower, upper = tree[level - 1]
-        kept = (a <= b) & np.all((lower[a] <= upper[b]) & (lower[b] <= upper[a]), axis=1)
-        a, b = a[kept], b[kept]
+        pairs = (a <= b) & np.all((lower[a] <= upper[b]) & (lower[b] <= upper[a]), axis=1)
+        a, b = a[pairs], b[pairs]
         waiting += [(level - 1, a[k:k + _CHUNK], b[k:k + _CHUNK]) for k in range(0, len(a), _CHUNK)]
 
 

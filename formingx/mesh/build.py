@@ -100,10 +100,10 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
-    whole = thick.sum()
-    if whole < _FILM_THICKNESS:
+    total = thick.sum()
+    if total < _FILM_THICKNESS:
         return along, [1] * len(layers)
-    bending = _BENDING_ELEMENTS[accuracy] * thick / whole if whole >= _BENDING_THICKNESS else 0.0
+    bending = _BENDING_ELEMENTS[accuracy] * thick / total if total >= _BENDING_THICKNESS else 0.0
     needed = np.ceil(np.maximum(bending, thick * along / _ASPECT_RATIO) - 1e-9)
     return along, np.maximum(usual, needed).astype(int).tolist()
 
@@ -133,15 +133,16 @@ def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]
     Raises:
         InputError: there are fewer elements than intervals between these radii.
     """
-    at, small = np.array(list(sizes)), np.array(list(sizes.values()))
-    ends = np.unique([low, *at, high])
+    radii, small = np.array(list(sizes)), np.array(list(sizes.values()))
+    ends = np.unique([low, *radii, high])
     if along < len(ends) - 1:
         raise InputError(f"disc: elements along the radius = {along}: must be at least {len(ends) - 1}, one between"
                          f" each two radii of concentrate = {sizes!r}")
     steps = np.geomspace(1e-9, 1, 4001) * (high - low)      # fine near small elements
-    R = np.unique(np.clip([*ends, *np.add.outer(at, steps).ravel(), *np.subtract.outer(at, steps).ravel()], low, high))
-    away = np.abs(np.subtract.outer(R, at))
-    size = (small + (1 - small) * away / away.min(1).max()).min(1)
+    beside = [*np.add.outer(radii, steps).ravel(), *np.subtract.outer(radii, steps).ravel()]
+    R = np.unique(np.clip([*ends, *beside], low, high))
+    distance = np.abs(np.subtract.outer(R, radii))
+    size = (small + (1 - small) * distance / distance.min(1).max()).min(1)
     number = np.concatenate([[0.0], np.cumsum(np.diff(R) * (1 / size[1:] + 1 / size[:-1]) / 2)])
     at_ends = np.interp(ends, R, number)
     marks = np.round(along * at_ends / number[-1]).astype(int)
@@ -270,16 +271,16 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     _, through = divisions("from_lines", "lines", (sum(along), elements[1]), len(parts))
     ends = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(along))])
     level = levels(parts, through, np.zeros(1))
-    around = np.concatenate([lines[0], lines[1][::-1]])
+    outline = np.concatenate([lines[0], lines[1][::-1]])
     names = ["axis" if all(line[k, 0] == 0 for line in lines) else name for k, name in ((0, "start"), (-1, "end"))]
     if names[0] == names[1]:
         names = ["start", "end"]
-    if np.sum(around[:, 0] * np.roll(around[:, 1], -1) - np.roll(around[:, 0], -1) * around[:, 1]) < 0:
+    if np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1]) < 0:
         # the body lies to the left of `inner`
         lines, names, ends = [line[::-1] for line in lines], names[::-1], pieces - ends[::-1]
 
-    def between(at: np.ndarray) -> np.ndarray:
-        first, second = (np.stack([np.interp(at, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
+    def between(coordinate: np.ndarray) -> np.ndarray:
+        first, second = (np.stack([np.interp(coordinate, np.arange(pieces + 1), line[:, i]) for i in (0, 1)], axis=-1)
                          for line in lines)
         return first + (level / level[-1])[:, :, None] * (second - first)
     return _mesh("from_lines", between, ends, np.arange(1, pieces), list(parts), through, (*names, "inner", "outer"),

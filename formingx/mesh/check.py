@@ -117,10 +117,10 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
         InputError: two elements lie on the same side of an edge.
     """
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    ahead = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)   # side of the element
+    side = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)   # side of the element
     edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     sides = np.zeros(len(edges))
-    np.add.at(sides, place.ravel(), ahead)
+    np.add.at(sides, place.ravel(), side)
     over = (times > 2) | (times == 2) & (sides != 0)
     if over.any():
         raise InputError(f"{what}: elements lie over each other at {_show(points[edges[over][0]].mean(0))}: each edge"
@@ -150,19 +150,19 @@ def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
         Numbers of edges, shape (m, 2), m > 0.
     """
     low, high = points[edges].min(1), points[edges].max(1)
-    near = 1e-9 * float((high - low).max())
-    for first, second in overlapping(low - near, high + near):
+    tolerance = 1e-9 * float((high - low).max())
+    for first, second in overlapping(low - tolerance, high + tolerance):
         e, f = edges[first], edges[second]
         a, b, c, d = points[e[:, 0]], points[e[:, 1]], points[f[:, 0]], points[f[:, 1]]
-        apart = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
-        crosses = apart & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
+        separate = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
+        crosses = separate & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
         crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
         for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
                                          (d, f[:, 1], a, b, e)):
-            along = q - p
-            length = (along**2).sum(1)
-            t = np.clip(((point - p) * along).sum(1) / length, 0, 1)
-            gap = ((point - p - t[:, None] * along) ** 2).sum(1)
+            overlap = q - p
+            length = (overlap**2).sum(1)
+            t = np.clip(((point - p) * overlap).sum(1) / length, 0, 1)
+            gap = ((point - p - t[:, None] * overlap) ** 2).sum(1)
             crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
         if crosses.any():
             yield np.column_stack([first, second])[crosses]

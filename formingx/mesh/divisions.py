@@ -48,8 +48,8 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
         return lambda x: np.array([positive(f"{caller} at {coordinate} = {v:.6g}",
                                             _call(given, v, caller, coordinate))
                                    for v in map(float, x)])
-    points = sorted((finite(f"{caller}: {coordinate}", at), positive(f"{caller} at {coordinate} = {at!r}", h))
-                    for at, h in given.items())
+    points = sorted((finite(f"{caller}: {coordinate}", x_value), positive(f"{caller} at {coordinate} = {x_value!r}", h))
+                    for x_value, h in given.items())
     ends, values = np.array(points).reshape(-1, 2).T
 
     def between(x):
@@ -150,9 +150,9 @@ def graded(along: int, grading: float) -> np.ndarray:
 
 def with_middles(joints: np.ndarray) -> np.ndarray:
     """Return the ends of elements and their middles in order, shape (2 n + 1,)."""
-    both = np.empty(2 * len(joints) - 1)
-    both[::2], both[1::2] = joints, (joints[1:] + joints[:-1]) / 2
-    return both
+    points = np.empty(2 * len(joints) - 1)
+    points[::2], points[1::2] = joints, (joints[1:] + joints[:-1]) / 2
+    return points
 
 
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
@@ -166,5 +166,5 @@ def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinate
     rows = [np.zeros(len(coordinates))]
     for thickness_at, ends in zip(layers.values(), through):
         h, base = thickness_at(coordinates), rows[-1]
-        rows += [base + h * at for at in with_middles(ends)[1:]]
+        rows += [base + h * fraction for fraction in with_middles(ends)[1:]]
     return np.array(rows)

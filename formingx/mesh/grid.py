@@ -70,12 +70,12 @@ def to_grid(mesh: Mesh) -> Grid:
 def gathered(mesh: Mesh) -> Grid:
     """Return the whole mesh as plain arrays on all ranks; collective."""
     domain, comm = mesh.domain, mesh.comm
-    own, X = len(own_cells(domain)), domain.geometry.x
+    owned, X = len(own_cells(domain)), domain.geometry.x
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
-    cells = numbers[np.asarray(_compat.cell_nodes(domain))[:own]]
+    cells = numbers[np.asarray(_compat.cell_nodes(domain))[:owned]]
     marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
     ends = {name: numbers_of_facets(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
-    parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < own]] for name, found in marks.items()},
+    parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < owned]] for name, found in marks.items()},
                             {name: numbers[found] for name, found in ends.items()}))
     points = np.zeros((domain.geometry.index_map().size_global, 2))
     for number, x, _, _ in parts:
@@ -186,6 +186,6 @@ def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], c
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):
         bad = next(pair for pair in pairs if (min(pair), max(pair)) not in known)
-        at = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
-        raise InputError(f"{caller}: its edge from {at[0]} to {at[1]} is not an edge of an element")
+        position = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
+        raise InputError(f"{caller}: its edge from {position[0]} to {position[1]} is not an edge of an element")
     return found

@@ -42,8 +42,8 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
         InputError: a point lies in none of the cells.
     """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
-    nodes, own = _compat.cell_nodes(mesh), own_cells(mesh)
-    cells = own if cells is None else cells[cells < len(own)]
+    nodes, owned = _compat.cell_nodes(mesh), own_cells(mesh)
+    cells = owned if cells is None else cells[cells < len(owned)]
     padded = np.zeros((len(points), 3))
     padded[:, :2] = points
     found = np.full(len(points), -1)

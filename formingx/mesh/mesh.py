@@ -63,10 +63,10 @@ class Mesh:
 
     def __str__(self) -> str:
         """Return a summary of the mesh; sizes and numbers of edges only on one rank, because it is not collective."""
-        cells, alone = self.domain.topology.index_map(2).size_global, self.comm.size == 1
-        edges = {name: f" ({len(self.facets_of(name))} edges)" if alone else "" for name in self.boundaries}
+        cells, serial = self.domain.topology.index_map(2).size_global, self.comm.size == 1
+        edges = {name: f" ({len(self.facets_of(name))} edges)" if serial else "" for name in self.boundaries}
         lines = [f"{cells} six-node triangles"]
-        if alone:
+        if serial:
             (r, z), (R, Z) = (f(self.domain.geometry.x[:, :2], axis=0) for f in (np.min, np.max))
             lines[0] += f", R from {r:.6g} to {R:.6g}, Z from {z:.6g} to {Z:.6g}"
         return "\n".join([*lines, f"layers: {', '.join(self.layers)}",

@@ -174,10 +174,10 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
                 raise InputError(f"mesh file {file!r}: group {name!r} has elements of {block.nodes.shape[1]} nodes"
                                  f" (gmsh's type {block.kind}): formingx needs {what} of"
                                  f" {' or '.join(map(str, kinds.values()))} nodes")
-            at = np.minimum(np.searchsorted(numbers, block.nodes), max(len(numbers) - 1, 0))
-            if not len(numbers) or np.any(numbers[at] != block.nodes):
+            indices = np.minimum(np.searchsorted(numbers, block.nodes), max(len(numbers) - 1, 0))
+            if not len(numbers) or np.any(numbers[indices] != block.nodes):
                 raise InputError(f"mesh file {file!r}: an element of group {name!r} has a node that is not in $Nodes")
-            rows.append(at)
+            rows.append(indices)
         if len({r.shape[1] for r in rows}) > 1:
             raise InputError(f"mesh file {file!r}: group {name!r} mixes {what} of"
                              f" {' and '.join(map(str, kinds.values()))} nodes: all must have the same number")
@@ -190,16 +190,16 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
     Raises:
         InputError: a section has no end, or there is text outside the sections.
     """
-    begin, at = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
-    while match := begin.match(data, at):
+    begin, offset = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
+    while match := begin.match(data, offset):
         end = data.find(b"$End" + match[1], match.end())
         if end < 0:
             raise InputError(f"mesh file {file!r} ends within its section ${match[1].decode()}")
         yield match[1].decode(), data[match.end():end]
-        at = end + len(match[1]) + 4
-    rest = data[at:].strip()
-    if rest:
-        raise InputError(f"mesh file {file!r}: {rest[:40].decode('utf-8', 'replace')!r} is no section of a mesh")
+        offset = end + len(match[1]) + 4
+    remainder = data[offset:].strip()
+    if remainder:
+        raise InputError(f"mesh file {file!r}: {remainder[:40].decode('utf-8', 'replace')!r} is no section of a mesh")
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:

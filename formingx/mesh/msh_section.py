@@ -21,7 +21,7 @@ class Section:
 
     def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
         self._binary, self._order, self._width, self.where = binary, order, width, where
-        self._body, self._at = body, 0
+        self._body, self._offset = body, 0
         if not binary:
             try:
                 if re.search(rb"[^\s+\-.0-9a-zA-Z]", body):      # NumPy takes 1_0 for a number
@@ -41,11 +41,11 @@ class Section:
         Raises:
             InputError: there is no such line.
         """
-        end = self._body.find(b"\n", self._at)
-        word = self._body[self._at:end].strip()
+        end = self._body.find(b"\n", self._offset)
+        word = self._body[self._offset:end].strip()
         if end < 0 or not word.isdigit() or len(word) > 15:
             raise InputError(f"{self.where}: must begin with a count")
-        self._at = end + 1
+        self._offset = end + 1
         return int(word)
 
     def reals(self, n: int) -> np.ndarray:
@@ -70,7 +70,7 @@ class Section:
         Raises:
             InputError: numbers are left over, which would be lost.
         """
-        remaining = len(self._body[self._at:].strip()) if self._binary else len(self._values) - self._at
+        remaining = len(self._body[self._offset:].strip()) if self._binary else len(self._values) - self._offset
         if remaining:
             raise InputError(f"{self.where}: {remaining} more {'bytes' if self._binary else 'numbers'} follow what its"
                              f" counts announce")
@@ -87,10 +87,10 @@ class Section:
         """
         if self._binary:
             return self._bytes(n, np.dtype(self._order + kind))
-        if n > len(self._values) - self._at:
+        if n > len(self._values) - self._offset:
             raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
-        self._at += n
-        return self._values[self._at - n:self._at]
+        self._offset += n
+        return self._values[self._offset - n:self._offset]
 
     def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
         """Return the next n numbers of a binary section.
@@ -98,10 +98,10 @@ class Section:
         Raises:
             InputError: the section is too short.
         """
-        if n * kind.itemsize > len(self._body) - self._at:
+        if n * kind.itemsize > len(self._body) - self._offset:
             raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
-        found = np.frombuffer(self._body, kind, n, self._at)
-        self._at += n * kind.itemsize
+        found = np.frombuffer(self._body, kind, n, self._offset)
+        self._offset += n * kind.itemsize
         return found
 
     def whole(self, values: np.ndarray) -> np.ndarray:

@@ -162,7 +162,7 @@ class _Lines(Iterator):
     """Lines of a file as words without comments, with their line numbers for messages."""
 
     def __init__(self, file: str):
-        self.file, self.at = file, 0
+        self.file, self.line_number = file, 0
         try:
             with open(file, encoding="utf-8") as stream:
                 self._text = stream.read().splitlines()
@@ -170,17 +170,17 @@ class _Lines(Iterator):
             raise InputError(f"mesh file {file!r} cannot be read: {error}") from None
 
     def __next__(self) -> list[str]:
-        while self.at < len(self._text):
-            words = self._text[self.at].split("#")[0].split()
-            self.at += 1
+        while self.line_number < len(self._text):
+            words = self._text[self.line_number].split("#")[0].split()
+            self.line_number += 1
             if words:
                 return words
         raise StopIteration
 
     def error(self, message: str) -> InputError:
         """Return an error that names the present line."""
-        shown = self._text[self.at - 1].strip() if self._text else ""
-        return InputError(f"mesh file {self.file!r}, line {self.at} ({shown[:60]!r}): {message}")
+        shown = self._text[self.line_number - 1].strip() if self._text else ""
+        return InputError(f"mesh file {self.file!r}, line {self.line_number} ({shown[:60]!r}): {message}")
 
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
         """Return `count` lines of numbers, with node numbers converted to indices.

@@ -30,8 +30,8 @@ class Place(NamedTuple):
         layer = f" in layer {self.layer!r}" if self.layer else ""
         if not self.boundary:
             return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}"
-        near = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
-        return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{near}"
+        side = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
+        return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{side}"
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
@@ -46,8 +46,8 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)[:, :2]
         if len(nodes):
-            away = float(np.hypot(*(nodes - point).T).min())
-            best, size = (name, away) if away < best[1] else best, max(size, float(np.abs(nodes).max()))
+            gap = float(np.hypot(*(nodes - point).T).min())
+            best, size = (name, gap) if gap < best[1] else best, max(size, float(np.abs(nodes).max()))
     R, Z, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
     return Place(R, Z, layer, best[0], distance)
 
@@ -87,12 +87,12 @@ class Triangles:
 
     def __init__(self, mesh: Mesh):
         self._mesh = mesh
-        n = len(own := own_cells(mesh.domain))
+        n = len(owned := own_cells(mesh.domain))
         names = np.full(n, "", dtype=object)
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        self.corners = gathered(mesh.comm, of_cells(mesh.domain, own)[:, :3, :2])  # in three dimensions (x, y)
+        self.corners = gathered(mesh.comm, of_cells(mesh.domain, owned)[:, :3, :2])  # in three dimensions (x, y)
         self.layer = gathered(mesh.comm, names).astype(str)
         edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
                           for i, j in ((0, 1), (1, 2), (2, 0))], 1)

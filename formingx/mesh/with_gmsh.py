@@ -22,8 +22,8 @@ def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any
         The module gmsh.
     """
     import gmsh
-    mine = not gmsh.isInitialized()
-    if mine:
+    own_session = not gmsh.isInitialized()
+    if own_session:
         gmsh.initialize(interruptible=False)
     requested = {**_DEFAULTS, **(options or {})}
     before = {option: gmsh.option.getNumber(option) for option in requested}
@@ -34,7 +34,7 @@ def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any
         gmsh.model.add(name)
         yield gmsh
     finally:
-        if mine:
+        if own_session:
             gmsh.finalize()
         else:
             gmsh.model.remove()

@@ -100,9 +100,9 @@ class Path(States):
             OSError: the folder cannot be written.
         """
         from .files.checkpoint import Checkpoint
-        kept = Checkpoint(folder, self)
-        kept.write()
-        kept.end("", self.findings())
+        writer = Checkpoint(folder, self)
+        writer.write()
+        writer.end("", self.findings())
 
     def to_vtk(self, file: Any, states: Any = None) -> None:
         """Write the fields of states for ParaView, one time step per state.
@@ -268,8 +268,8 @@ class Path(States):
         """
         self.section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
-        alone = self.alone(state or self.last)
-        return ContactFace(alone, contact_of(alone, tool, "contact")[0]).of(state or self.last)
+        on_mesh = self.alone(state or self.last)
+        return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).of(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
         """Return the temperature of material points in a state.

@@ -53,7 +53,7 @@ class States:
 
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None,
                  views: dict[int, _View] | None = None):
-        self.record, self._timed, self._own = record, timed, {} if columns is None else columns
+        self.record, self._timed, self._columns = record, timed, {} if columns is None else columns
         self._views = {} if views is None else views         # by id(problem)
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
@@ -253,9 +253,9 @@ class States:
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
         before = segment.states[: segment.states.index(left) + 1]
-        kept: dict[str, Any] = next((s.stepping for s in reversed(before) if s.stepping and s.setting == left.setting),
+        data: dict[str, Any] = next((s.stepping for s in reversed(before) if s.stepping and s.setting == left.setting),
                                     {})
-        step, given = StepControl(**kept.get("step", {})), {k: v for k, v in kept.items() if k == "accuracy"}
+        step, given = StepControl(**data.get("step", {})), {k: v for k, v in data.items() if k == "accuracy"}
         try:
             Run(record, [(target, bound)], step, **given).follow(200, False, None)
         except (ConvergenceError, Failure) as error:
@@ -402,7 +402,7 @@ class States:
         segment = self.segment(state)
         record = Record(segment.problem, segment.curve)
         record.segments, record.counts = [segment], self.counts
-        return type(self)(record, self._timed, self._own, self._views)
+        return type(self)(record, self._timed, self._columns, self._views)
 
     @property
     def admissibility(self) -> AdmissibilityCheck:
@@ -413,7 +413,7 @@ class States:
         """Return the evaluation objects of a segment's problem."""
         key = id(segment.problem)
         if key not in self._views:
-            self._views[key] = _View(segment.problem, self._timed, self._own)
+            self._views[key] = _View(segment.problem, self._timed, self._columns)
         return self._views[key]
 
 

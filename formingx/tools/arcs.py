@@ -33,11 +33,11 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
 
     def between(low: float, high: float, depth: int) -> list[Line | Arc]:
         nonlocal made
-        points, along = curve(np.linspace(low, high, 17))
-        lengths = np.hypot(*along.T)
+        points, derivatives = curve(np.linspace(low, high, 17))
+        lengths = np.hypot(*derivatives.T)
         if not np.all(np.isfinite(points)) or not lengths[[0, -1]].min() > 0:
             raise InputError(f"{name}: it has a corner or no direction near ({points[0, 0]:.6g}, {points[0, 1]:.6g})")
-        found = _biarc(points[0], along[0] / lengths[0], points[-1], along[-1] / lengths[-1])
+        found = _biarc(points[0], derivatives[0] / lengths[0], points[-1], derivatives[-1] / lengths[-1])
         if found and np.min([_distance_to(points, piece) for piece in found], axis=0).max() <= tolerance:
             made += len(found)
             return found
@@ -104,8 +104,8 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 
     The joint is the midpoint of the control points p + d t and q - d s.
     """
-    v, both = q - p, t + s
-    a, b, c = 2 * (1 - t @ s), 2 * (v @ both), v @ v
+    v, arcs = q - p, t + s
+    a, b, c = 2 * (1 - t @ s), 2 * (v @ arcs), v @ v
     if a > 1e-12:
         d = (-b + math.sqrt(b * b + 4 * a * c)) / (2 * a)
     elif b > 0:
@@ -120,19 +120,19 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
     """Return the arc or the line from p with the unit tangent t to q, or None."""
     w = q - p
-    across, ahead, length = t[0] * w[1] - t[1] * w[0], float(t @ w), math.hypot(*w)
+    normal_distance, tangent_distance, length = t[0] * w[1] - t[1] * w[0], float(t @ w), math.hypot(*w)
     if not length > 0:
         return None
-    if abs(across) < 1e-9 * length:
-        return Line(p, q) if ahead > 0 else None
-    radius = length**2 / (2 * across)                      # to the left if positive
+    if abs(normal_distance) < 1e-9 * length:
+        return Line(p, q) if tangent_distance > 0 else None
+    radius = length**2 / (2 * normal_distance)                      # to the left if positive
     centre = p + radius * np.array([-t[1], t[0]])
-    return Arc(centre, abs(radius), math.atan2(*(p - centre)[::-1]), 2 * math.atan2(across, ahead))
+    return Arc(centre, abs(radius), math.atan2(*(p - centre)[::-1]), 2 * math.atan2(normal_distance, tangent_distance))
 
 
 def _distance_to(points: np.ndarray, piece: Line | Arc) -> np.ndarray:
     """Return the distances of points, shape (n, 2), from the line or circle of a piece, shape (n,)."""
     if isinstance(piece, Arc):
         return np.abs(np.hypot(*(points - piece.centre).T) - piece.radius)
-    way = (piece.b - piece.a) / math.dist(piece.a, piece.b)
-    return np.abs((points - piece.a) @ (-way[1], way[0]))
+    direction = (piece.b - piece.a) / math.dist(piece.a, piece.b)
+    return np.abs((points - piece.a) @ (-direction[1], direction[0]))

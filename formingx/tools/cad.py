@@ -77,8 +77,8 @@ class _Reader:
 
     def evaluate(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return points of a curve and its derivatives at parameters, shape (n,); shape (n, 3) each."""
-        points, along = self._answer([tag, parameters.tolist()])
-        return np.array(points).reshape(-1, 3), np.array(along).reshape(-1, 3)
+        points, derivatives = self._answer([tag, parameters.tolist()])
+        return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
         """Return the answer of the process to a question.
@@ -97,16 +97,16 @@ class _Reader:
             pass
         if not line.endswith("\n"):
             ended = process.wait()
-            why = (f"it took more than {self._seconds} s" if ended in (-signal.SIGXCPU, -signal.SIGKILL) else
+            cause = (f"it took more than {self._seconds} s" if ended in (-signal.SIGXCPU, -signal.SIGKILL) else
                    f"Open CASCADE ended at it ({signal.Signals(-ended).name if ended < 0 else ended})")
-            raise InputError(f"tool file {self._file!r} cannot be read: {why}: is it damaged?")
+            raise InputError(f"tool file {self._file!r} cannot be read: {cause}: is it damaged?")
         found = json.loads(line)
         if "error" in found:
             raise InputError(f"tool file {self._file!r} cannot be read: {found['error']}")
         return found
 
 
-def _of_curve(at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
+def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
     """Return the function that returns the pieces of a curve.
 
@@ -116,8 +116,8 @@ def _of_curve(at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds:
     low, high = bounds
 
     def curve(t):
-        points, along = at(low + (high - low) * t)
-        return in_plane(points, name), along[:, :2]
+        points, derivatives = evaluate(low + (high - low) * t)
+        return in_plane(points, name), derivatives[:, :2]
     try:
         try:
             pieces = [piece_through(curve(np.linspace(0, 1, 9))[0], name)]

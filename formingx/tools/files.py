@@ -70,9 +70,9 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
     if kind in _HEADERS and not head.startswith(_HEADERS[kind]):
         raise InputError(f"tool file {name!r} cannot be read: it does not begin as a {kind.upper()} file does")
     factor = 1.0 if units is None else _factor(units, kind, name)
-    own = None if tolerance is None else tolerance / factor
+    own_curves = None if tolerance is None else tolerance / factor
     found = ({"geo": _geo_curves, "msh": _mesh_curves}[kind](name) if kind in ("geo", "msh") else
-             dxf.curves(name, own) if kind == "dxf" else cad.curves(name, kind, own))
+             dxf.curves(name, own_curves) if kind == "dxf" else cad.curves(name, kind, own_curves))
     for tag in tags or []:
         if abs(tag) not in found:
             raise InputError(f"tool file {name!r} has no curve {abs(tag)}; it has {sorted(found)}")
@@ -94,11 +94,11 @@ def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
     else:
         points = np.array([pair("tools.read: body", body)])
-    depth, near = tool.signed_distance(points), 1e-6 * tool.size
-    if depth.max() > near and depth.min() < -near:
+    depth, tolerance = tool.signed_distance(points), 1e-6 * tool.size
+    if depth.max() > tolerance and depth.min() < -tolerance:
         raise InputError(f"tool file {file!r}: the body is on both sides of the profile, up to {depth.max():.6g} and"
                          f" {-depth.min():.6g} away from it: move the tool or the body")
-    return tool.reversed() if depth.max() > near else tool
+    return tool.reversed() if depth.max() > tolerance else tool
 
 
 def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
@@ -119,9 +119,9 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
     ends = np.array([[pieces[0].ends[0], pieces[-1].ends[1]] for pieces in curves]).reshape(-1, 2)
     if not np.abs(ends).max() < 1e50:                       # squares and products are still numbers
         raise InputError(f"tool file {file!r}: a curve ends {np.abs(ends).max():.3g} away: must be below 1e50")
-    near = 1e-6 * max(float(np.ptp(ends, axis=0).max()), 1e-300)
+    tolerance = 1e-6 * max(float(np.ptp(ends, axis=0).max()), 1e-300)
     neighbours: list[list[int]] = [[] for _ in ends]             # other ends at the same point
-    for a, b in cKDTree(ends).query_pairs(near, output_type="ndarray").tolist():
+    for a, b in cKDTree(ends).query_pairs(tolerance, output_type="ndarray").tolist():
         neighbours[a].append(b)
         neighbours[b].append(a)
     number = np.array([1 + len(others) for others in neighbours])
@@ -163,10 +163,10 @@ def _factor(units: Any, kind: str, file: str) -> float:
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)
     known("tools.read: units", units, LENGTHS)
-    own = {"step": "mm", "dxf": dxf.unit(file) if kind == "dxf" else None}.get(kind)
-    if own is None:
+    own_unit = {"step": "mm", "dxf": dxf.unit(file) if kind == "dxf" else None}.get(kind)
+    if own_unit is None:
         raise InputError(f"tools.read: units = {units!r}: tool file {file!r} does not state its own: give a factor")
-    return LENGTHS[own] / LENGTHS[units]
+    return LENGTHS[own_unit] / LENGTHS[units]
 
 
 def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:

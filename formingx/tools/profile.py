@@ -270,11 +270,11 @@ class Tool:
                 rows.append((*p.a, *(p.b - p.a) / length, 0.0, -math.inf if opens[0] else -tol,
                              math.inf if opens[1] else length + tol))
             else:
-                whole, sign = abs(p.sweep) >= TURN - _FLAT, math.copysign(1.0, p.sweep)
+                full, sign = abs(p.sweep) >= TURN - _FLAT, math.copysign(1.0, p.sweep)
                 start = p.start - sign * (math.pi / 2 * opens[0] + _FLAT)
                 sweep = abs(p.sweep) + math.pi / 2 * (opens[0] + opens[1])
                 arcs.append((*p.centre, 0.0, 0.0, sign, 0.0,
-                             math.inf if whole or sweep >= TURN else sweep + 2 * _FLAT, p.radius, start))
+                             math.inf if full or sweep >= TURN else sweep + 2 * _FLAT, p.radius, start))
         joints = list(zip(self.pieces, self.pieces[1:] + (self.pieces[:1] if self.closed else ())))
         corners = [(p.ends[1], _turn(p.angles[1], q.angles[0])) for p, q in joints] + [e for e in ends if e is not None]
         arcs += [(*c, 0.0, 0.0, math.copysign(1.0, turn), 0.0, math.inf, 0.0, 0.0)
@@ -303,12 +303,12 @@ class Tool:
         parts = [_sampled(p, _straight_pieces(p)) for p in self.pieces]
         a = np.concatenate([part[:-1] for part in parts])
         b = np.concatenate([part[1:] for part in parts])
-        near, n = 1e-9 * self.size, len(a)
-        closes = self.closed or math.dist(a[0], b[-1]) < near
-        for i, j in overlapping(np.minimum(a, b) - near, np.maximum(a, b) + near):
+        tolerance, n = 1e-9 * self.size, len(a)
+        closes = self.closed or math.dist(a[0], b[-1]) < tolerance
+        for i, j in overlapping(np.minimum(a, b) - tolerance, np.maximum(a, b) + tolerance):
             i, j = np.minimum(i, j), np.maximum(i, j)
-            apart = (j - i > 1) & ~((i == 0) & (j == n - 1) & closes)
-            i, j = i[apart], j[apart]
+            separate = (j - i > 1) & ~((i == 0) & (j == n - 1) & closes)
+            i, j = i[separate], j[separate]
             u, v, w = b[i] - a[i], b[j] - a[j], a[j] - a[i]
             det = _cross(u, v)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -320,7 +320,7 @@ class Tool:
             length = np.maximum(np.hypot(*u.T), 1e-300)
             both = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
             across, lies = np.abs(_cross(u, both)) / length, (u * both).sum(-1) / length
-            over = (across.max(0) < near) & (lies.max(0) > near) & (lies.min(0) < length - near)
+            over = (across.max(0) < tolerance) & (lies.max(0) > tolerance) & (lies.min(0) < length - tolerance)
             if over.any():
                 raise InputError(f"Tool: the profile doubles back at (R, Z) = {_show(a[j[np.argmax(over)]])}")
 

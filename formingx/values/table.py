@@ -58,8 +58,8 @@ class Table:
             InputError: a number lies outside.
         """
         x = np.asarray(x, dtype=float)
-        near = 1e-9 * (self.x[-1] - self.x[0])
-        outside = ~((x >= self.x[0] - near) & (x <= self.x[-1] + near))
+        tolerance = 1e-9 * (self.x[-1] - self.x[0])
+        outside = ~((x >= self.x[0] - tolerance) & (x <= self.x[-1] + tolerance))
         if np.any(outside):
             raise InputError(f"{self!r}: {name} = {x[outside].flat[0]:.6g}: must be from {self.x[0]:g} to"
                              f" {self.x[-1]:g}")

@@ -76,8 +76,8 @@ class Depth(NamedTuple):
     @property
     def words(self) -> str:
         """Message about a contact point in three dimensions."""
-        at = ", ".join(f"{v:.5g}" for v in self.place)
-        return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({at})"
+        position = ", ".join(f"{v:.5g}" for v in self.place)
+        return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({position})"
 
 
 class AdmissibilityCheck:
@@ -95,7 +95,7 @@ class AdmissibilityCheck:
         if self._solid:
             self._outline = Outline(problem.forms)
             self._faces = [self._outline.mask(contact.contact.on) for contact in problem.contacts]
-            self._rest = _lengths(self._outline.rest)
+            self._reference_lengths = _lengths(self._outline.rest)
 
     def of(self, state: State) -> str:
         """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
@@ -134,7 +134,7 @@ class AdmissibilityCheck:
         if measures.get("pole_stretch", 1.0) > _LIMITS.pole_stretch:
             yield "the two faces cross at the pole"
         if not self._solid:
-            for deep in self._deepest_points(state, _most_inside):
+            for deep in self._deepest_points(state, _allowed_penetration):
                 yield f"{deep.words}: the step was too long, or smaller triangles are needed there"
             return
         if measures["volume_error"] > _LIMITS.volume:
@@ -175,8 +175,8 @@ class AdmissibilityCheck:
             if not contact.present:
                 continue
             depth = _depths(contact, points, state)
-            most = CUT * contact.thickness if own else _LIMITS.depth * np.maximum(contact.thickness, length)
-            share = np.where(face | (not own), depth.max(1) / most, 0.0)
+            allowed = CUT * contact.thickness if own else _LIMITS.depth * np.maximum(contact.thickness, length)
+            share = np.where(face | (not own), depth.max(1) / allowed, 0.0)
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
@@ -200,12 +200,13 @@ class AdmissibilityCheck:
 
     def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield contact points whose penetration is too large compared with the local wall."""
-        weight, rest = self._problem.scene.kinematics.weight, self._outline.rest
+        weight, reference = self._problem.scene.kinematics.weight, self._outline.rest
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
                 continue
             depth = _depths(contact, edges[face], state).max(1)
-            grown = _lengths(edges[face]) / self._rest[face] * weight(edges[face, 2].T) / weight(rest[face, 2].T)
+            grown = _lengths(edges[face]) / self._reference_lengths[face]
+            grown = grown * weight(edges[face, 2].T) / weight(reference[face, 2].T)
             share = depth * grown / (_LIMITS.penetration * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
@@ -214,17 +215,17 @@ class AdmissibilityCheck:
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
     """Return the penetration of points, shape (m, n, components), into a tool, shape (m, n), length."""
-    at = points - contact.travelled(state.control)
-    return contact.contact.tool.signed_distance(at.reshape(-1, at.shape[-1])).reshape(at.shape[:2])
+    positions = points - contact.travelled(state.control)
+    return contact.contact.tool.signed_distance(positions.reshape(-1, positions.shape[-1])).reshape(positions.shape[:2])
 
 
-def _most_inside(contact: Any) -> np.ndarray:
+def _allowed_penetration(contact: Any) -> np.ndarray:
     """Return the allowed penetration of contact points, shape (n,), length.
 
     It is infinite for lagged points that touch since this step: no force acts on them yet.
     """
-    most = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
-    return np.where(contact.area < contact.rule.area, np.inf, most)
+    allowed = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
+    return np.where(contact.area < contact.rule.area, np.inf, allowed)
 
 
 def _force_error(contact: Any, state: State, images: int) -> float:
@@ -245,11 +246,11 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     direction = contact.contact.way / np.hypot(*contact.contact.way)
     h = _LIMITS.difference_step
     states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-h, 0.0, h)]
-    backward, force, forward = (resultants.force(contact, *at) @ direction for at in states)
-    way = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ direction
-    if not force or not way:
+    backward, force, forward = (resultants.force(contact, *point) @ direction for point in states)
+    travel = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ direction
+    if not force or not travel:
         return share
-    return min(2 * energy * abs((forward - backward) / way) / force**2, _LIMITS.largest_energy_ratio * share)
+    return min(2 * energy * abs((forward - backward) / travel) / force**2, _LIMITS.largest_energy_ratio * share)
 
 
 def _penalty_advice(contact: Any, error: float) -> str:

@@ -96,11 +96,11 @@ class ContactFace:
         Returns:
             The area ratios, shape (n,).
         """
-        n, rest, now = len(points), self.reference_points[self._edges], points[self._edges]
+        n, reference, now = len(points), self.reference_points[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._reference_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:
-            axis = rest[..., 0] < 1e-9 * self._path.problem.forms.length
-            ratio = ratio * np.where(axis, ratio, now[..., 0] / np.where(axis, 1.0, rest[..., 0]))
+            axis = reference[..., 0] < 1e-9 * self._path.problem.forms.length
+            ratio = ratio * np.where(axis, ratio, now[..., 0] / np.where(axis, 1.0, reference[..., 0]))
         edges = self._edges.ravel()
         return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
 

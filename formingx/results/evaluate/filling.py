@@ -72,14 +72,14 @@ class Filling(Sheet):
         gap = non_negative("pressure_at: gap", gap)
         if corner is not None and corner not in range(len(self.corners)):
             raise InputError(f"pressure_at: corner = {corner!r}: must be from 0 to {len(self.corners) - 1}")
-        left = self.gaps.max(1) if corner is None else self.gaps[:, corner]
-        if left[-1] > gap:
-            raise InputError(f"pressure_at: gap = {gap:g} is not reached: {left[-1]:.6g} is left at the end")
-        wider = np.flatnonzero(left > gap)
+        remaining = self.gaps.max(1) if corner is None else self.gaps[:, corner]
+        if remaining[-1] > gap:
+            raise InputError(f"pressure_at: gap = {gap:g} is not reached: {remaining[-1]:.6g} is left at the end")
+        wider = np.flatnonzero(remaining > gap)
         if not len(wider):
             return float(self.pressure[0])
         k = wider[-1]
-        part = (left[k] - gap) / (left[k] - left[k + 1])
+        part = (remaining[k] - gap) / (remaining[k] - remaining[k + 1])
         return float((1 - part) * self.pressure[k] + part * self.pressure[k + 1])
 
 

@@ -63,9 +63,9 @@ class Part(PartNumbers):
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Rows of the printed table: pairs (name, value with its unit)."""
-        along, rest = self.min_wall_reference
-        where = (f"height {self._length(self.min_wall_height)}, r = {self._length(self.min_wall_at[0])}, from {along} ="
-                 f" {self._length(rest)}")
+        axis, reference = self.min_wall_reference
+        where = (f"height {self._length(self.min_wall_height)}, r = {self._length(self.min_wall_at[0])}, from {axis} ="
+                 f" {self._length(reference)}")
         return self._rows(where, [("capacity", self._with_unit(self.capacity, self.units.volume)), *(
             (f"wall at height {self._length(h)}", self._length(w)) for h, w in self.walls.items())])
 
@@ -91,26 +91,26 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     units = units if axisymmetric else units.per_depth()
     strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
     middle = _surface(fine(profile.middle), axisymmetric)
-    rest = _surface(fine((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
-    at_rest = _strips(fine(profile.reference_bottom), fine(profile.reference_top), axisymmetric)
+    reference = _surface(fine((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
+    reference_strips = _strips(fine(profile.reference_bottom), fine(profile.reference_top), axisymmetric)
     inside = strips_within(wall, trim)
-    volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, rest, at_rest))
-    kept = [float((v * inside).sum()) for v in (volume, area, *before)]
+    volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, reference, reference_strips))
+    sums = [float((v * inside).sum()) for v in (volume, area, *before)]
     reached = np.append(inside > 0, False) | np.append(False, inside == 1)
     reached[0] = True
     k = int(np.argmin(np.where(reached, wall.wall, np.inf)))
-    along = int(np.argmax(np.ptp(profile.reference_bottom, axis=0)))
-    mean = kept[0] / kept[1]
+    coordinate = int(np.argmax(np.ptp(profile.reference_bottom, axis=0)))
+    mean = sums[0] / sums[1]
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
-    average = (of_strip * area * inside).sum() / kept[1]
-    spread = ((of_strip - average) ** 2 * area * inside).sum() / kept[1]
-    weight = None if density is None else units.mass(images * kept[3], positive("part: density", density))
-    at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
-    return Part(images * kept[0], images * kept[1], kept[1] / kept[2], mean, float(wall.wall[k]),
+    average = (of_strip * area * inside).sum() / sums[1]
+    spread = ((of_strip - average) ** 2 * area * inside).sum() / sums[1]
+    weight = None if density is None else units.mass(images * sums[3], positive("part: density", density))
+    walls_at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
+    return Part(images * sums[0], images * sums[1], sums[1] / sums[2], mean, float(wall.wall[k]),
                 float(wall.reference_radius[k]),
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
-                ("RZ"[along], float(profile.reference_bottom[k, along])), float(wall.wall[k] / mean),
-                float(np.sqrt(spread) / average), weight, at, float(1 - kept[0] / volume.sum()),
+                ("RZ"[coordinate], float(profile.reference_bottom[k, coordinate])), float(wall.wall[k] / mean),
+                float(np.sqrt(spread) / average), weight, walls_at, float(1 - sums[0] / volume.sum()),
                 images * _content(wall, inside, axisymmetric), basis, units)
 
 
@@ -127,13 +127,13 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
         return inside
-    along, value = trim if isinstance(trim, tuple) and len(trim) == 2 else ("r", trim)
-    known("part: trim along", along, ("r", "height"))
-    value, line = finite("part: trim", value), wall.r if along == "r" else wall.height
+    coordinate, value = trim if isinstance(trim, tuple) and len(trim) == 2 else ("r", trim)
+    known("part: trim along", coordinate, ("r", "height"))
+    value, line = finite("part: trim", value), wall.r if coordinate == "r" else wall.height
     crossed = np.flatnonzero((line[:-1] < value) & (line[1:] >= value))
     if not len(crossed):
         low, high = without_round_off((line.min(), line.max()), line)
-        raise InputError(f"part: trim = {trim!r}: the part goes from {low:.6g} to {high:.6g} along {along}")
+        raise InputError(f"part: trim = {trim!r}: the part goes from {low:.6g} to {high:.6g} along {coordinate}")
     k = crossed[-1]
     inside[k], inside[k + 1:] = (value - line[k]) / (line[k + 1] - line[k]), 0.0
     return inside
@@ -144,8 +144,8 @@ def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside
-        least = 1e-12 * np.abs(face).max() ** (2 + axisymmetric)           # below it is round-off
-        found.append(abs(float(slices.sum())) if abs(slices.sum()) > least else 0.0)
+        tolerance = 1e-12 * np.abs(face).max() ** (2 + axisymmetric)           # below it is round-off
+        found.append(abs(float(slices.sum())) if abs(slices.sum()) > tolerance else 0.0)
     return min(found)
 
 

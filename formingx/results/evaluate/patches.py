@@ -28,22 +28,22 @@ class Patches:
 
     def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, mine: np.ndarray):
         self._points = points
-        at: dict[tuple[int, int], list[int]] = {}
+        neighbours: dict[tuple[int, int], list[int]] = {}
         for cell, (three, where) in enumerate(zip(corners, layer, strict=True)):
             for corner in three:
-                at.setdefault((int(where), int(corner)), []).append(cell)
-        patches = [sorted({c for corner in corners[cell].tolist() for c in at[int(layer[cell]), corner]})
+                neighbours.setdefault((int(where), int(corner)), []).append(cell)
+        patches = [sorted({c for corner in corners[cell].tolist() for c in neighbours[int(layer[cell]), corner]})
                    for cell in mine]
         self._patch = np.full((len(mine), max(map(len, patches), default=0)), -1)
         for row, patch in zip(self._patch, patches, strict=True):
             row[: len(patch)] = patch
         self._origin = points[mine].mean(1)
         self._size = np.ones_like(self._origin)
-        for some in self._chunks():
-            away = np.abs(points[self._patch[some]] - self._origin[some, None, None])
-            self._size[some] = np.where(self._patch[some, :, None, None] < 0, 0.0, away).max((1, 2))
+        for chunk in self._chunks():
+            distance = np.abs(points[self._patch[chunk]] - self._origin[chunk, None, None])
+            self._size[chunk] = np.where(self._patch[chunk, :, None, None] < 0, 0.0, distance).max((1, 2))
         self._keeps = self._patch.size * points.shape[1] * len(_POWERS) < _KEPT
-        self._kept: dict[int, np.ndarray] = {}
+        self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
         """Return the coefficients of the fitted cubics, shape (m, 10, k).
@@ -52,22 +52,22 @@ class Patches:
             values: values at the quadrature points of all cells, shape (n, q, k).
         """
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
-        for some in self._chunks():
-            patch = self._patch[some]
-            found[some] = self._operator(some) @ values[patch].reshape(len(patch), -1, values.shape[-1])
+        for chunk in self._chunks():
+            patch = self._patch[chunk]
+            found[chunk] = self._operator(chunk) @ values[patch].reshape(len(patch), -1, values.shape[-1])
         return found
 
-    def _operator(self, some: slice) -> np.ndarray:
+    def _operator(self, chunk: slice) -> np.ndarray:
         """Return the matrices from values at the points of patches to coefficients, shape (cells, 10, points)."""
-        if some.start in self._kept:
-            return self._kept[some.start]
-        patch = self._patch[some]
-        basis = self._basis(some, self._points[patch]) * (patch >= 0)[..., None, None]
+        if chunk.start in self._operators:
+            return self._operators[chunk.start]
+        patch = self._patch[chunk]
+        basis = self._basis(chunk, self._points[patch]) * (patch >= 0)[..., None, None]
         basis = basis.reshape(len(patch), -1, len(_POWERS)).transpose(0, 2, 1)
         # too few cells for a cubic: the smallest coefficients that fit
         operator = np.linalg.pinv(basis @ basis.transpose(0, 2, 1), rcond=1e-12, hermitian=True) @ basis
         if self._keeps:
-            self._kept[some.start] = operator
+            self._operators[chunk.start] = operator
         return operator
 
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -79,7 +79,7 @@ class Patches:
         """
         return self._basis(slice(None), points) @ coefficients
 
-    def _basis(self, some: slice, points: np.ndarray) -> np.ndarray:
+    def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
         """Return the ten monomials of a cubic for some of the patches, shape (cells, ..., 10).
 
         Args:
@@ -87,7 +87,7 @@ class Patches:
             points: points of each patch, shape (cells, ..., 2).
         """
         between = (slice(None), *[None] * (points.ndim - 2))
-        x = (points - self._origin[some][between]) / self._size[some][between]
+        x = (points - self._origin[chunk][between]) / self._size[chunk][between]
         powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)
         return powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 

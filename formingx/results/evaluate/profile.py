@@ -90,9 +90,9 @@ class Profile:
         Raises:
             InputError: the radius lies outside the sheet.
         """
-        least, most = self.reference_radius[[0, -1]]
-        if not abs(finite("thickness_ratio_at: radius", radius) - (least + most) / 2) <= (0.5 + 1e-9) * (most - least):
-            raise InputError(f"thickness_ratio_at: radius = {radius:g}: must be from {least:g} to {most:g}")
+        low, high = self.reference_radius[[0, -1]]
+        if not abs(finite("thickness_ratio_at: radius", radius) - (low + high) / 2) <= (0.5 + 1e-9) * (high - low):
+            raise InputError(f"thickness_ratio_at: radius = {radius:g}: must be from {low:g} to {high:g}")
         return float(np.interp(radius, self.reference_radius, self.thickness_ratio))
 
 
@@ -107,9 +107,9 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
         The distances, shape (m,), length.
     """
     a, b = line[:-1], line[1:]
-    along = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
-    away = points[:, None] - a - np.clip(along, 0, 1)[..., None] * (b - a)
-    return np.hypot(away[..., 0], away[..., 1]).min(1)
+    direction = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
+    offset = points[:, None] - a - np.clip(direction, 0, 1)[..., None] * (b - a)
+    return np.hypot(offset[..., 0], offset[..., 1]).min(1)
 
 
 class Profiles:
@@ -125,10 +125,10 @@ class Profiles:
 
     def of(self, state: Any) -> Profile:
         """Return the profile of a state; collective."""
-        self._probe = at = self._probe or self._make_probe()
-        deformed = at.points + at.displacement_in(state)
-        n = len(at.points) // 2
-        return Profile(at.points[:n].copy(), at.points[n:].copy(), deformed[:n], deformed[n:])
+        self._probe = problem = self._probe or self._make_probe()
+        deformed = problem.points + problem.displacement_in(state)
+        n = len(problem.points) // 2
+        return Profile(problem.points[:n].copy(), problem.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
         """Return the probe that evaluates displacements at the points of both faces.
@@ -176,14 +176,14 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
     tangent[2::2] += _unit(3 * b - 4 * m + a)
     found = np.empty_like(line)
     for k, (x, t) in enumerate(zip(line, tangent)):
-        ahead = (other - x) @ t
+        distance = (other - x) @ t
         away = np.hypot(*(other - x).T)
-        met = np.flatnonzero((ahead[:-1] <= 0) & (ahead[1:] > 0))
+        met = np.flatnonzero((distance[:-1] <= 0) & (distance[1:] > 0))
         if k in (0, len(line) - 1) or not len(met):
             found[k] = other[0 if k == 0 or k < len(line) - 1 and away[0] < away[-1] else -1]
             continue
         i = met[np.argmin(away[met])]
-        xi = (i % 2 + ahead[i] / (ahead[i] - ahead[i + 1])) / 2
+        xi = (i % 2 + distance[i] / (distance[i] - distance[i + 1])) / 2
         a, m, b = other[i - i % 2: i - i % 2 + 3]
         for _ in range(3):                                 # Newton's method along the curved edge
             point = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b

@@ -129,8 +129,8 @@ class StressField:
         Raises:
             InputError: the layer is unknown, or `exact` is not a function or returns another shape.
         """
-        mine, comm = self._recovery.of_layer(layer), self._recovery.problem.comm
-        return StressError(*(gathered(comm, v[mine]) for v in self._fitted.error(exact)))
+        selected, comm = self._recovery.of_layer(layer), self._recovery.problem.comm
+        return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
         """Return `StressError.mean` in this rank's cells, shape (m,), stress; collective."""
@@ -150,13 +150,13 @@ class StressField:
             InputError: the layer is unknown, or no cell lies between the radii.
         """
         comm, fitted = self._recovery.problem.comm, self._fitted
-        mine = self._recovery.of_layer(layer)
+        selected = self._recovery.of_layer(layer)
         if radii is not None:
             low, high = pair("stress peak: radii", radii)
             R = fitted.points[:, :, 0].mean(1)
-            mine &= (low <= R) & (high >= R)
+            selected &= (low <= R) & (high >= R)
         errors = np.sqrt(((fitted.smooth - fitted.raw) ** 2).sum((2, 3))).max(1, initial=0.0)
-        cells = [gathered(comm, v[mine]) for v in (*self._recovery.at_corners(fitted), errors)]
+        cells = [gathered(comm, v[selected]) for v in (*self._recovery.at_corners(fitted), errors)]
         if not len(cells[0]):
             raise InputError(f"stress peak: radii = {radii!r}: no cell has its middle between them")
         peak = StressPeak.among(*cells)
@@ -253,14 +253,14 @@ class Stresses:
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
-        domain, own = self.problem.forms.domain, order.size
+        domain, owned = self.problem.forms.domain, order.size
         if self._patches is None:
-            corners = _compat.cell_nodes(domain)[:own, :3]
+            corners = _compat.cell_nodes(domain)[:owned, :3]
             numbers = domain.geometry.index_map().local_to_global(corners.ravel()).reshape(-1, 3)
             layer = np.concatenate([np.full(len(self._owned(name)), k) for k, name in enumerate(self.cells)])[order]
-            first = comm.exscan(own) or 0
+            first = comm.exscan(owned) or 0
             points_of_all, numbers, layer = (gathered(comm, v) for v in (points, numbers, layer))
-            self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + own))
+            self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + owned))
         cubics = self._patches.fit(gathered(comm, values))
         return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
 
@@ -270,17 +270,17 @@ class Stresses:
         Returns:
             The stresses, shape (m,), and the positions (R, Z) of the corners, shape (m, 2), length.
         """
-        own = own_cells(self.problem.forms.domain)
-        X = of_cells(self.problem.forms.domain, own)[:, :3]
+        owned = own_cells(self.problem.forms.domain)
+        X = of_cells(self.problem.forms.domain, owned)[:, :3]
         assert self._patches is not None
         largest = np.linalg.eigvalsh(_cauchy(self._patches.at(fitted.cubics, X)))[..., -1]
-        top = (own, largest.argmax(1))
+        top = (owned, largest.argmax(1))
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
         """Return the numbers of the locally owned cells of a layer (None: of all), shape (m,)."""
-        own = own_cells(self.problem.forms.domain)
-        return np.isin(own, self.cells[self.layer(name)]) if name is not None else np.ones(len(own), dtype=bool)
+        owned = own_cells(self.problem.forms.domain)
+        return np.isin(owned, self.cells[self.layer(name)]) if name is not None else np.ones(len(owned), dtype=bool)
 
     def _owned(self, layer: str) -> np.ndarray:
         """Return the numbers of the locally owned cells of a layer."""

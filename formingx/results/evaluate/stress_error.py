@@ -50,8 +50,8 @@ class StressError(NamedTuple):
 
         It is `total` over the root of the integral of the squared computed stress and the squared error.
         """
-        whole = np.hypot(np.linalg.norm(self.stress), self.total)
-        return float(self.total / whole) if whole > 0 else 0.0
+        scale = np.hypot(np.linalg.norm(self.stress), self.total)
+        return float(self.total / scale) if scale > 0 else 0.0
 
 
 class StressPeak(NamedTuple):
@@ -74,18 +74,18 @@ class StressPeak(NamedTuple):
     doubtful_error: float
 
     @classmethod
-    def among(cls, sigma: np.ndarray, at: np.ndarray, error: np.ndarray) -> StressPeak:
+    def among(cls, sigma: np.ndarray, corners: np.ndarray, error: np.ndarray) -> StressPeak:
         """Return the peak over n cells.
 
         Args:
             sigma: largest principal stress in each cell, shape (n,), stress.
-            at: corner (R, Z) where it occurs, shape (n, 2), length.
+            corners: corner (R, Z) where it occurs, shape (n, 2), length.
             error: largest error in each cell, shape (n,), stress.
         """
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
-        same_corner = np.hypot(*(at - at[top]).T) <= 1e-9 * np.abs(at).max()
-        return cls(float(sigma[top]), at[top], float(error[same_corner].max()), float(sigma[worst]), at[worst],
-                   float(error[worst]))
+        same_corner = np.hypot(*(corners - corners[top]).T) <= 1e-9 * np.abs(corners).max()
+        return cls(float(sigma[top]), corners[top], float(error[same_corner].max()), float(sigma[worst]),
+                   corners[worst], float(error[worst]))
 
     @property
     def converged(self) -> bool:

@@ -65,7 +65,7 @@ class Tension:
         values = ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], at_rest])
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
-    def least(self, state: Any) -> Resultant:
+    def smallest(self, state: Any) -> Resultant:
         """Return the smallest resultant in a state, in plane strain only along the section; collective."""
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
@@ -103,8 +103,8 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
         line = isinstance(scene.model, Membrane) and scene.kinematics.components == 2
         tension = Tension(segment.problem) if line else None
         for state in segment.states:
-            if tension is not None and (least := tension.least(state)).compressed:
-                return k, least
+            if tension is not None and (smallest := tension.smallest(state)).compressed:
+                return k, smallest
             k += 1
     return None
 

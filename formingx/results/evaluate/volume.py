@@ -19,7 +19,7 @@ _FURTHEST = 2.0
 """J, or 1/J, at a point beside the quadrature points above which a report warns."""
 
 
-def findings(error: float, where: str, away: float | None = None) -> list[Finding]:
+def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
     """Return the findings on the volume error of a state.
 
     Args:
@@ -29,9 +29,9 @@ def findings(error: float, where: str, away: float | None = None) -> list[Findin
     """
     if error <= BOUND:
         return []
-    if away is not None and away <= 4 * BOUND:
+    if far_error is not None and far_error <= 4 * BOUND:
         return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
-                        f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * away:.2g} % from"
+                        f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * far_error:.2g} % from"
                         f" {_NEAR:g} lengths of that face on. The corner is singular: take no stresses from there.")]
     return [Finding("warning" if error > 4 * BOUND else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"

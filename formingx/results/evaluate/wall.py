@@ -139,8 +139,8 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
     if len(mesh.layers) == 1:
         return list(mesh.layers), np.zeros((0, *profile.reference_bottom.shape))
     edges = _interfaces(mesh)
-    across = profile.reference_top - profile.reference_bottom
-    found = {pair: _crossing(profile.reference_bottom, across, lines) for pair, lines in edges.items()}
+    direction = profile.reference_top - profile.reference_bottom
+    found = {pair: _crossing(profile.reference_bottom, direction, lines) for pair, lines in edges.items()}
     missing = [pair for pair, part in found.items() if not np.all(np.isfinite(part))]
     if missing or len(found) != len(mesh.layers) - 1:
         raise InputError(f"wall: the layers {', '.join(map(repr, mesh.layers))} do not lie one upon another from the"
@@ -151,7 +151,7 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
     names = [first]
     for pair in order:
         names.append(next(name for name in pair if name != names[-1]))
-    return names, np.array([profile.reference_bottom + found[pair][:, None] * across for pair in order])
+    return names, np.array([profile.reference_bottom + found[pair][:, None] * direction for pair in order])
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
@@ -176,17 +176,17 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
     return found
 
 
-def _crossing(start: np.ndarray, across: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
     """Return the parameters s at which lines start + s across meet straight pieces, shape (n,).
 
     The pieces have shape (m, 2, 2). s is nan if a line meets none of them within 0 <= s <= 1.
     """
-    a, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
+    a, edge = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
-    det = across[:, None, 0] * along[:, 1] - across[:, None, 1] * along[:, 0]
+    det = direction[:, None, 0] * edge[:, 1] - direction[:, None, 1] * edge[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        s = (from_start[..., 0] * along[:, 1] - from_start[..., 1] * along[:, 0]) / det
-        t = (from_start[..., 0] * across[:, None, 1] - from_start[..., 1] * across[:, None, 0]) / det
+        s = (from_start[..., 0] * edge[:, 1] - from_start[..., 1] * edge[:, 0]) / det
+        t = (from_start[..., 0] * direction[:, None, 1] - from_start[..., 1] * direction[:, None, 0]) / det
     tolerance = 1e-6
     s = np.where((t >= -tolerance) & (t <= 1 + tolerance) & (s >= -tolerance) & (s <= 1 + tolerance), s, np.inf).min(1)
     return np.where(np.isfinite(s), s, np.nan)

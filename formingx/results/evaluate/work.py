@@ -117,17 +117,17 @@ class EnergyBalance:
         names = dict.fromkeys(name for row in rows for name in row)
         return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
 
-    def _refined(self, a: Any, b: Any, whole: dict[str, float], small: float,
+    def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
         """Return the energies of a step, computed through states between its ends; `whole` is the first estimate."""
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
-            return whole
+            return estimate
         halves = [(start, end, self._step_energies(start, end)) for start, end in ((a, middle), (middle, b))]
-        if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(whole))) > small:
+        if abs(sum(sum(_gains(row)) for *_, row in halves) - sum(_gains(estimate))) > small:
             halves = [(start, end, self._refined(start, end, row, small, times - 1)) for start, end, row in halves]
-        (*_, found), (*_, rest) = halves
-        return {name: found.get(name, 0.0) + rest.get(name, 0.0) for name in {**found, **rest}}
+        (*_, found), (*_, second) = halves
+        return {name: found.get(name, 0.0) + second.get(name, 0.0) for name in {**found, **second}}
 
     def _middle(self, a: Any, b: Any) -> Any:
         """Return a state near the middle of a step, solved for from the start of the step, or None."""
@@ -221,30 +221,30 @@ class EnergyBalance:
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
         scale = forms.stress * forms.volume / forms.length
-        with problem.state_context(state) as at:
-            fields, n = at.x.array_r.copy(), at.n_owned
+        with problem.state_context(state) as p:
+            fields, n = p.x.array_r.copy(), p.n_owned
             e, d = _SMALL, state.direction
-            ahead, behind = (at.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
+            forward, backward = (p.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
                              for sign in (1, -1))
-            change = scale * (ahead - behind)[:n] / (2 * e)
+            change = scale * (forward - backward)[:n] / (2 * e)
             free = change.copy()
-            free[at.held] = 0                               # constrained unknowns
+            free[p.held] = 0                               # constrained unknowns
             for i, item in self._driven:
-                setting = at.setting
+                setting = p.setting
                 travel = forms.length * setting.amplitude(i, state.control)
                 by_arc = forms.length * setting.rate[i] * state.slope
                 if i in setting.inactive:
                     force = slope = 0.0
                 elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.together(i)]
-                    tools = [c for c in at.present if c.contact in together]
+                    tools = [c for c in p.present if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
                                  for c in tools)
                     slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.way)
                                 for c in tools)
                 else:
-                    force = -at.reaction(i, at.x, state.control)
-                    slope = self._sum(change[at.driven_unknowns(i)])
+                    force = -p.reaction(i, p.x, state.control)
+                    slope = self._sum(change[p.driven_unknowns(i)])
                 found[_entry_name(scene, item)] = _Reaction(force, slope, travel, by_arc)
         return found
 
@@ -294,8 +294,8 @@ class EnergyBalance:
 
     def _bonds(self, state: Any) -> float:
         """Return the energy stored in adhesive tools."""
-        with self._problem.state_context(state) as at:
-            return sum(resultants.energy(c, state.x[: at.n_owned], state.control) for c in at.present if c.law.pulls)
+        with self._problem.state_context(state) as p:
+            return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.pulls)
 
     def _sum(self, values: Any) -> float:
         """Return the sum over all ranks."""
@@ -387,5 +387,5 @@ def balance(path: Any) -> dict[str, np.ndarray]:
         made = zero.copy()
         made[first] = stored[first] - stored[first - 1]
         found["new_meshes"] = np.cumsum(made)
-    left = sum(found.values(), zero) - stored - sum(lost.values(), zero)
-    return found | {"strain_energy": stored} | lost | {"unbalanced": left}
+    unbalanced = sum(found.values(), zero) - stored - sum(lost.values(), zero)
+    return found | {"strain_energy": stored} | lost | {"unbalanced": unbalanced}

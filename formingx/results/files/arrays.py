@@ -51,7 +51,7 @@ def unpack(data: Any, content: bytes) -> Any:
         return data
     if data.keys() != {_KEY}:
         return {key: unpack(value, content) for key, value in data.items()}
-    at, kind, shape = data[_KEY]
+    first, kind, shape = data[_KEY]
     if kind not in _TYPES:
         raise ValueError(f"no array is of the type {kind!r}")
-    return np.frombuffer(content, kind, int(np.prod(shape, dtype=int)), at).reshape(shape)
+    return np.frombuffer(content, kind, int(np.prod(shape, dtype=int)), first).reshape(shape)

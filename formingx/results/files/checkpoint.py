@@ -107,19 +107,19 @@ class Checkpoint:
                 folder.mkdir(parents=True, exist_ok=True)
                 files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))
                 return 0
-            kept = read_json(folder / "scene.json")
-            check_scene(folder, kept, scene)
+            about_stored = read_json(folder / "scene.json")
+            check_scene(folder, about_stored, scene)
             folders = complete_states(folder)
             stored = [read_data(folder, k, checksums=False) for k in range(len(folders))]
             settled = max((k + 1 for k, data in enumerate(stored) if data["stepping"]), default=len(stored))
-            whole = stored[:max(settled, len(path))]        # later states belong to an unfinished step
-            if len(whole) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
-                                             for h, s in zip(whole, path.states)):
+            complete = stored[:max(settled, len(path))]        # later states belong to an unfinished step
+            if len(complete) > len(path) or any((h["control"], h["slope"]) != (s.control, s.slope)
+                                             for h, s in zip(complete, path.states)):
                 raise InputError(f"checkpoint {str(folder)!r} holds {len(stored)} states of another run: go on from it"
                                  f" with start=fx.load({str(folder)!r}, scene), give another folder, or remove it")
-            for unfinished in folders[len(whole):]:
+            for unfinished in folders[len(complete):]:
                 shutil.rmtree(unfinished)
-            return len(whole)
+            return len(complete)
         return files.on_root(problem.comm, lambda: named_os_errors(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State) -> None:
@@ -128,7 +128,7 @@ class Checkpoint:
         problem = segment.problem
         final = self.folder / state_name(number)
         part = final.with_name(final.name + ".part")
-        memory = [history.save(kept) for history, kept in zip(problem.histories, state.memory, strict=True)]
+        memory = [history.save(values) for history, values in zip(problem.histories, state.memory, strict=True)]
         space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": memory, "profile": _profile(self._path, state)}
         if state is segment.states[0] and segment is not self._path.segments[0]:
@@ -195,8 +195,8 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
             problem = _on_next_mesh(problem, record.last, data["mesh"])
             record.segments.append(Segment(problem, Curve(problem, Tolerances())))
         record.segments[-1].states.append(_read_state(data, problem))
-    kept = next((s.stepping for s in reversed(record.states) if s.stepping), None)
-    record.counts = Counts(**kept["counts"]) if kept else Counts()
+    last_stepping = next((s.stepping for s in reversed(record.states) if s.stepping), None)
+    record.counts = Counts(**last_stepping["counts"]) if last_stepping else Counts()
     record.counts.steps = sum(s.kind != "start" for s in record.states)
     problem.restore(record.last)
     return record
@@ -246,7 +246,7 @@ def _read_state(data: dict, problem: Any) -> State:
                  **{f.name: data[f.name] for f in fields(State) if f.name in data and f.name not in FIELDS})
 
 
-def _by_cell(space: Any, own: np.ndarray) -> np.ndarray:
+def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
     """Return unknowns in the order of the cells of the script's mesh, on rank 0; collective.
 
     Returns:
@@ -254,7 +254,7 @@ def _by_cell(space: Any, own: np.ndarray) -> np.ndarray:
     """
     topology, w = space.mesh.topology, fem.Function(space)
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
-    w.x.array[:n] = own[:n]
+    w.x.array[:n] = owned[:n]
     w.x.scatter_forward()
     parts = space.mesh.comm.gather((topology.original_cell_index[:cells], w.x.array[space.dofmap.list[:cells]]))
     numbers, values = (np.concatenate(column) for column in zip(*parts or [(np.zeros(0, int), np.zeros((0, 0)))]))
@@ -269,9 +269,9 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
     return found[:space.dofmap.index_map.size_local]
 
 
-def _tail(space: Any, own: np.ndarray) -> list[float]:
+def _tail(space: Any, owned: np.ndarray) -> list[float]:
     """Return the unknowns that belong to no cell, such as multipliers; the last rank owns them; collective."""
-    return space.mesh.comm.allgather(own[space.dofmap.index_map.size_local:].tolist())[-1]
+    return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 
 
 def _plain_state(state: State) -> dict[str, Any]:

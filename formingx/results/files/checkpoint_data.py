@@ -177,12 +177,12 @@ def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     try:
         content = (state_folder / ARRAYS).read_bytes()
         missing = [f.name for f in fields(State) if f.name not in (*FIELDS, "memory") and f.name not in data]
-        whole = not missing and data.get("number") == number and (
+        complete = not missing and data.get("number") == number and (
             not checksums or crc_sums(data, content) == data.get("checksums"))
-        found = unpack(data, content) if whole else data
+        found = unpack(data, content) if complete else data
     except (OSError, ValueError, TypeError):
-        whole, found = False, data
-    if not whole:
+        complete, found = False, data
+    if not complete:
         raise InputError(f"checkpoint {str(state_folder)!r} is damaged: its files are not those that were written"
                          f" (load's state= picks an earlier one)")
     return found
@@ -232,8 +232,8 @@ def crc_sums(data: dict, content: bytes) -> dict[str, int]:
         data: the data of state.json.
         content: the bytes of the arrays.
     """
-    rest = {key: value for key, value in data.items() if key != "checksums"}
-    return {"state.json": zlib.crc32(json.dumps(rest, sort_keys=True).encode()), ARRAYS: zlib.crc32(content)}
+    summed = {key: value for key, value in data.items() if key != "checksums"}
+    return {"state.json": zlib.crc32(json.dumps(summed, sort_keys=True).encode()), ARRAYS: zlib.crc32(content)}
 
 
 def named_os_errors(action: Callable[[], Any], folder: FilePath, what: str) -> Any:

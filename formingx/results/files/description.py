@@ -84,18 +84,18 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
     """Return {name: sum over a layer} of functions of a `Sample`, weighted so that a change at any point changes it."""
-    at = scene.sample(layer)
-    numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[at.cells])
-    weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(at.places)))).ravel()
-    return {name: float(scene.mesh.comm.allreduce(float(weights @ values(at)), MPI.SUM))
+    points_of = scene.sample(layer)
+    numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[points_of.cells])
+    weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(points_of.places)))).ravel()
+    return {name: float(scene.mesh.comm.allreduce(float(weights @ values(points_of)), MPI.SUM))
             for name, values in fields.items()}
 
 
 def _mesh(problem: Any) -> dict[str, Any]:
     """Return counts and sums of the mesh."""
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
-    cells = len(own := own_cells(domain))
-    x = of_cells(domain, own)[..., :COORDINATES] / problem.forms.length
+    cells = len(owned := own_cells(domain))
+    x = of_cells(domain, owned)[..., :COORDINATES] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)

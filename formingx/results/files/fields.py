@@ -72,8 +72,8 @@ class Fields:
         with problem.state_context(state):
             found = {"displacement": self._eval(self._u)}
         if self._components == 3:
-            ratio, rest = forms.F[2, 2], sum(forms.thicknesses.values())
-            wall = _compat.compile_expression(ufl.as_vector([rest * ratio, ratio, 0.0]), _NODES[2])
+            ratio, reference = forms.F[2, 2], sum(forms.thicknesses.values())
+            wall = _compat.compile_expression(ufl.as_vector([reference * ratio, ratio, 0.0]), _NODES[2])
             with problem.state_context(state):
                 h = self._eval(wall)
             found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
@@ -97,7 +97,7 @@ class Fields:
         if profile is not None:
             if self._between is None:  # a point stays on its line across the sheet
                 points = self.points.reshape(-1, self.points.shape[-1])
-                self._between = _across(points, profile.reference_bottom, profile.reference_top)
+                self._between = _position_across(points, profile.reference_bottom, profile.reference_top)
             k, part = self._between
             for name, values in (("thickness", profile.thickness), ("thickness_ratio", profile.thickness_ratio)):
                 found[name] = (1 - part) * values[k] + part * values[k + 1]
@@ -115,10 +115,10 @@ class Fields:
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
                 face = ContactFace(self._path, contact)
-                away, at = nearest(face.nodes, self.points.reshape(-1, self.points.shape[-1]))
-                self._faces[k] = face, face.nearest[at], away < 1e-9 * self._problem.forms.length
-            face, at, on_face = self._faces[k]
-            pressure += np.where(on_face, face.of(state).pressure[at], 0.0).reshape(pressure.shape)
+                distance, numbers = nearest(face.nodes, self.points.reshape(-1, self.points.shape[-1]))
+                self._faces[k] = face, face.nearest[numbers], distance < 1e-9 * self._problem.forms.length
+            face, numbers, on_face = self._faces[k]
+            pressure += np.where(on_face, face.of(state).pressure[numbers], 0.0).reshape(pressure.shape)
         return pressure
 
 
@@ -204,22 +204,22 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
     return np.concatenate(parts) if parts else None
 
 
-def _across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return for points (m, 2) the number k of the strip between lines k and k + 1, and the position in it, 0 to 1.
 
     The lines lead from the bottom to the top of a sheet. Both results have shape (m,).
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
-    along = top - bottom
+    line = top - bottom
     for i, x in enumerate(points):
-        side = along[:, 0] * (x - bottom)[:, 1] - along[:, 1] * (x - bottom)[:, 0]
-        s = np.clip(((x - bottom) * along).sum(1) / (along**2).sum(1), 0, 1)
-        away = np.hypot(*(bottom + s[:, None] * along - x).T)
+        side = line[:, 0] * (x - bottom)[:, 1] - line[:, 1] * (x - bottom)[:, 0]
+        s = np.clip(((x - bottom) * line).sum(1) / (line**2).sum(1), 0, 1)
+        distance = np.hypot(*(bottom + s[:, None] * line - x).T)
         between = np.flatnonzero(side[:-1] * side[1:] <= 0)
         if not len(between):                                    # beyond the first line, or the last
-            k[i], part[i] = (0, 0.0) if np.argmin(away) == 0 else (max(np.argmin(away) - 1, 0), 1.0)
+            k[i], part[i] = (0, 0.0) if np.argmin(distance) == 0 else (max(np.argmin(distance) - 1, 0), 1.0)
             continue
-        k[i] = between[np.argmin(away[between] + away[between + 1])]
-        a, b = away[k[i]], away[k[i] + 1]
+        k[i] = between[np.argmin(distance[between] + distance[between + 1])]
+        a, b = distance[k[i]], distance[k[i] + 1]
         part[i] = a / (a + b) if a + b > 0 else 0.0
     return k, part

@@ -109,8 +109,8 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
     text += b" " * (-len(text) % 4)
     chunks = b"".join(np.array([len(part)], "<u4").tobytes() + kind + part for kind, part in
                       ((b"JSON", text), (b"BIN\0", data)))
-    whole = b"glTF" + np.array([2, 12 + len(chunks)], "<u4").tobytes() + chunks
-    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(whole), "wb"))
+    content = b"glTF" + np.array([2, 12 + len(chunks)], "<u4").tobytes() + chunks
+    tabular.on_root(comm, lambda: tabular.replace(file, lambda stream: stream.write(content), "wb"))
 
 
 def _ends(number: np.ndarray) -> list[np.ndarray]:

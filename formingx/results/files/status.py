@@ -66,15 +66,15 @@ class Status:
             name, goal, now = self.target
             lines[0] += f": {name.replace('_', ' ')} {now:.6g} of {goal:.6g}"
         spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
-        left = self._without_pace() if self.left is None else \
+        remaining = self._without_pace() if self.left is None else \
             "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
-        most = sorted(self.limits.items(), key=lambda limit: -limit[1])[:3]
-        limits = ", ".join(f"{why} ({n} times)" for why, n in most)
+        frequent = sorted(self.limits.items(), key=lambda limit: -limit[1])[:3]
+        limits = ", ".join(f"{reason} ({n} times)" for reason, n in frequent)
         if self.ended is None:
-            left += f"; the last state is {_words(self.age)} old"
+            remaining += f"; the last state is {_words(self.age)} old"
         elif self.left != 0:
-            left = "the run could not go on" if self.ended["failure"] else "the run ended before its target"
-        lines += [f"after {spent}: {left}", f"steps limited by: {limits or 'their own control only'}"]
+            remaining = "the run could not go on" if self.ended["failure"] else "the run ended before its target"
+        lines += [f"after {spent}: {remaining}", f"steps limited by: {limits or 'their own control only'}"]
         if self.ended is not None and self.ended["failure"]:
             lines.append(self.ended["failure"])
         return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
@@ -101,22 +101,22 @@ def of_folder(folder: Any) -> Status:
     n, states, age = checkpoint_data.latest(folder, _RECENT)
     last, ended = states[-1], checkpoint_data.ended(folder)
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
-    kept: dict[str, Any] = done[-1]["stepping"] if done else {}
-    counts = kept.get("counts", {})
-    name, goal = aimed(kept, last["measures"]) or ("", 0.0)
+    stepping: dict[str, Any] = done[-1]["stepping"] if done else {}
+    counts = stepping.get("counts", {})
+    name, goal = aimed(stepping, last["measures"]) or ("", 0.0)
     if name not in last["measures"]:
         return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
                       counts.get("limits", {}), age, ended)
     now, before = done[-1]["measures"][name], done[0]["measures"][name]
     moved = {c: (done[0]["measures"][c], done[-1]["measures"][c]) for c in _MOVES if c in last["measures"]}
-    most = max(moved, key=lambda c: abs(np.subtract(*moved[c])) / (max(map(abs, moved[c])) or 1.0), default=None)
+    leader = max(moved, key=lambda c: abs(np.subtract(*moved[c])) / (max(map(abs, moved[c])) or 1.0), default=None)
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
-    left = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if nearer else None
-    return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], left,
-                  counts.get("limits", {}), age, ended, len(done) == 1,
-                  (most, *moved[most]) if most and not np.isclose(*moved[most], rtol=_STILL, atol=0.0) else None)
+    remaining = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if nearer else None
+    moving = leader if leader and not np.isclose(*moved[leader], rtol=_STILL, atol=0.0) else None
+    return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], remaining,
+                  counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 
 
 def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:

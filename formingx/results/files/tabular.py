@@ -53,8 +53,8 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
     file = named("to_csv", file, ".csv")
 
     def write(stream):
-        writer, quoted = (csv.writer(stream, lineterminator="\n", quoting=how)
-                          for how in (csv.QUOTE_MINIMAL, csv.QUOTE_ALL))     # a line that begins with # is a remark
+        writer, quoted = (csv.writer(stream, lineterminator="\n", quoting=style)
+                          for style in (csv.QUOTE_MINIMAL, csv.QUOTE_ALL))     # a line that begins with # is a remark
         (quoted if any(mark in name for name in header for mark in ";\t") else writer).writerow(header)
         for row in rows:
             cells = [repr(float(v)) if isinstance(v, (float, np.floating)) else v for v in row]

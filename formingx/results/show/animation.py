@@ -42,11 +42,11 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
     shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
     for a, b, fraction in spread(path, frames):
-        at = path.between(a, b, fraction)
-        shapes.append(path.profile(at))
+        interpolated = path.between(a, b, fraction)
+        shapes.append(path.profile(interpolated))
         names = shown[b.stage]
         now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))
-        tools.append(tooling.placed(tooling.travels(at.setting, at.control)))
+        tools.append(tooling.placed(tooling.travels(interpolated.setting, interpolated.control)))
     curves = {names: path.curve(*names) for names in shown.values()}
     axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
 
@@ -64,11 +64,11 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
         For each frame a state, the next state, and the position between them, 0 to 1.
     """
     profiles = [path.profile(state) for state in path.states]
-    at = progress({c: path[c] for c in path.columns}, profiles)
+    done = progress({c: path[c] for c in path.columns}, profiles)
     found = []
-    for s in np.linspace(0, at[-1], frames) if frames > 1 else at[-1:]:
-        k = int(np.clip(np.searchsorted(at, s, side="right") - 1, 0, len(at) - 2))
-        found.append((path.states[k], path.states[k + 1], float((s - at[k]) / ((at[k + 1] - at[k]) or 1.0))))
+    for s in np.linspace(0, done[-1], frames) if frames > 1 else done[-1:]:
+        k = int(np.clip(np.searchsorted(done, s, side="right") - 1, 0, len(done) - 2))
+        found.append((path.states[k], path.states[k + 1], float((s - done[k]) / ((done[k + 1] - done[k]) or 1.0))))
     return found
 
 
@@ -104,19 +104,19 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     low, high = plots.span(shapes, mirrored=len(sides) == 2)
     ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
-    figure, (left, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
-    bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=left, shrink=0.8, label="thickness / original")
+    figure, (first, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
+    bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=first, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
     pictures: list[Any] = []
-    for shape, ratio, tool, (names, at) in zip(shapes, ratios, tools, now):
-        left.clear()
-        left.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"),
+    for shape, ratio, tool, (names, point) in zip(shapes, ratios, tools, now):
+        first.clear()
+        first.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"),
                  ylabel=units.label("z"), aspect="equal")
-        left.spines[["top", "right"]].set_visible(False)
-        figures.tools(left, tool, low, high, mirror=len(sides) == 2)
+        first.spines[["top", "right"]].set_visible(False)
+        figures.tools(first, tool, low, high, mirror=len(sides) == 2)
         for side in sides:
-            plots.section(left, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
-        _curve(right, names, curves[names], at, units)
+            plots.section(first, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
+        _curve(right, names, curves[names], point, units)
         figure.canvas.draw()
         if not pictures:
             figure.set_layout_engine("none")                # or the axes would shift from frame to frame
@@ -124,15 +124,15 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     return pictures
 
 
-def _curve(axes: Any, names: tuple[str, str], curve: list, at: list[float], units: Units) -> None:
+def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], units: Units) -> None:
     """Draw the loading curve, and a dot at the present state."""
     x, y = map(units.label, names)
     axes.clear()
     axes.grid(True, color="0.9", linewidth=0.7)
     axes.plot(*curve, color="0.6")
-    axes.plot(*at, "o", color="tab:red")
+    axes.plot(*point, "o", color="tab:red")
     axes.set(xlabel=x, ylabel=y)
-    value = at[1] if abs(at[1]) > 1e-9 * np.abs(curve[1]).max() else 0.0
+    value = point[1] if abs(point[1]) > 1e-9 * np.abs(curve[1]).max() else 0.0
     axes.set_title(f"{names[1].replace('_', ' ')} {value:.4g} {units.of(names[1])}".rstrip(), fontsize=10)
 
 

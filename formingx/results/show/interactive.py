@@ -80,7 +80,7 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
 def _sheet(record: Record, units: Units) -> dict[str, Any]:
     """Return the profiles and fields of a sheet, frame by frame."""
     n = len(record.profiles[-1].bottom)
-    some = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
+    stations = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
     profiles = [record.profiles[k] for k in record.frames]
     for profile, fields_of_state in zip(profiles, [record.fields[k] for k in record.frames]):
@@ -88,12 +88,12 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
         values |= {_label(record, units, key): v for key, v in fields_of_state.items()}
         for key, v in values.items():
-            fields.setdefault(key, []).append(rounded(v[some], each=True))
+            fields.setdefault(key, []).append(rounded(v[stations], each=True))
     last = record.profiles[-1]
-    along = int(np.argmax(np.ptp(last.reference_bottom, axis=0)))          # of a parison: Z
-    return {"from": "RZ"[along], "material": rounded(last.reference_bottom[some, along]), "fields": fields,
-            "bottom": [rounded(p.bottom[some].T) for p in profiles],
-            "top": [rounded(p.top[some].T) for p in profiles]}
+    column = int(np.argmax(np.ptp(last.reference_bottom, axis=0)))          # of a parison: Z
+    return {"from": "RZ"[column], "material": rounded(last.reference_bottom[stations, column]), "fields": fields,
+            "bottom": [rounded(p.bottom[stations].T) for p in profiles],
+            "top": [rounded(p.top[stations].T) for p in profiles]}
 
 
 def _label(record: Record, units: Units, key: str) -> str:
@@ -170,8 +170,8 @@ def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict
         for tool, force in record.forces.items():
             drawn.setdefault("Force", (units.label("force"), []))[1].append(_trace(time, force, lead + tool))
         warm = [k for k in record.frames if "temperature" in record.fields[k]]
-        for which, of in (("hottest", np.max), ("mean", np.mean), ("coldest", np.min)) if warm else ():
-            values = np.array([of(record.fields[k]["temperature"]) for k in warm])
+        for which, reduce in (("hottest", np.max), ("mean", np.mean), ("coldest", np.min)) if warm else ():
+            values = np.array([reduce(record.fields[k]["temperature"]) for k in warm])
             drawn.setdefault("Temperature", (_label(record, units, "temperature"), []))[1].append(
                 _trace(time[warm], values, lead + which))
     return [_chart(f"{kind} over time", units.label("process_time"), label, traces)

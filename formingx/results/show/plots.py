@@ -50,9 +50,9 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
     """
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
-        own = travel.replace("travel", "force")
+        own_force = travel.replace("travel", "force")
         forces = [c for c in columns if c.endswith("_force")]       # tools that move come first
-        return travel, next(c for c in (own, *forces, "pole_height", "strain_energy") if c in columns)
+        return travel, next(c for c in (own_force, *forces, "pole_height", "strain_energy") if c in columns)
     return (next(c for c in ("pole_height", "enclosed_volume", "strain_energy") if c in columns),
             next(c for c in columns if c.endswith("pressure")))
 

@@ -141,8 +141,8 @@ class Record:
                                  f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer"
                                  f" mesh, keeps it."))
         found += [*self._of_volume(), *self._of_verdict()]
-        mine = {finding.about for finding in found}         # on all states; `self.findings` are on the last one
-        found += [finding for finding in self.findings if finding.about not in mine]
+        subjects = {finding.about for finding in found}         # on all states; `self.findings` are on the last one
+        found += [finding for finding in self.findings if finding.about not in subjects]
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(Finding("note", "steps", f"{self.counts['failures']} attempts at a step failed and were"
                                  f" repeated with a shorter step; that does not impair the results."))
@@ -268,9 +268,9 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
     if not heat:
         return {}
 
-    def said(tool):
+    def described(tool):
         return f"{tool:g}" if isinstance(tool, int | float) else f"{tool['start']:g} at first, {tool['back']:g} behind"
-    return {"heat": {name: (conductance, said(tool)) for name, (conductance, tool) in heat["tools"].items()},
+    return {"heat": {name: (conductance, described(tool)) for name, (conductance, tool) in heat["tools"].items()},
             "unit": heat["unit"]}
 
 
@@ -279,12 +279,12 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     numbers = None
     for values, state in zip(found, states):
-        kept = next((m for m in state["memory"] if "temperature" in m and "points" in m), None)
-        if kept is None or last is None:
+        stored = next((m for m in state["memory"] if "temperature" in m and "points" in m), None)
+        if stored is None or last is None:
             return found
         if numbers is None:
-            numbers = nearest(np.asarray(kept["points"]), np.array([last.reference_bottom, last.reference_top]))[1]
-        values["temperature"] = np.asarray(kept["temperature"])[numbers].mean(0)
+            numbers = nearest(np.asarray(stored["points"]), np.array([last.reference_bottom, last.reference_top]))[1]
+        values["temperature"] = np.asarray(stored["temperature"])[numbers].mean(0)
     return found
 
 
@@ -301,8 +301,8 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
     """
     n = len(at)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
-    way = (at + np.linspace(0, 1, n)) / 2
-    even = np.searchsorted(way, np.linspace(0, 1, max(most - len(marked), most // 2)))
+    position = (at + np.linspace(0, 1, n)) / 2
+    even = np.searchsorted(position, np.linspace(0, 1, max(most - len(marked), most // 2)))
     return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > most else list(range(n))
 
 
@@ -317,15 +317,15 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
         profiles: profiles of the states.
     """
     n = len(profiles)
-    way, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
+    steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
     driven = [c for c in measures if c.endswith(("pressure", "travel", "displacement"))]
     for column in ["process_time"] if np.ptp(clock) > 0 else driven:
         values = measures[column]
-        way[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(driven)
+        steps[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(driven)
     if not np.ptp(clock) > 0 and all(p is not None for p in profiles):
         moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(profiles, profiles[1:])]
-        way[1:] += np.array(moved) / (sum(moved) or 1.0)
-    done = np.cumsum(way)
+        steps[1:] += np.array(moved) / (sum(moved) or 1.0)
+    done = np.cumsum(steps)
     return done / done[-1] if done[-1] > 0 else np.linspace(0, 1, n)
 
 
@@ -362,6 +362,6 @@ def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
 
     The face of the sheet that is nearer to the contact points is used.
     """
-    away, at = zip(*(nearest(table.reference_points, p) for p in points))
-    nearer = np.argmin([a.mean() for a in away])
-    return table.pressure[at[nearer]]
+    distance, numbers = zip(*(nearest(table.reference_points, p) for p in points))
+    nearer = np.argmin([a.mean() for a in distance])
+    return table.pressure[numbers[nearer]]

@@ -112,7 +112,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
              "<h2>Curves</h2><div id=charts class=grid></div>"]
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
-        body += _behind(record, units)
+        body += _details(record, units)
     body += ["<h2>Made with</h2>", page.table(["", ""], _made(records))]
     return page.page(title, body, scripts(interactive.data(records, names, units)))
 
@@ -151,7 +151,7 @@ def _trouble(failure: Any, lead: str) -> list[str]:
     return found + ([page.picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
 
 
-def _behind(record: Record, units: Units) -> list[str]:
+def _details(record: Record, units: Units) -> list[str]:
     """Return the sections below the results: stages, tools, inputs, warnings; closed: all quantities, convergence."""
     found = []
     if any(record.stages):
