@@ -15,8 +15,8 @@ import numpy as np
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
 
-_FAR = 1e30
-"""A length larger than all others, but finite: its product with 0 is 0."""
+FAR = 1e30
+"""A number larger than all others, but finite: its product with 0 is 0."""
 
 
 class ContactStatus(IntEnum):
@@ -256,7 +256,7 @@ class NormalLaw(ContactLaw):
         return self._with(**{name: value[points] for name, value in arrays.items()})
 
     def without(self, points: np.ndarray) -> Self:
-        return self._with(shift=self.shift + np.where(points, _FAR, 0.0))
+        return self._with(shift=self.shift + np.where(points, FAR, 0.0))
 
     def _with(self, **other: Any) -> Self:
         """Return the same law with other attributes."""

@@ -61,7 +61,6 @@ class SnapThrough:
         iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
             halves its length.
         near_rest: viscous forces below which equilibrium without them is tried.
-        sweeps: solutions in which a body releases a tool in three dimensions.
         at_rest: viscous forces below which the body is in equilibrium, even if the iteration without them fails. It may
             oscillate where a point is at a kink of its law of friction.
     """
@@ -87,7 +86,6 @@ class SnapThrough:
     too_far: float = 10.0
     near_rest: float = 1e-3
     at_rest: float = 1e-10
-    sweeps: int = 30
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
         """Return `lengths`; the last alone where contacts with friction stick, for there shorter steps succeed."""
@@ -338,7 +336,7 @@ def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callabl
     Raises:
         Failure: no such state was found.
     """
-    for _ in range(SnapThrough.sweeps):
+    for _ in range(curve.sweeps):
         if not limit.let_go(new):
             return new
         try:

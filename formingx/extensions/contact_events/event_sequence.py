@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...contact.approach import gap_closures
-from ...physics.contact_law import ContactStatus
+from ...physics.contact_law import FAR, ContactStatus
 from .reduced_contact import Points
 from .response import Response
 
@@ -39,7 +39,6 @@ class EventSettings:
         taken_over: sliding points of the start state get their own forces only up to this number of points.
         same_place: convergence tolerance of a sticking point: its motion over its tributary length.
         about_there: convergence tolerance of a point that may slide, likewise.
-        far: sum of squared positions above which the iteration has diverged, length^2.
         soon: part of the step within which two closures are simultaneous.
         earlier: maximum number of times that an earlier closure replaces the one being located.
         late: largest change of an event's arc length in an iteration, relative to that arc length.
@@ -54,7 +53,6 @@ class EventSettings:
     taken_over: int = 80
     same_place: float = 1e-3
     about_there: float = 1e-2
-    far: float = 1e30
     soon: float = 0.02
     earlier: int = 3
     late: float = 1.0
@@ -392,7 +390,7 @@ class ContactEventSequence:
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
         gram = self._comm.allreduce(by @ by.T)
-        if not gram.trace() < _SETTINGS.far:
+        if not gram.trace() < FAR:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
         right = gram[-1, -1] - gram[:-1, -1]

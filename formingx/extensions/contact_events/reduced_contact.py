@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...physics.contact_law import ContactStatus
+from ...physics.contact_law import FAR, ContactStatus
 from .response import Response
 
 
@@ -34,7 +34,6 @@ class StatusSearch:
     Attributes:
         all_at_once: number of trials in which all violating statuses change; later only one changes at a time.
         tries: maximum number of status sets.
-        rough: finite value that replaces an infinite friction coefficient.
         none: part of the largest rate below which a rate is negligible.
         soon: arc length over which force rates are compared with forces.
         limit: relative distance from the Coulomb cone, or from zero pressure, that counts as on it.
@@ -42,7 +41,6 @@ class StatusSearch:
 
     all_at_once: int = 6
     tries: int = 60
-    rough: float = 1e30
     none: float = 1e-9
     soon: float = 1e-4
     limit: float = 1e-6
@@ -128,11 +126,11 @@ class Points:
             self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
         self._C = self.at(self.by).reshape(len(self.steps), -1)
         ones = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, _SEARCH.rough) * unit,
+        more = self.at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
                                          face.law.elastic_slip * unit, face.scale, face.law.pulls * unit])
                         for face, unit in zip(self._faces, ones)], new)
         friction, slip, scale, pulls = more.T
-        self.friction = np.append(self.friction, np.where(friction < _SEARCH.rough, friction, np.inf))
+        self.friction = np.append(self.friction, np.where(friction < FAR, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)
         known = self.at([face.stiffness_in_tangent for face in self._faces], new)
