@@ -154,7 +154,8 @@ MUTANTS = [Mutant(*row) for row in [
     ("results/evaluate/tension.py", "- F[1, 1] * P[1, 1])", "+ F[1, 1] * P[1, 1])", "membrane"),
     ("results/evaluate/part.py", "(r * r + r * s + s * s) * (w - z)", "(r * r + s * s) * 1.5 * (w - z)", "details"),
     ("results/evaluate/contact_face.py", "(traction / ratio).T", "traction.T", "answers"),
-    ("results/evaluate/filling.py", "left[k] - gap) / (left[k]", "left[k] - gap) / (gap + left[k]", "answers"),
+    ("results/evaluate/filling.py", "remaining[k] - gap) / (remaining[k]",
+     "remaining[k] - gap) / (gap + remaining[k]", "answers"),
     ("results/evaluate/point_stress.py", "n[:, 1], -n[:, 0]", "n[:, 1], n[:, 0]", "stress"),
 ]]
 
