@@ -271,6 +271,18 @@ class TestNearest:
         assert near.distance == pytest.approx([-0.5, 1.0])
         assert np.array_equal(near.normal, self.corner.nearest(x).normal)
 
+    @pytest.mark.parametrize("degrees", range(0, 360, 30))
+    def test_fillets_in_all_directions(self, degrees):
+        """Angles of an arc go on beyond half a turn, in both senses: the other side of a trapezium is not nearer."""
+        solid = fx.Tool([(-3, -1), (3, -1), (1, 1), (-1, 1)], fillets=[0, 0, 0.5, 0.5], closed=True).turned(degrees)
+        for tool, sign in ((solid, 1), (solid.reversed(), -1)):
+            arcs = [piece for piece in tool.pieces if isinstance(piece, Arc)]
+            middle = np.array([piece.start + piece.sweep / 2 for piece in arcs])
+            out = np.column_stack([np.cos(middle), np.sin(middle)])
+            near = tool.nearest([piece.centre for piece in arcs] + 0.4 * out)
+            assert near.distance == pytest.approx(sign * np.full(2, 0.1), rel=1e-12)
+            assert near.normal == pytest.approx(-sign * out, abs=1e-12)
+
     def test_zero_length_and_nearly(self):
         """A piece of length 0 is refused; one of 1e-6 of the profile changes no distance by more than its length."""
         with pytest.raises(fx.InputError, match="no length"):

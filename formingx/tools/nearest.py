@@ -41,7 +41,6 @@ static long closest(double r, double z, long pieces, long lines, const double *t
             }
         }
         if (!beyond && (at < p[LOW] || at > p[HIGH])) continue;
-        if (isnan(d)) { *distance = d; return k; }
         if (best < 0 || fabs(d) < fabs(*distance)) { *distance = d; best = k; }
     }
     return best;
@@ -54,7 +53,7 @@ void nearest(long points, const double *x, long pieces, long lines, const double
         long k = closest(x[0], x[1], pieces, lines, table, 0, distance + i);
         if (k < 0) k = closest(x[0], x[1], pieces, lines, table, 1, distance + i);
         const double *p = table + k * COLUMNS, u = x[0] - p[R], v = x[1] - p[Z], away = hypot(u, v);
-        curvature[i] = -p[SIGN] / (away > 1e-300 || isnan(away) ? away : 1e-300);
+        curvature[i] = -p[SIGN] / (away < 1e-300 ? 1e-300 : away);
         normal[0] = -p[ALONG_Z] + curvature[i] * u;
         normal[1] = p[ALONG_R] + curvature[i] * v;
     }
