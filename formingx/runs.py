@@ -52,7 +52,8 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: path of this scene to be continued, for example from `formingx.load`; it is not changed. Without `step`
             the step length continues, too. Targets that the path has met count as met. If another target lies behind
-            the start, the run goes back. Only a pressure is searched for ahead, because it may return.
+            the start, the run goes back. A target pressure is approached forward, because the pressure may pass it
+            again.
         checkpoint: folder to which every accepted state is written (`formingx.load`).
         record: {name: quantity} of additional columns. A quantity is a function of the `Problem` that returns a number,
             or a target such as `displacement(0, at=(1, 0))`, whose quantity is recorded.
@@ -77,9 +78,9 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         The path with all accepted states.
 
     Raises:
-        InputError: there is no controlled item. A target needs an item that the scene does not have, or cannot be met:
-            its place is supported or inside a tool, its value behind the start or beyond the strength of the material.
-            `start` or the checkpoint belongs to another run.
+        InputError: there is no controlled item. A target needs an item that the scene does not have. A target cannot be
+            met: its place is supported or inside a tool, or its value lies behind the start or beyond the strength of
+            the material. `start` or the checkpoint belongs to another run.
         ConvergenceError: the target was not reached. The error carries the path so far and gives advice.
         OSError: the checkpoint cannot be written; its states are kept.
 

@@ -233,7 +233,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,
                comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
-    """Return the mesh of a body between two polygons, whose points are opposite each other.
+    """Return the mesh of a body between two polylines, whose points are opposite each other.
 
     Boundaries: `inner`, `outer`, and `start` and `end`, which join the first or the last points. `start` or `end` is
     called `axis` if both points have R = 0.

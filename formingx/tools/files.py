@@ -26,7 +26,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
          tolerance: float | None = None, body: Any = None, units: str | float | Units | None = None) -> Tool:
     """Return a tool from curves of a file.
 
-    Lines and circular arcs are exact; curves of a mesh (.msh) are polygons through its nodes. The ending of the name
+    Lines and circular arcs are exact; curves of a mesh (.msh) are polylines through its nodes. The ending of the name
     gives the format: .step or .stp, .brep, .dxf, .msh or .geo. The curves lie in the plane z = 0.
 
     A .geo file is a script, but it is not run. It may contain points, lines, circles and named numbers; loops, surfaces

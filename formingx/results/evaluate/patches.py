@@ -58,7 +58,11 @@ class Patches:
         return found
 
     def _operator(self, chunk: slice) -> np.ndarray:
-        """Return the matrices from values at the points of patches to coefficients, shape (cells, 10, points)."""
+        """Return the least-squares matrices from values at the points of patches to coefficients of cubics.
+
+        Returns:
+            Shape (cells, 10, points).
+        """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
         patch = self._patch[chunk]

@@ -97,11 +97,11 @@ class Profile:
 
 
 def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the shortest distances of points from a polygon.
+    """Return the shortest distances of points from a polyline.
 
     Args:
         points: shape (m, 2), length.
-        line: corners of the polygon, shape (n, 2), length.
+        line: corners of the polyline, shape (n, 2), length.
 
     Returns:
         The distances, shape (m,), length.
@@ -199,5 +199,5 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def _length_along(points: np.ndarray) -> np.ndarray:
-    """Return the arc length from the first point of a polygon, shape (n,), length."""
+    """Return the arc length from the first point of a polyline, shape (n,), length."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
