@@ -581,4 +581,5 @@ def test_ribbed_tray_quick(tmp_path):
     coarse = found["size_16"]
     assert found["mould"]["undercut_area"] == 0 and coarse["touching"] > 0.95
     assert coarse["weight_g"] == pytest.approx(27.57, rel=0.02) and 0.4 < coarse["least_wall_mm"] < 0.8
+    assert coarse["least_wall_mm"] <= coarse["least_wall_around_mm"] < 0.9
     assert (tmp_path / "part.stl").stat().st_size > 1000
