@@ -500,6 +500,8 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0, part="half"), 0.3, reflected=["rim"]), "'rim' is not straight"),
     (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, -1), (2, -1), (2, 1), (0, 1)], 0.3, names=[*"abcdef"],
                            reflected=["a"]), "'a': the sheet meets its line at other places"),
+    (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, 0.5), (2, 0.5), (2, 0), (3, 0), (3, 1), (0, 1)], 0.3,
+                           names=[*"abcdefgh"], reflected=["a"]), "'a': the sheet meets its line at other places"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: x), r"size at \(-.*: must be greater than 0"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x: x), "the function fails: TypeError"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: 1e-5 + x * x), "more than 500000 triangles"),
