@@ -212,7 +212,7 @@ def test_no_flux_where_nothing_touches():
     mesh = fx.mesh.disc(radius=0.04, thickness=D, elements=(8, 3))
     tool = fx.ConductingTool(thickness=0.01, back=30.0, **TOOL)
     body = body_of(mesh, [fx.ContactWithTool("bottom", conductance=300, tool=tool)], start=150.0)
-    touch = body.touches[0]
+    touch = body.tool_contacts[0]
     away = touch.points[:, 0] > 0.0201
     touch.conductance[away] = 0.0
     body.update()

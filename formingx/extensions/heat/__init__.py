@@ -1,1 +1,1 @@
-"""Heat: conduction in a sheet over time, what its faces give and take, tools that it touches."""
+"""Heat conduction in a sheet over time, heat exchange at its faces, and tools in contact with it."""

@@ -1,7 +1,7 @@
-"""Thermal properties of a body, and the heat that its faces and its interior receive: one law each.
+"""Thermal properties of a body, and the laws of heat at its faces and in its interior.
 
-A flux is heat into the body per area of the deformed face and time. All numbers are in one consistent set of units, the
-mesh's unit of length among them. A "table over R" is a `formingx.table` of the reference radius.
+A flux is heat into the body per deformed area and time. All numbers are in one consistent set of units, with the mesh's
+unit of length. A "table over R" is a `formingx.table` of the reference radius.
 """
 
 from typing import Any
@@ -10,19 +10,19 @@ from ...errors import InputError, finite, non_negative, positive
 from ...values.table import Table
 
 STEFAN_BOLTZMANN = 5.670374419e-8
-"""W/(m2 K4)."""
+"""Stefan-Boltzmann constant, W/(m2 K4)."""
 
 
 class ThermalProperties:
-    """Thermal properties of a material.
+    """Thermal properties of a material, in one consistent set of units (in SI: W/(m K), kg/m3, J/(kg K)).
 
     Args:
         conductivity: k, heat per time, length and degree.
-        density: of the reference body, mass per volume.
-        heat_capacity: per mass and degree. (In SI: W/(m K), kg/m3, J/(kg K).)
+        density: density of the reference body, mass per volume.
+        heat_capacity: specific heat capacity, heat per mass and degree.
 
     Raises:
-        InputError: a number that is not above 0.
+        InputError: a number that is not positive.
 
     >>> fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)      # W/(mm K), g/mm3, J/(g K)
     ThermalProperties(conductivity=0.0002, density=0.001, heat_capacity=2.0)
@@ -35,7 +35,7 @@ class ThermalProperties:
 
     @property
     def diffusivity(self) -> float:
-        """k/(density heat_capacity), length^2/time."""
+        """Thermal diffusivity k/(density heat_capacity), length^2/time."""
         return self.conductivity / (self.density * self.heat_capacity)
 
     def __repr__(self) -> str:
@@ -44,7 +44,7 @@ class ThermalProperties:
 
 
 class _Boundary:
-    """Law of a face.
+    """Law of heat at a face.
 
     Attributes:
         parameters: {name: number or Table over R}.
@@ -62,6 +62,7 @@ class _Boundary:
                            for name, value in parameters.items()}
 
     def _between(self, name: str, low: float, high: float = float("inf")) -> None:
+        """Raise an InputError unless all values of a parameter lie between two bounds."""
         value = self.parameters[name]
         for number in value.y if isinstance(value, Table) else [value]:
             if not low <= number <= high:
@@ -81,11 +82,14 @@ class _Boundary:
 
 
 class Convection(_Boundary):
-    """Air along a face: flux h (air - T).
+    """Convection at a face.
+
+    .. math:: q = h (T_{air} - T)
 
     Args:
         on: name of the boundary.
-        h: heat transfer coefficient, heat per time, area and degree; air: temperature; numbers or tables over R.
+        h: heat transfer coefficient, heat per time, area and degree, number or table over R.
+        air: temperature of the air, number or table over R.
 
     >>> fx.Convection("top", h=2e-5, air=fx.table({0.0: 25.0, 10.0: 20.0}))              # W/(mm2 K); by R
     Convection('top', h=2e-05, air=table({0: 25, 10: 20}))
@@ -98,16 +102,30 @@ class Convection(_Boundary):
         self._between("h", 0.0)
 
     def flux(self, T, absolute_zero, h, air):
-        """Return the heat flux into the face, UFL."""
+        """Return the heat flux into the face.
+
+        Args:
+            T: temperature (UFL scalar).
+            absolute_zero: not used.
+            h: heat transfer coefficient (UFL scalar).
+            air: temperature of the air (UFL scalar).
+
+        Returns:
+            Flux (UFL scalar), heat per time and area.
+        """
         return h * (air - T)
 
 
 class Radiation(_Boundary):
-    """A grey face before a black heater: flux view_factor emissivity sigma (heater^4 - T^4), from absolute zero.
+    r"""Radiation from a black heater to a grey face, with absolute temperatures.
+
+    .. math:: q = f \epsilon \sigma (T_{heater}^4 - T^4)
 
     Args:
         on: name of the boundary.
-        emissivity, view_factor: from 0 to 1; heater: temperature; numbers or tables over R.
+        emissivity: emissivity of the face, from 0 to 1, number or table over R.
+        heater: temperature of the heater, number or table over R.
+        view_factor: view factor f, from 0 to 1, number or table over R.
         stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
 
     >>> fx.Radiation("top", emissivity=0.9, heater=600.0, stefan_boltzmann=5.67e-14)      # W/(mm2 K4)
@@ -125,17 +143,29 @@ class Radiation(_Boundary):
         self._between("view_factor", 0.0, 1.0)
 
     def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
-        """Return the heat flux into the face, UFL."""
+        """Return the heat flux into the face.
+
+        Args:
+            T: temperature (UFL scalar).
+            absolute_zero: absolute zero in the unit of temperatures.
+            emissivity: emissivity of the face (UFL scalar).
+            heater: temperature of the heater (UFL scalar).
+            view_factor: view factor (UFL scalar).
+            stefan_boltzmann: Stefan-Boltzmann constant.
+
+        Returns:
+            Flux (UFL scalar), heat per time and area.
+        """
         kelvin = (heater - absolute_zero, T - absolute_zero)
         return view_factor * emissivity * stefan_boltzmann * (kelvin[0] ** 4 - kelvin[1] ** 4)
 
 
 class HeatFlux(_Boundary):
-    """A given flux into a face.
+    """Prescribed heat flux into a face.
 
     Args:
         on: name of the boundary.
-        flux: heat per time and area, number or table over R; negative takes heat out.
+        flux: heat per time and area, number or table over R; negative out of the body.
 
     >>> fx.HeatFlux("top", flux=1e-3)
     HeatFlux('top', flux=0.001)
@@ -145,12 +175,21 @@ class HeatFlux(_Boundary):
         super().__init__(on, flux=flux)
 
     def flux(self, T, absolute_zero, flux):
-        """Return the heat flux into the face, UFL."""
+        """Return the heat flux into the face.
+
+        Args:
+            T: not used.
+            absolute_zero: not used.
+            flux: the flux (UFL scalar).
+
+        Returns:
+            Flux (UFL scalar), heat per time and area.
+        """
         return flux
 
 
 class FixedTemperature(_Boundary):
-    """A face at a prescribed temperature from the start.
+    """Face at a prescribed temperature from the start.
 
     Args:
         on: name of the boundary.
@@ -167,15 +206,18 @@ class FixedTemperature(_Boundary):
 
 
 class Absorption:
-    """Radiation that goes through a face and is absorbed in the depth x below it (Beer and Lambert's law).
+    r"""Radiation that passes through a face and is absorbed below it (Beer-Lambert law).
 
-    Heat per deformed volume and time: flux coefficient exp(-coefficient x), x the distance to the deformed face.
+    The heat per deformed volume and time at a distance x from the deformed face is
+
+    .. math:: s = q \, a \exp(-a x)
+
     Radiation that leaves through the other face is lost.
 
     Args:
-        on: name of the boundary through which the radiation enters; for both sides give two laws.
-        flux: radiation that enters, heat per time and area.
-        coefficient: 1/length, above 0.
+        on: name of the boundary through which the radiation enters; two laws for radiation from both sides.
+        flux: incoming radiation q, heat per time and area.
+        coefficient: absorption coefficient a, 1/length, positive.
 
     >>> fx.Absorption("top", flux=2e-3, coefficient=1.5)                           # W/mm2, 1/mm
     Absorption('top', flux=0.002, coefficient=1.5)

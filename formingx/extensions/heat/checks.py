@@ -10,7 +10,7 @@ from ...findings import Finding, register
 from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
 from ...values.temperature import FunctionOfTemperature
-from .cooling import CoolingHistory
+from .cooling_history import CoolingHistory
 from .layers import graded, height_at
 from .run import checked_materials
 
@@ -22,9 +22,10 @@ _RISES = 2.0               # modulus of the coldest over the modulus of the hott
 _ALLOWED = 0.01
 """Error of the temperature, over the span of temperatures, above which the check warns."""
 _ONE_LAYER = 0.14
-"""Error over the span of temperatures with one layer of elements, its face at another temperature at once. This and the
-next two are measured with one to eight equal layers, after a hundredth of wall^2/diffusivity: see
-tests/test_heat_layers.py.
+"""Error over the span of temperatures with one layer of elements, for a face that is chilled suddenly.
+
+This and the next two constants were measured with one to eight equal layers, after a hundredth of wall^2/diffusivity
+(tests/test_heat_layers.py).
 """
 _ORDER = 1.75
 """Order of the error in the number of layers."""
@@ -33,27 +34,45 @@ _WEAK = 2.0
 
 
 def error_of_layers(layers: float, biot: float) -> float:
-    """Return the error of the temperature in a chilled sheet, over its span, soon after the face is chilled.
+    """Return the relative temperature error in a sheet soon after a face is chilled.
 
     Args:
         layers: wall over the thickness of the elements at the face.
         biot: conductance times wall over conductivity.
+
+    Returns:
+        Error over the span of temperatures.
     """
     return _ONE_LAYER * _share(biot) * layers ** -_ORDER
 
 
 def layers_needed(biot: float) -> int:
-    """Return the number of equal layers of elements for which `error_of_layers` is 1 %."""
+    """Return the number of equal layers of elements for an error of 1 %.
+
+    Args:
+        biot: conductance times wall over conductivity.
+
+    Returns:
+        Number of layers, see `error_of_layers`.
+    """
     return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
 
 
 def _share(biot: float) -> float:
+    """Return the error at a Biot number over the error at an infinite one."""
     return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
 
 
 @register("scene")
 def coarse_layers(body: Any) -> Iterator[Finding]:
-    """Too few layers of elements through a sheet that is chilled at a face."""
+    """Find sheets with too few layers of elements below a chilled face.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        A finding for each such face.
+    """
     scene = body.scene
     if scene.heat is None:
         return
@@ -79,10 +98,16 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def springs_back(body: Any) -> Iterator[Finding]:
-    """Equilibrium moduli that rise as a stretched body cools: they pull it back in place of fixing its shape.
+    """Find equilibrium moduli that increase on cooling, and so pull the part back instead of fixing its shape.
 
-    (A film was drawn into a mould with a table of stiffness on its equilibrium energy. It came off the mould and shrank
-    to a third of its height.)
+    For example, a film was drawn into a mould with a table of stiffness on its equilibrium energy. It came off the
+    mould and shrank to a third of its height.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        A finding for each such constant.
     """
     scene = body.scene
     if scene.heat is None:
@@ -109,7 +134,14 @@ def springs_back(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def beyond_limits(body: Any) -> Iterator[Finding]:
-    """Temperatures to which tools, air and heaters may bring the body, at which a constant is not known."""
+    """Find temperatures that the body may reach by tools, air and heaters, but at which a constant is unknown.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        A finding for each such constant.
+    """
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
         yield from _beyond(body.scene, low, high, "the tools and the air may bring it")
@@ -117,7 +149,14 @@ def beyond_limits(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def were_beyond_limits(path: Any) -> Iterator[Finding]:
-    """Temperatures of the run at which a constant is not known, unless a check before the run has found them."""
+    """Find temperatures of the run at which a constant is unknown, unless an earlier check has found them.
+
+    Args:
+        path: the path.
+
+    Yields:
+        A finding for each such constant.
+    """
     said = {finding.about for finding in path.record.findings}
     states = path.segments[-1].states
     for k, history in enumerate(path.problem.histories):
@@ -130,11 +169,12 @@ def were_beyond_limits(path: Any) -> Iterator[Finding]:
 
 
 def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
-    """Yield constants of materials, friction and expansion that are not known all the way from low to high.
+    """Yield findings for constants of materials, friction and expansion that are unknown between two temperatures.
 
     Args:
         scene: the scene.
-        low, high: temperatures.
+        low: lowest temperature.
+        high: highest temperature.
         cause: subject and verb of the message, such as "the run brought it".
     """
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
@@ -158,7 +198,14 @@ def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding
 
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
-    """Discretisation errors of the temperature in states of the last mesh; collective."""
+    """Find discretisation errors of the temperature in states of the last mesh; collective.
+
+    Args:
+        path: the path.
+
+    Yields:
+        A finding if the mesh is too coarse.
+    """
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):
             yield from history.findings(path.segments[-1].states)

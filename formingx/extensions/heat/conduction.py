@@ -1,11 +1,13 @@
-"""Conduction in a body: M dT/dt = R(T), on quadratic triangles, in the body as it is deformed.
+r"""Heat conduction in the deformed body, M dT/dt = R(T), on quadratic triangles.
 
-Per reference volume, with F, J of a displacement and q the heat into the deformed face, by Nanson's formula:
+Per reference volume, with F and J of a displacement and the heat flux q into the deformed face (Nanson's formula):
 
-    density heat_capacity dT/dt = Div(k J F^-1 F^-T Grad T) + J source,    k J F^-1 F^-T Grad T . N = q |J F^-T N|
+.. math::
+    \rho c \frac{dT}{dt} = \mathrm{Div}(k J F^{-1} F^{-T} \mathrm{Grad}\, T) + J s, \qquad
+    k J F^{-1} F^{-T} \mathrm{Grad}\, T \cdot N = q |J F^{-T} N|
 
-A body without displacement has no F in its forms. All forms are divided by the heat capacity of the whole body, so M
-sums up to 1 and R is in degrees per time.
+The forms of a body without displacement do not contain F. All forms are divided by the heat capacity of the whole body,
+so the entries of M add up to 1 and R is in degrees per time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +30,8 @@ from ...results.evaluate.profile import distance_to_line
 from ...solve.linear import DirectSolver
 from ...values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
-from .contact import ContactWithTool, Touch
+from .contact import ContactWithTool, HeatContact
+from .vectors import HeatVectors
 
 _MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants by temperature
 
@@ -37,7 +40,8 @@ class Stage(NamedTuple):
     """Result of an implicit stage.
 
     Attributes:
-        changes: change of T, locally owned entries, shape (n,), then of the lines of each touch, shape (its nodes, m).
+        changes: change of T, locally owned entries, shape (n,), then of the lines of each tool contact, shape (nodes,
+            m).
         rates: rates of heat M dT/dt at the end, of the same shapes.
         heats: rate of heat through each boundary and source, of the whole body.
     """
@@ -47,18 +51,27 @@ class Stage(NamedTuple):
     heats: np.ndarray
 
 
-class Conduction:
-    """The equations, in a stage of a time step.
+class Conduction(HeatVectors):
+    """Equations of heat conduction in an implicit stage of a time step.
+
+    Args:
+        mesh: the `Mesh`.
+        materials: {layer: `ThermalProperties`}.
+        boundaries: laws of the faces and heat sources.
+        kinematics: the `Kinematics`.
+        absolute_zero: absolute zero in the unit of temperatures.
+        displacement: displacement of the body (UFL), length, or None.
+        degree: degree of the temperature in an element.
 
     Attributes:
-        mesh: the mesh.
-        comm: its MPI communicator.
-        space: P2 function space (or of `degree`).
+        mesh: the `Mesh`.
+        comm: MPI communicator.
+        space: function space of the temperature.
         T: the temperature `Function` of the forms.
-        points: positions (R, Z) of its locally owned nodes, shape (n, 2), length.
+        points: reference positions of the locally owned nodes, shape (n, 2), length.
         capacity: heat capacity of the whole body, heat per degree.
-        volume: volume of the reference body.
-        touches: a `Touch` for each `ContactWithTool`; call `update` after a change of its conductance.
+        volume: reference volume of the body.
+        tool_contacts: a `HeatContact` for each `ContactWithTool`; call `update` after a change of its conductance.
         power: heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
         names: names of the boundaries and sources of heat, in the order of `Stage.heats`.
     """
@@ -69,7 +82,7 @@ class Conduction:
         self._kinematics, self._u, self._zero = kinematics, displacement, absolute_zero
         domain = mesh.domain
         self.space = fem.functionspace(domain, ("Lagrange", degree))
-        self.T, self._change, self._held_at = (fem.Function(self.space) for _ in range(3))
+        self.T, self._change, self._fixed_values = (fem.Function(self.space) for _ in range(3))
         self._n = self.space.dofmap.index_map.size_local
         self.points = of_space(self.space)[: self._n]
         self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
@@ -85,7 +98,7 @@ class Conduction:
         self.volume = self._integral(unity * self._weight * self._dx)
         self.capacity = self._integral(self._stored(materials, unity, unity))
         self._scale.value = 1 / self.capacity
-        self.touches = [self._touch(b) for b in boundaries if isinstance(b, ContactWithTool)]
+        self.tool_contacts = [self._tool_contact(b) for b in boundaries if isinstance(b, ContactWithTool)]
         self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
         self._laws = [b for b in boundaries if hasattr(b, "flux") and not isinstance(b, Absorption)]
         self._sources = [(b, fem.Function(self.space)) for b in boundaries if isinstance(b, Absorption)]
@@ -95,22 +108,29 @@ class Conduction:
         self._compile(materials)
         self.update()
 
-    def constant(self, value: float) -> fem.Constant:
-        """Return a number in a form that can be changed without compiling it again."""
-        return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
-
     def start(self) -> list[np.ndarray]:
-        """Return the present state [T, *lines], T with its prescribed values at fixed faces, locally owned entries."""
-        return [self.held(self.T.x.array[: self._n]), *(touch.start() for touch in self.touches)]
+        """Return the present state, with prescribed values at fixed faces.
 
-    def held(self, T: np.ndarray) -> np.ndarray:
-        """Return a temperature with the prescribed values at fixed faces, locally owned entries."""
-        return np.where(self._held, self._held_at.x.array[: self._n], T)
+        Returns:
+            [T, *lines], locally owned entries.
+        """
+        return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
+
+    def with_fixed_values(self, T: np.ndarray) -> np.ndarray:
+        """Return a temperature with the prescribed values at fixed faces.
+
+        Args:
+            T: temperature, locally owned entries, shape (n,).
+
+        Returns:
+            Temperature, shape (n,).
+        """
+        return np.where(self._fixed_mask, self._fixed_values.x.array[: self._n], T)
 
     def update(self) -> None:
-        """Update the position and size of faces to a changed displacement or contact."""
+        """Update position and size of faces to a changed displacement or contact."""
         self._factored_for = None
-        for touch, area in zip(self.touches, self._areas):
+        for touch, area in zip(self.tool_contacts, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
         for source, depth in self._sources:
             depth.x.array[: self._n] = distance_to_line(self._moved(self.points, self.displacements()),
@@ -118,10 +138,17 @@ class Conduction:
             depth.x.scatter_forward()
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        """Return (rates, heats) at a state, as in `Stage`."""
+        """Return the rates of heat in a state.
+
+        Args:
+            state: [T, *lines].
+
+        Returns:
+            Rates and heats, as in `Stage`.
+        """
         R = self._body_rate(state[0])
         found, through = [R], []
-        for touch, lines in zip(self.touches, state[1:], strict=True):
+        for touch, lines in zip(self.tool_contacts, state[1:], strict=True):
             q, rate = touch.rates(lines, state[0][touch.dofs])
             R[touch.dofs] += touch.area * q
             through.append(touch.area @ q)
@@ -129,23 +156,28 @@ class Conduction:
         return found, self._heats(through)
 
     def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> Stage:
-        """Solve M change = known + c rates(state + change) for the body and all lines.
+        r"""Solve an implicit stage for the body and all lines.
+
+        .. math:: M \Delta = k + c R(y + \Delta)
 
         Args:
-            state: [T, *lines] at the start.
-            known: known parts, of the same shapes.
+            state: state y, [T, *lines], at the start.
+            known: known parts k, of the same shapes.
             c: factor of the rates, time.
-            guess: first guess of the change of T, shape (n,).
+            guess: initial guess of the change of T, shape (n,).
+
+        Returns:
+            Result of the stage.
 
         Raises:
             ConvergenceError: Newton's method found no solution.
         """
         T = state[0]
-        answers = [touch.answer(lines, k, c) for touch, lines, k in zip(self.touches, state[1:], known[1:])]
-        change = np.where(self._held, 0.0, guess)
+        answers = [touch.answer(lines, k, c) for touch, lines, k in zip(self.tool_contacts, state[1:], known[1:])]
+        change = np.where(self._fixed_mask, 0.0, guess)
         for iteration in range(_MOST_ITERATIONS):
             R = self._body_rate(T + change)
-            for touch, answer in zip(self.touches, answers):
+            for touch, answer in zip(self.tool_contacts, answers):
                 at = (T + change)[touch.dofs]
                 R[touch.dofs] += touch.area * answer.g * (answer.free - at)
             left = known[0] + c * R - self._mass(change)
@@ -160,37 +192,52 @@ class Conduction:
         raise ConvergenceError("heat: Newton's method did not converge in a step")
 
     def difference(self, known: list[np.ndarray], c: float) -> float:
-        """Return the largest change, of body and tools, by heat `known` in an implicit step: (M - c R') change = known.
+        r"""Return the largest change of body and tools by known heat in an implicit step.
 
-        The tangent of the last `stage` is reused if it had the same c; else it is assembled at the last T.
+        .. math:: (M - c R') \Delta = k
+
+        The tangent of the last `stage` is reused if it had the same c; otherwise it is assembled at the last T.
+
+        Args:
+            known: known parts k, as in `stage`.
+            c: factor of the rates, time.
+
+        Returns:
+            Largest absolute change, degrees.
         """
-        answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.touches, known[1:])]
+        answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, answers, afresh=False)
         left = known[0].copy()
-        for touch, answer in zip(self.touches, answers):
+        for touch, answer in zip(self.tool_contacts, answers):
             left[touch.dofs] += c * touch.area * answer.g * answer.free
         change = self._solve(left)
         sizes = [self._largest(change)]
-        for touch, answer, k in zip(self.touches, answers, known[1:]):
+        for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
             sizes.append(self._largest(touch.finish(answer, k, change[touch.dofs], c)[1]))
         return max(sizes)
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
-        """Return dT/dt from rates of heat M dT/dt, locally owned entries; 0 where the temperature is prescribed."""
+        """Return dT/dt from rates of heat M dT/dt.
+
+        Args:
+            rate: rates of heat, locally owned entries, shape (n,).
+
+        Returns:
+            dT/dt, shape (n,); 0 where the temperature is prescribed.
+        """
         self._factorise(0.0, [], afresh=True)
         return self._solve(rate)
 
-    def stored(self, change: np.ndarray) -> float:
-        """Return the heat that a change of T, locally owned entries, stores in the whole body."""
-        return self.capacity * self._sum(self._mass(change))
+    def through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
+        """Return the heat through each face of prescribed temperature.
 
-    def held_by(self, missing: np.ndarray) -> np.ndarray:
-        """Return the heat through each fixed face, from the missing heat at the nodes, locally owned entries."""
+        Args:
+            missing: missing heat at the nodes, locally owned entries, shape (n,).
+
+        Returns:
+            Heat of each face.
+        """
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
-
-    def mass(self, change: np.ndarray) -> np.ndarray:
-        """Return M times a change of T, locally owned entries."""
-        return self._mass(change)
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -199,9 +246,10 @@ class Conduction:
 
     def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 answers: list[Any]) -> Stage:
+        """Return the result of a stage from its converged temperature."""
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
-        for touch, answer, k in zip(self.touches, answers, known[1:]):
+        for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
             q, moved, rate = touch.finish(answer, k, (T + change)[touch.dofs], c)
             R[touch.dofs] += touch.area * q
             through.append(touch.area @ q)
@@ -210,12 +258,12 @@ class Conduction:
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, through_touches: list[float]) -> np.ndarray:
-        """Return the rates of heat at the last T, in the order of `names`, without fixed faces (see `held_by`)."""
+        """Return the rates of heat at the last T, in the order of `names`, without fixed faces."""
         local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
 
     def _deform(self) -> None:
-        """Set `_weight`, `_area` (of a deformed face per reference length), `_carry` (Grad T to grad T), `_J`."""
+        """Set `_weight`, `_area` (deformed face per reference length), `_carry` (Grad T to grad T) and `_J`."""
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._carry = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
@@ -227,10 +275,11 @@ class Conduction:
             self._area = ufl.sqrt(ufl.inner(area, area))
 
     def _gradient(self, f: Any) -> Any:
+        """Return the spatial gradient of a function (UFL)."""
         return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
 
     def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """Return [(properties, measure)]; layers with the same properties object share a measure."""
+        """Return a list of (properties, measure); layers with the same properties object share a measure."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -238,10 +287,12 @@ class Conduction:
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
+        """Return the form of stored heat (UFL)."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layers(materials))
 
     def _compile(self, materials: Mapping[str, ThermalProperties]) -> None:
+        """Compile the forms of mass, rate and tangent."""
         T, v, J = self.T, self._v, self._J
         R = -sum(self._scale * self.constant(m.conductivity) * J * self._weight
                  * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layers(materials))
@@ -260,16 +311,19 @@ class Conduction:
         self._rate_form, self._mass_form = self._form(R), self._form(self._stored(materials, self._change, v))
         self._scalars = [self._form(s) for s in scalars]
         gll = {"quadrature_rule": "GLL", "quadrature_degree": 2 * self._degree - 1}    # points at the nodes
-        self._areas = [self._form(self._scale * self._area * v * self._ds(touch.on, gll)) for touch in self.touches]
+        self._areas = [self._form(self._scale * self._area * v * self._ds(touch.on, gll))
+                       for touch in self.tool_contacts]
         self._tangent = self._form(tangent)
         self._matrix = fem_petsc.create_matrix(self._tangent)
         self._rhs, self._out = self._matrix.createVecRight(), self._matrix.createVecRight()
         self._solver = DirectSolver(self._matrix, symmetric=False)
 
     def _number(self, value: float | Table) -> Any:
+        """Return a number or a table over R as a coefficient of the forms."""
         return value(self._X[0]) if isinstance(value, Table) else self.constant(value)
 
     def _ds(self, boundary: str, metadata: dict) -> ufl.Measure:
+        """Return the measure of a boundary."""
         ds = ufl.Measure("ds", self.mesh.domain, subdomain_data=self.mesh.facets)
         return ds(self.mesh.boundaries[boundary], metadata=metadata)
 
@@ -278,25 +332,31 @@ class Conduction:
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
     def _fix(self, fixed: list[FixedTemperature]) -> None:
-        self._held = np.zeros(self._n, dtype=bool)
-        self._fixed, self._bcs, taken = [], [], self._held.copy()
+        """Store the unknowns and values of faces with prescribed temperatures."""
+        self._fixed_mask = np.zeros(self._n, dtype=bool)
+        self._fixed, self._bcs, taken = [], [], self._fixed_mask.copy()
         for boundary in fixed:
             dofs = self._dofs(boundary.on)
             R = self.space.tabulate_dof_coordinates()[dofs, 0]
             value = boundary.parameters["temperature"]
-            self._held_at.x.array[dofs] = value(R) if isinstance(value, Table) else value
-            self._bcs.append(fem.dirichletbc(self._held_at, dofs))
+            self._fixed_values.x.array[dofs] = value(R) if isinstance(value, Table) else value
+            self._bcs.append(fem.dirichletbc(self._fixed_values, dofs))
             own = dofs[dofs < self._n]
             self._fixed.append((boundary, own[~taken[own]]))
-            taken[own] = self._held[own] = True
+            taken[own] = self._fixed_mask[own] = True
 
-    def _touch(self, contact: ContactWithTool) -> Touch:
+    def _tool_contact(self, contact: ContactWithTool) -> HeatContact:
+        """Return the nodes and lines of a contact with a tool."""
         dofs = self._dofs(contact.on)
         own = dofs[dofs < self._n]
-        return Touch(contact, own, self.points[own])
+        return HeatContact(contact, own, self.points[own])
 
     def displacements(self) -> Any:
-        """Return the displacements of the locally owned nodes, shape (n, 2), length, or None."""
+        """Return the displacements of the locally owned nodes.
+
+        Returns:
+            Displacements, shape (n, 2), length; None for a body without displacement.
+        """
         if self._u is None:
             return None
         if self._displaced is None:
@@ -309,10 +369,11 @@ class Conduction:
 
     @staticmethod
     def _moved(points: np.ndarray, u: Any) -> np.ndarray:
+        """Return deformed positions, shape (n, 2), length."""
         return points if u is None else points + u
 
     def _face_line(self, boundary: str) -> np.ndarray:
-        """Return the deformed nodes of a boundary one after the other, shape (k, 2), all ranks."""
+        """Return the deformed nodes of a boundary in order along it, shape (k, 2), length, all ranks."""
         line = self.mesh.line_of(boundary)
         u = self.displacements()
         if u is None:
@@ -323,36 +384,8 @@ class Conduction:
         X, u = (gathered(self.comm, a) for a in (self.points[own], u[own]))
         return line + u[cKDTree(X).query(line)[1]]
 
-    def source(self, make: Any) -> Any:
-        """Return a compiled form for `assembled`: make(v) is an integral (UFL) of heat per time, times v."""
-        return self._form(make(self._scale * self._v))
-
-    def assembled(self, form: Any) -> np.ndarray:
-        """Return the values of a form of `source` at the nodes, for `power`, locally owned entries."""
-        return self._assemble(form)
-
-    def _form(self, form: Any) -> Any:
-        return _compat.compile_form(form)
-
-    def _integral(self, form: Any) -> float:
-        return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
-
-    def _assemble(self, form: Any) -> np.ndarray:
-        return _compat.assemble_vector(self._buffer, form).copy()
-
-    def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """R(T) without points in contact, owned part; leaves T in `T`."""
-        self.T.x.array[: self._n] = T
-        self.T.x.scatter_forward()
-        return self._assemble(self._rate_form) + self.power
-
-    def _mass(self, change: np.ndarray) -> np.ndarray:
-        self._change.x.array[: self._n] = change
-        self._change.x.scatter_forward()
-        return self._assemble(self._mass_form)
-
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """Assemble the tangent M - c R' at the last T, with contact; reuse one with the same c unless `afresh`."""
+        """Factorise the tangent M - c R' at the last T, with contact; reuse one with the same c unless `afresh`."""
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c
@@ -360,22 +393,17 @@ class Conduction:
         self._matrix.zeroEntries()
         _compat.assemble_matrix(self._matrix, self._tangent, self._bcs)
         self._matrix.assemble()
-        if self.touches:
+        if self.tool_contacts:
             extra = np.zeros(self._n)
-            for touch, answer in zip(self.touches, answers):
+            for touch, answer in zip(self.tool_contacts, answers):
                 extra[touch.dofs] += c * touch.area * answer.g
-            self._rhs.array_w[:] = np.where(self._held, 0.0, extra)
+            self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, extra)
             self._matrix.setDiagonal(self._rhs, PETSc.InsertMode.ADD_VALUES)
         if not self._solver.factorise():
             raise ConvergenceError("heat: the matrix of a step is singular")
 
     def _solve(self, left: np.ndarray) -> np.ndarray:
-        self._rhs.array_w[:] = np.where(self._held, 0.0, left)
+        """Return the solution of the factorised tangent, locally owned entries, shape (n,)."""
+        self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, left)
         self._solver.solve(self._rhs, self._out)
         return self._out.array_r.copy()
-
-    def _largest(self, values: np.ndarray) -> float:
-        return float(self.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
-
-    def _sum(self, values: np.ndarray) -> float:
-        return float(self.comm.allreduce(values.sum(), MPI.SUM))

@@ -1,9 +1,18 @@
-"""Heat through a contact conductance into a tool at a given temperature, or into a conducting tool.
+r"""Heat through a contact conductance into a tool at a given temperature, or into a conducting tool.
 
-At each node of the face q = conductance (tool - T) flows into the body. A conducting tool has a line of its own below
-each node, one-dimensional, into its depth y: C w_t = k w_yy, -k w_y = -q at its face, w = back at its end. In an
-implicit stage T + c dT/dt = known the line answers linearly, w_face = free - z q, with one z for all lines; so q =
-g (free - T), g = conductance/(1 + z conductance), and the line is out of the equations of the body.
+At each node of the face the flux into the body is
+
+.. math:: q = h (T_{tool} - T)
+
+with the conductance h. A conducting tool has a one-dimensional line below each node, along its depth y:
+
+.. math:: C \frac{\partial w}{\partial t} = k \frac{\partial^2 w}{\partial y^2}, \qquad
+          -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = w_{back} \text{ at the back}
+
+In an implicit stage T + c dT/dt = known the line responds linearly, w_face = free - z q, with one z for all lines. The
+line is therefore condensed:
+
+.. math:: q = g (w_{free} - T), \qquad g = \frac{h}{1 + z h}
 """
 
 from functools import lru_cache
@@ -15,15 +24,16 @@ from ...errors import InputError, count, finite, non_negative, positive
 
 
 class ConductingTool:
-    """A tool wall that conducts into its depth, in one dimension, below each point that touches.
+    """Tool wall that conducts heat along its depth, in one dimension, below each point in contact.
 
     Args:
-        thickness: length. conductivity: heat per time, length and degree.
-        heat_capacity: per volume and degree (density times that per mass).
-        back: temperature that its far side is held at.
-        start: its temperature at first; default `back`.
-        elements: through its thickness, quadratic ones.
-        finest: size of the one at the face over the thickness; sizes grow geometrically from there.
+        thickness: thickness of the wall, length.
+        conductivity: heat per time, length and degree.
+        heat_capacity: heat capacity per volume and degree (density times specific heat capacity).
+        back: prescribed temperature of its back.
+        start: initial temperature; default `back`.
+        elements: number of quadratic elements through its thickness.
+        finest: size of the element at the face over the thickness; sizes grow geometrically from the face.
 
     Raises:
         InputError: a number that is not allowed.
@@ -46,7 +56,7 @@ class ConductingTool:
 
     @property
     def depths(self) -> np.ndarray:
-        """Depths of the nodes, shape (2 elements + 1,), length: from the face to the back."""
+        """Depths of the nodes from the face to the back, shape (2 elements + 1,), length."""
         from scipy.optimize import brentq
         n, small = self.elements, self.finest
         ratio = 1.0
@@ -56,7 +66,11 @@ class ConductingTool:
         return np.interp(np.arange(2 * n + 1) / 2, np.arange(n + 1), self.thickness * ends / ends[-1])
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return (capacity, conductivity) per area of a line, for temperatures above `back`, without the last node."""
+        """Return the matrices of a line per area, for temperatures above `back`, without the last node.
+
+        Returns:
+            Capacity and conductivity, shape (2 elements, 2 elements) each.
+        """
         y = self.depths
         M, K = np.zeros((2, len(y), len(y)))
         for e in range(0, len(y) - 1, 2):
@@ -71,11 +85,11 @@ class ConductingTool:
 
 
 class ContactWithTool:
-    """A face that touches a tool all over, from the start on.
+    """Face in complete contact with a tool from the start.
 
     Args:
         on: name of the boundary.
-        conductance: of the contact, heat per time, area and degree.
+        conductance: contact conductance, heat per time, area and degree.
         tool: a temperature, or a `ConductingTool`.
 
     >>> fx.ContactWithTool("bottom", conductance=1e-3, tool=40.0)
@@ -90,7 +104,15 @@ class ContactWithTool:
         self.tool = tool if isinstance(tool, ConductingTool) else finite(f"ContactWithTool({on!r}): tool", tool)
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError unless the tool is above absolute zero."""
+        """Raise an InputError unless the tool is above absolute zero.
+
+        Args:
+            mesh: the mesh.
+            absolute_zero: absolute zero in the unit of temperatures.
+
+        Raises:
+            InputError: the tool is too cold.
+        """
         tool = self.tool
         for value in (tool.back, tool.start) if isinstance(tool, ConductingTool) else (tool,):
             if value < absolute_zero:
@@ -116,17 +138,22 @@ class Answer(NamedTuple):
     column: np.ndarray
 
 
-class Touch:
+class HeatContact:
     """The n nodes of this rank on a face under a tool, and the lines of the tool below them.
 
     Lines are temperatures above the tool's back at m nodes, shape (n, m), the face first; m = 0 for a tool at a given
     temperature.
 
+    Args:
+        contact: the `ContactWithTool`.
+        dofs: local unknowns of the nodes, shape (n,).
+        points: reference positions of the nodes, shape (n, 2), length.
+
     Attributes:
         dofs: local unknowns of the nodes, shape (n,).
-        points: their positions (R, Z), shape (n, 2), length.
-        area: share of each in the deformed face, shape (n,).
-        conductance: contact conductance of each, shape (n,); 0 without contact.
+        points: reference positions of the nodes, shape (n, 2), length.
+        area: tributary deformed area of each node, shape (n,).
+        conductance: contact conductance of each node, shape (n,); 0 without contact.
         back: temperature of the tool's back, or of a tool at a given temperature.
         depths: depths of the nodes of a line with the back, shape (m + 1,), length.
     """
@@ -146,19 +173,38 @@ class Touch:
 
     @property
     def conducts(self) -> bool:
-        """True if the tool conducts: it has lines."""
+        """True if the tool conducts heat, so that it has lines."""
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """Return the initial lines, shape (n, m)."""
+        """Return the initial lines.
+
+        Returns:
+            Lines, shape (n, m).
+        """
         return np.full((len(self.dofs), len(self._M)), self._above)
 
     def face(self, lines: np.ndarray) -> np.ndarray:
-        """Return the temperature of the tool's face at the nodes, shape (n,)."""
+        """Return the temperature of the tool's face at the nodes.
+
+        Args:
+            lines: temperatures above the tool's back, shape (n, m).
+
+        Returns:
+            Temperatures, shape (n,).
+        """
         return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
     def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (q, heat per time and area into the nodes of the lines) for body temperatures T, shape (n,)."""
+        """Return the rates of heat of the contact.
+
+        Args:
+            lines: temperatures above the tool's back, shape (n, m).
+            T: temperatures of the body at the nodes, shape (n,).
+
+        Returns:
+            Flux q into the body, shape (n,); heat per time and area into the nodes of the lines, shape (n, m).
+        """
         q = self.conductance * (self.face(lines) - T)
         rate = -lines @ self._K
         rate[:, :1] -= q[:, None]
@@ -171,7 +217,10 @@ class Touch:
             lines: temperatures above the tool's back, shape (n, m).
             known: known part, shape (n, m).
             c: factor of the rate, time.
-            absolute: False: lines count from 0, not from the tool's back (for differences of temperatures).
+            absolute: False if lines are differences of temperatures, with a back of 0.
+
+        Returns:
+            The response.
         """
         back = self.back if absolute else 0.0
         if not self.conducts:
@@ -182,11 +231,22 @@ class Touch:
                       change, column)
 
     def finish(self, answer: Answer, known: np.ndarray, T: np.ndarray, c: float) -> tuple[Any, Any, Any]:
-        """Return (q, change of the lines, their rate) at the end of a stage, for body temperatures T, shape (n,)."""
+        """Return the contact at the end of a stage.
+
+        Args:
+            answer: response of the lines.
+            known: known part, shape (n, m).
+            T: temperatures of the body at the nodes, shape (n,).
+            c: factor of the rate, time.
+
+        Returns:
+            Flux q, shape (n,); change of the lines and their rate, shape (n, m) each.
+        """
         q = answer.g * (answer.free - T)
         change = answer.change - np.outer(q, answer.column)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the factorised matrix of a line for a factor c, and its response to a flux."""
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

@@ -1,4 +1,4 @@
-"""Thermal expansion: how large a material is without stress, by its temperature."""
+"""Thermal expansion: the stress-free volume of a material as a function of its temperature."""
 
 from typing import Any
 
@@ -10,19 +10,21 @@ from ...values.temperature import FunctionOfTemperature
 
 
 class ThermalExpansion:
-    """The volume ratio J_T(T) at which a material has no stress, alike in all directions.
+    r"""Isotropic stress-free volume ratio J_T(T) of a material.
 
-    F = J_T^(1/3) F_e: the energy and the constraint depend on F_e, so det F = J_T where the volume is kept, and the
-    isochoric part is that of F (Lu and Pister, Int. J. Solids Struct. 11 (1975) 927).
+    The energy and the volume constraint depend on the elastic part of F (Lu and Pister, Int. J. Solids Struct. 11
+    (1975) 927), so det F = J_T for an incompressible material:
+
+    .. math:: F = J_T^{1/3} F_e, \qquad
+              J_T = [1 + a (T - T_0)]^3 \;\text{ or }\; J_T = \frac{v(T)}{v(T_0)}
 
     Args:
-        linear: coefficient a of linear expansion, 1/degree: J_T = [1 + a (T - stress_free)]^3.
-        specific_volume: in place of it, v(T) in any unit, a `table` or the result of `of_temperature`:
-            J_T = v(T)/v(stress_free).
-        stress_free: the temperature at which the mesh as it is has no stress.
+        linear: coefficient a of linear expansion, 1/degree.
+        specific_volume: v(T) instead, in any unit, a `table` or the result of `of_temperature`.
+        stress_free: temperature T_0 at which the mesh is stress-free.
 
     Raises:
-        InputError: neither of the two, or both; a volume that is not above 0.
+        InputError: neither or both laws are given, or a volume is not positive.
 
     >>> float(fx.ThermalExpansion(linear=1e-4, stress_free=120.0).stretch(20.0).round(6))
     0.99
@@ -40,18 +42,28 @@ class ThermalExpansion:
         self.stretch(np.array([self.stress_free]))
 
     def volume_ratio(self, temperature: Any) -> np.ndarray:
-        """Return J_T at temperatures, of the same shape."""
+        """Return the stress-free volume ratio J_T.
+
+        Args:
+            temperature: temperatures, any shape.
+
+        Returns:
+            J_T, the same shape.
+        """
         return self.stretch(temperature) ** 3
 
     def stretch(self, temperature: Any, clamped: bool = False) -> np.ndarray:
-        """Return J_T^(1/3) at temperatures, of the same shape.
+        """Return the stress-free stretch J_T^(1/3).
 
         Args:
-            temperature: temperatures, of any shape.
-            clamped: True: beyond the ends of a table its end value is used, as in a run.
+            temperature: temperatures, any shape.
+            clamped: True to use, beyond the ends of a table, its end value, as in a run.
+
+        Returns:
+            Stretches, the same shape.
 
         Raises:
-            InputError: the volume is not above 0, or not known there.
+            InputError: the volume is not positive, or unknown at a temperature.
         """
         T = np.asarray(temperature, dtype=float)
         if self.linear is not None:

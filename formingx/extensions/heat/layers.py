@@ -1,9 +1,9 @@
-"""Elements for heat: where heat passes a face, the elements of a body are cut into layers that are thin enough for it.
+"""Mesh for heat: elements below faces that exchange heat are cut into thin layers.
 
-Heat has gone sqrt(a t) deep by a time t (a: diffusivity), and elements must be smaller than that there. A layer at a
-depth y below such a face is a given part of max(that depth at the first time of interest, y/3) thick, so that later
-profiles, which are deeper, are met as well. Edges are cut, shared edges for both neighbours; triangles are cut
-into rows between the cuts of their edges, in the shape of the element that they are part of.
+By a time t heat penetrates to a depth sqrt(a t), with the diffusivity a, and elements there must be smaller. The
+thickness of a layer at a depth y below such a face is a given part of max(that depth at the first time of interest,
+y/3), so later and deeper profiles are resolved too. Shared edges are cut for both neighbours. Triangles are cut into
+rows between the cuts of their edges, in the shape of the original element.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,24 +16,25 @@ from ...mesh import Mesh
 from ...mesh.grid import Grid, gathered, to_mesh
 
 _PART = 0.3
-"""Thickness of a layer over the depth that heat has gone: errors are then some 1e-5 of the span of temperatures."""
+"""Thickness of a layer over the penetration depth of heat: errors are then some 1e-5 of the span of temperatures."""
 _REACH = 7.0
-"""Depth that heat reaches, over the penetration depth at the last time: 1 - erf(7/2) is 7e-7."""
+"""Largest depth of heat over the penetration depth at the last time: 1 - erf(7/2) is 7e-7."""
 _SPARE = 0.2
 """Part of a layer by which the required number of layers is reduced before it is rounded up."""
 _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """Return the mesh with its elements cut into layers below faces. Collective.
-
-    The mesh itself is returned if its elements are thin enough, or too curved to be cut.
+    """Cut the elements of a mesh into layers below faces; collective.
 
     Args:
         mesh: the mesh.
-        depths: {boundary: penetration depths of heat at the first and the last time of interest}, lengths.
-        moved: function that returns the deformed positions of points, shape (n, 2), between which depths are measured;
-            None: the reference positions.
+        depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
+        moved: function from reference to deformed positions, shape (n, 2), between which depths are measured; None: the
+            reference positions.
+
+    Returns:
+        The new mesh; the given mesh if its elements are thin enough, or too curved to be cut.
     """
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
@@ -44,13 +45,16 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
 
 def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
-    """Return the relative sizes of layers from the bottom up, graded to the faces by a factor of 1.26; collective.
+    """Return the relative sizes of layers from the bottom up, graded towards faces by a factor of 1.26; collective.
 
     Args:
         mesh: the mesh.
         faces: "bottom", "top" or both.
         part: largest thickness of a layer at a face, over the present elements there.
         depth: penetration depth of heat, length; a layer at a face is at most `_PART` of it.
+
+    Returns:
+        Sizes.
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_along(grid, face) for face in faces))
@@ -61,7 +65,15 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
 
 
 def height_at(mesh: Mesh, face: str) -> float:
-    """Return the median height of the elements along a boundary, length; collective."""
+    """Return the median height of the elements along a boundary; collective.
+
+    Args:
+        mesh: the mesh.
+        face: name of the boundary.
+
+    Returns:
+        Height, length.
+    """
     return _along(gathered(mesh), face)[0]
 
 
@@ -77,9 +89,9 @@ def _along(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return {ends of an edge, the end of smaller (R, Z) first: where it is cut, from 0 to 1}, of edges that are cut.
+    """Return {ends of a cut edge, the end of smaller (R, Z) first: positions of the cuts, from 0 to 1}.
 
-    points: where nodes are, for depths, shape (n, 2).
+    points: positions of the nodes between which depths are measured, shape (n, 2), length.
     """
     if not depths:
         return {}
@@ -119,7 +131,7 @@ def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 class _Nodes:
-    """Nodes of the cut mesh: the old ones, and new ones on edges and inside triangles."""
+    """Nodes of the cut mesh: the old nodes, and new ones on edges and inside triangles."""
 
     def __init__(self, grid: Grid, cuts: dict[tuple[int, int], np.ndarray]):
         self._old, self._cuts = grid.points, cuts
@@ -128,7 +140,7 @@ class _Nodes:
         self._middles: dict[tuple[int, int], int] = {}
 
     def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
-        """Return (nodes, positions from 0 to 1) of an edge from a to b along a `curve` of 2 or 3 nodes, ends first."""
+        """Return (nodes, positions from 0 to 1) of an edge from a to b along a curve of 2 or 3 nodes, ends first."""
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
         places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])
@@ -139,17 +151,18 @@ class _Nodes:
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
-        """Return the node in the middle of an edge; the first call makes it at `point`."""
+        """Return the node in the middle of an edge; the first call creates it at `point`."""
         key = min(a, b), max(a, b)
         if key not in self._middles:
             self._middles[key] = self._new(point)
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """Keep the middle of an edge that is not cut."""
+        """Keep the middle node of an edge that is not cut."""
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
+        """Add a node and return its number."""
         self.points.append(point)
         return len(self.points) - 1
 
@@ -163,13 +176,14 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the point of a triangle, 3 or 6 nodes, at area coordinates x, shape (3,)."""
+    """Return the point of a triangle with 3 or 6 nodes at area coordinates x, shape (3,)."""
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
 
 
 def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
+    """Return the grid with its edges cut."""
     nodes = _Nodes(grid, cuts)
     quadratic = next(iter(grid.layers.values())).shape[1] == 6
     layers, boundaries = {}, {}
@@ -186,6 +200,7 @@ def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
 
 
 def _rows(table: np.ndarray) -> list[list[int]]:
+    """Return the rows of a table as lists."""
     return [list(map(int, row)) for row in table]
 
 

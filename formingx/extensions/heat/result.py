@@ -12,11 +12,17 @@ from ...scene.fields import PointReader
 from .conduction import Conduction
 
 _POINTS = 201
-"""On a line through the body."""
+"""Number of points on a line through the body."""
 
 
 class Spot(NamedTuple):
-    """The hottest or coldest node of a body: temperature, and (R, Z) in the reference, length."""
+    """Hottest or coldest node of a body.
+
+    Attributes:
+        temperature: its temperature.
+        R: reference radius, length.
+        Z: reference height, length.
+    """
 
     temperature: float
     R: float
@@ -24,23 +30,33 @@ class Spot(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Time at which the whole body is between two temperatures, and time at which a part leaves them; None: never."""
+    """Times at which a body enters and leaves a range of temperatures.
+
+    Attributes:
+        reached: time from which the whole body is in the range, or None.
+        left: time at which a part of the body leaves the range, or None.
+    """
 
     reached: float | None
     left: float | None
 
 
 class HeatRun:
-    """Temperatures of a body over time: every accepted step.
+    """Temperatures of a body over time, at every accepted step.
 
-    At a time between two steps the temperature is a cubic in time; times of output are ends of steps.
+    Between two steps the temperature is a cubic in time; output times are ends of steps.
+
+    Args:
+        body: the heat equation.
+        unit: unit of temperatures, "C" or "K".
+        outputs: requested output times.
 
     Attributes:
-        mesh: mesh of the computation: the given one, its elements cut into layers where heat passes faces.
+        mesh: mesh of the computation: the given mesh, with elements cut into layers below faces that exchange heat.
         outputs: requested output times.
-        errors_in_space: estimated largest error of the temperature that is due to the mesh, at these times, degrees.
-        unit: of temperatures, "C" or "K".
-        states: [[T of the nodes, locally owned entries, then the lines of each conducting tool]] of the steps.
+        errors_in_space: estimated largest discretisation error of the temperature at these times, degrees.
+        unit: unit of temperatures, "C" or "K".
+        states: for each step [T of the nodes, locally owned entries, then the lines of each conducting tool].
     """
 
     def __init__(self, body: Conduction, unit: str, outputs: np.ndarray):
@@ -52,7 +68,12 @@ class HeatRun:
         self.errors_in_space: np.ndarray = np.zeros(len(outputs))
 
     def record(self, time: float, step: Any) -> None:
-        """Append an accepted step (`formingx.extensions.heat.stepping.Step`)."""
+        """Append an accepted step.
+
+        Args:
+            time: time at its end.
+            step: the `formingx.extensions.heat.stepping.Step`.
+        """
         self.states.append(step.state)
         self._times.append(time)
         self._errors.append(step.error)
@@ -76,75 +97,119 @@ class HeatRun:
 
     @property
     def heat_through(self) -> dict[str, np.ndarray]:
-        """{boundary or source: heat that it gave the body in each step, shape (n,)}; per depth in plane strain."""
+        """{boundary or source: heat into the body in each step, shape (n,)}; per unit depth in plane strain."""
         return dict(zip(self._unique_names(), np.array(self._heats).T))
 
     @property
     def balance(self) -> np.ndarray:
-        """Heat stored less heat given in each step, over the largest of them, shape (n,)."""
+        """Heat stored minus heat supplied in each step, over the largest of both, shape (n,)."""
         heats = np.array(self._heats)
         largest = np.abs(np.column_stack([heats, self._stored])).max(1)
         return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)
 
     def temperature(self, time: float | None = None) -> fem.Function:
-        """Return the temperature at a time (default: the end) as a P2 Function on the mesh."""
+        """Return the temperature at a time.
+
+        Args:
+            time: the time; default the end.
+
+        Returns:
+            P2 Function on the mesh.
+        """
         T = fem.Function(self._body.space, name="temperature")
         T.x.array[: len(self._body.points)] = self._at(time)[0]
         T.x.scatter_forward()
         return T
 
     def at(self, points: Any, times: Any = None) -> np.ndarray:
-        """Return temperatures at points and times, shape (times, n).
+        """Return temperatures at points and times.
 
         Args:
-            points: positions (R, Z), shape (n, 2), the same on all ranks.
-            times: times; default: `outputs`.
+            points: reference positions (R, Z), shape (n, 2), length, the same on all ranks.
+            times: times; default `outputs`.
+
+        Returns:
+            Temperatures, shape (times, n).
 
         Raises:
-            InputError: a point outside the body, a time outside the run.
+            InputError: a point outside the body, or a time outside the run.
         """
         points = np.atleast_2d(np.asarray(points, dtype=float))
         reader = PointReader(self._body.space, points)
         return np.array([reader.read(self.temperature(t).x.array) for t in self._chosen(times)])
 
     def through(self, times: Any = None, *, line: Any = None, points: int = _POINTS) -> tuple[np.ndarray, np.ndarray]:
-        """Return (distance from the first end, temperatures) along a straight line, shapes (points,), (times, points).
+        """Return temperatures along a straight line through the body.
 
         Args:
-            times: times; default: `outputs`.
-            line: its two ends (R, Z); default: from `bottom` to `top` (or `inner` to `outer`) at their first nodes.
+            times: times; default `outputs`.
+            line: its two ends (R, Z), length; default from `bottom` to `top` (or `inner` to `outer`) at their first
+                nodes.
             points: number of points.
+
+        Returns:
+            Distances from the first end, shape (points,), length; temperatures, shape (times, points).
         """
         first, last = np.array(self._ends() if line is None else line, dtype=float).reshape(2, 2)
         s = np.linspace(0, 1, points)
         return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
 
     def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
-        """Return the mean temperature over a line as in `through`, shape (times,), by Simpson's rule."""
+        """Return the mean temperature along a line as in `through`, by Simpson's rule.
+
+        Args:
+            times: times; default `outputs`.
+            line: its two ends (R, Z), length.
+
+        Returns:
+            Temperatures, shape (times,).
+        """
         _, T = self.through(times, line=line)
         weights = np.full(_POINTS, 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
         return T @ (weights / weights.sum())
 
     def hottest(self, time: float | None = None) -> Spot:
-        """Return the hottest node at a time (default: the end)."""
+        """Return the hottest node at a time.
+
+        Args:
+            time: the time; default the end.
+
+        Returns:
+            The node.
+        """
         return self._extreme(self._at(time)[0], 1)
 
     def coldest(self, time: float | None = None) -> Spot:
-        """Return the coldest node at a time (default: the end)."""
+        """Return the coldest node at a time.
+
+        Args:
+            time: the time; default the end.
+
+        Returns:
+            The node.
+        """
         return self._extreme(self._at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
-        """Return the times at which the whole body enters a range of temperatures and at which it leaves it.
+        """Return the times at which the whole body enters a range of temperatures, and at which it leaves the range.
+
+        Args:
+            low: lowest temperature of the range.
+            high: highest temperature of the range.
+
+        Returns:
+            Both times.
 
         Raises:
-            InputError: low is not below high.
+            InputError: `low` is not below `high`.
         """
         low, high = finite("time_to_reach: low", low), finite("time_to_reach: high", high)
         if not low < high:
             raise InputError(f"time_to_reach: low = {low!r}: must be below high = {high!r}")
 
         def out(time):                                       # below 0: inside
+            """Return the largest excess beyond the range at a time, degrees."""
             return max(low - self.coldest(time).temperature, self.hottest(time).temperature - high)
         reached = self._first(out, self._times)
         if reached is None:
@@ -153,17 +218,23 @@ class HeatRun:
         return Window(reached, self._first(lambda t: -out(t), later, from_time=reached))
 
     def tool_profile(self, on: str, at: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """(depths, temperatures), shape (m,), of the conducting tool below the node of a face nearest to a point.
+        """Return the temperature along the depth of a conducting tool, below the node of a face nearest to a point.
 
-        The first is the tool's face. Depths are lengths from there.
+        Args:
+            on: name of the boundary.
+            at: reference position (R, Z), length.
+            time: the time; default the end.
+
+        Returns:
+            Depths from the tool's face, shape (m,), length; temperatures, shape (m,).
 
         Raises:
-            InputError: no conducting tool touches that boundary.
+            InputError: no conducting tool is in contact with the boundary.
         """
-        conducting = {t.on: k for k, t in enumerate(self._body.touches) if t.conducts}
+        conducting = {t.on: k for k, t in enumerate(self._body.tool_contacts) if t.conducts}
         known("tool_profile: conducting tool on boundary", on, conducting)
         number = conducting[on]
-        touch, lines = self._body.touches[number], self._at(time)[1 + number]
+        touch, lines = self._body.tool_contacts[number], self._at(time)[1 + number]
         away = np.hypot(*(touch.points - np.asarray(at, dtype=float)).T)
         mine = (away.min(initial=np.inf), self._comm.rank)
         nearest = min(self._comm.allgather(mine))
@@ -171,7 +242,11 @@ class HeatRun:
         return touch.depths, touch.back + np.append(line, 0.0)
 
     def to_csv(self, file: Any) -> None:
-        """Write one row per step: time, error, coldest, hottest, heat stored, heat through each boundary (rank 0)."""
+        """Write one row per step: time, error, coldest, hottest, heat stored, heat through each boundary (rank 0).
+
+        Args:
+            file: name of the file.
+        """
         header = ["time", f"estimated_error [{self.unit}]", f"coldest [{self.unit}]", f"hottest [{self.unit}]",
                   "heat_stored", *(f"heat of {name}" for name in self._unique_names())]
         rows = [[t, e, self._extreme(state[0], -1).temperature, self._extreme(state[0], 1).temperature, stored, *heats]
@@ -180,16 +255,29 @@ class HeatRun:
         files.write_rows(file, header, rows, self._comm)
 
     def field_to_csv(self, file: Any, time: float | None = None) -> None:
-        """Write the temperature at a time (default: the end) as CSV, columns R, Z, T, for `start` (rank 0)."""
+        """Write the temperature at a time as CSV with columns R, Z, T, for `start` (rank 0).
+
+        Args:
+            file: name of the file.
+            time: the time; default the end.
+        """
         table = np.column_stack([self._body.points, self._at(time)[0]])
         rows = gathered(self._comm, table)
         files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
 
     def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
                      **style: Any) -> Any:
-        """Draw the temperature through the thickness at times (default: `outputs`); returns the matplotlib axes.
+        """Draw the temperature through the thickness at times.
 
-        scale: what lengths are multiplied with.
+        Args:
+            times: times; default `outputs`.
+            line: see `through`.
+            scale: factor of lengths.
+            axes: matplotlib axes; default a new figure.
+            style: options of the lines.
+
+        Returns:
+            The matplotlib axes.
         """
         from ...figures import figure
         axes = figure()[1] if axes is None else axes
@@ -202,13 +290,16 @@ class HeatRun:
         return axes
 
     def _unique_names(self) -> list[str]:
+        """Return the names of boundaries and sources, numbered where they are equal."""
         names = self._body.names
         return [n if names.count(n) == 1 else f"{n} {names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
     def _chosen(self, times: Any) -> np.ndarray:
+        """Return the times as an array; default `outputs`."""
         return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
 
     def _ends(self) -> list[np.ndarray]:
+        """Return the ends of the default line through the body."""
         for low, high in (("bottom", "top"), ("inner", "outer")):
             if {low, high} <= set(self.mesh.boundaries):
                 return [self.mesh.line_of(low)[0], self.mesh.line_of(high)[0]]
@@ -216,7 +307,8 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _at(self, time: float | None) -> list[np.ndarray]:
-        """Return the state at a time: a step's own, or Hermite's cubic with slopes of parabolas through three steps."""
+        """Return the state at a time: that of a step, or Hermite's cubic with slopes of parabolas through three steps.
+        """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -243,13 +335,14 @@ class HeatRun:
         return [sum(w * v for w, v in zip(weights, parts)) for parts in zip(*self.states[i - 1: i + 2])]
 
     def _extreme(self, T: np.ndarray, sign: int) -> Spot:
+        """Return the node of the largest (sign 1) or smallest (sign -1) temperature."""
         k = int(np.argmax(sign * T)) if len(T) else -1
         mine = (sign * T[k], *self._body.points[k].tolist()) if len(T) else (-np.inf, 0.0, 0.0)
         value, R, Z = max(self._comm.allgather(mine))
         return Spot(float(sign * value), R, Z)
 
     def _first(self, out: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """Return the first time at which `out` is not above 0, found between steps."""
+        """Return the first time at which `out` is not positive, found between steps."""
         from scipy.optimize import brentq
         before = from_time
         for t in times:
@@ -263,5 +356,6 @@ _DEGREES = {"C": "°C", "K": "K"}
 
 
 def _shade(k: int, n: int) -> Any:
+    """Return the colour of curve k of n."""
     from matplotlib import colormaps
     return colormaps["viridis"](0.9 * (1 - k / max(n - 1, 1)))

@@ -24,7 +24,7 @@ from .result import HeatRun
 from .space_error import SpaceError
 
 PROMISE = 3e-4
-"""Allowed discretisation error, over the span of temperatures in a run."""
+"""Allowed discretisation error over the span of temperatures in a run."""
 _EARLY = 0.01
 """Earliest time, over the duration of a run, at which temperatures are as accurate as at the output times."""
 
@@ -34,25 +34,25 @@ _log = logging.getLogger(__name__)
 def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (), *,
          start: Any, times: Any, unit: str, kinematics: Any = None, displacement: Any = None, tolerance: float = 1e-3,
          max_steps: int = 10000) -> HeatRun:
-    """Compute the conduction of heat in a body over time, from t = 0.
+    """Compute the heat conduction in a body over time, from t = 0.
 
     Args:
-        mesh: of the body, from `formingx.mesh`. A boundary without a law lets no heat through.
+        mesh: mesh of the body, from `formingx.mesh`. A boundary without a law is insulated.
         materials: {layer: `ThermalProperties`}, or one for all layers.
-        boundaries: a list of `Convection`, `Radiation`, `HeatFlux`, `FixedTemperature`, `ContactWithTool`,
+        boundaries: list of `Convection`, `Radiation`, `HeatFlux`, `FixedTemperature`, `ContactWithTool` and
             `Absorption`; several on one boundary add up.
-        start: temperature at first: a number, a `table` over R, a function of arrays (R, Z), a CSV file with columns
-            R, Z, T, an earlier `HeatRun` (its end), or a DOLFINx Function.
-        times: output times, above 0 and increasing; the run ends at the last. Or this end alone. Steps end there.
-        unit: of all temperatures, "C" or "K".
+        start: initial temperature: a number, a `table` over R, a function of arrays (R, Z), or a CSV file with columns
+            R, Z, T. Also an earlier `HeatRun` (its end), or a DOLFINx Function.
+        times: output times, positive and increasing, or the end alone; the run ends at the last one. Steps end there.
+        unit: unit of all temperatures, "C" or "K".
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
-        displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: in the
+        displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: the
             reference configuration.
-        tolerance: the largest estimated error of one step, degrees.
+        tolerance: largest estimated error of one step, degrees.
         max_steps: maximum number of steps.
 
     Returns:
-        The `HeatRun`.
+        The temperatures over time.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -85,7 +85,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
         _begin(body, start, unit)
         run = HeatRun(body, unit, outputs)
         _advance(run, body, outputs, tolerance, max_steps)
-        _look_at_space(run, SpaceError(body, make(degree=3)), tolerance)
+        _check_error(run, SpaceError(body, make(degree=3)), tolerance)
     finally:
         body.destroy()
     return run
@@ -93,7 +93,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return {boundary: penetration depths of heat at the first and the last time of interest}, lengths."""
+    """Return {boundary: penetration depths of heat at the first and the last time of interest, length}."""
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
     first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
@@ -106,7 +106,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
 
 
 class _Displaced:
-    """A displacement on a mesh, at points of the body and on another mesh of it; collective."""
+    """Displacement on a mesh, at points of the body and on another mesh of it; collective."""
 
     def __init__(self, displacement: Any, mesh: Mesh):
         space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
@@ -115,7 +115,7 @@ class _Displaced:
         self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Return the positions of points, shape (n, 2), in the deformed body."""
+        """Return deformed positions of points, shape (n, 2), length."""
         return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
                                          for part in self._parts])
 
@@ -128,6 +128,7 @@ class _Displaced:
 
 
 def _begin(body: Conduction, start: Any, unit: str) -> None:
+    """Set the initial temperature, and check that it is above absolute zero."""
     if getattr(start, "unit", unit) != unit:
         raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
     T = fields.values_at(start, body.points, body.mesh, "heat: start")
@@ -140,7 +141,7 @@ def _begin(body: Conduction, start: Any, unit: str) -> None:
 
 
 def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
-    """Step through the times of output, as the estimate of the error allows."""
+    """Integrate over the output times with steps that the error estimate allows."""
     state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
     for end in outputs:
         while t < end:
@@ -160,13 +161,13 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
     _log.info("heat: %d steps to time %g", len(run.times) - 1, t)
 
 
-def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None:
+def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
     """Estimate the discretisation error at the output times, and warn if it exceeds the promised one."""
     try:
-        run.errors_in_space = np.array([estimate.of(run.states[k], run.times[k])
+        run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])
     finally:
-        estimate.destroy()
+        estimator.destroy()
     allowed = max(tolerance, PROMISE * (max(run.hottest(t).temperature for t in run.times)
                                         - min(run.coldest(t).temperature for t in run.times)))
     worst = int(np.argmax(run.errors_in_space))
@@ -177,10 +178,17 @@ def _look_at_space(run: HeatRun, estimate: SpaceError, tolerance: float) -> None
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
-    """Return {layer: `ThermalProperties`} from the user's argument.
+    """Return the thermal properties of each layer.
+
+    Args:
+        mesh: the mesh.
+        materials: the user's argument.
+
+    Returns:
+        {layer: `ThermalProperties`}.
 
     Raises:
-        InputError: it is not allowed, or a layer has none.
+        InputError: the argument is not allowed, or a layer has no properties.
     """
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
@@ -197,6 +205,14 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
     """Return the user's laws of the faces as a list.
+
+    Args:
+        mesh: the mesh.
+        boundaries: the user's argument.
+        absolute_zero: absolute zero in the unit of temperatures.
+
+    Returns:
+        The laws.
 
     Raises:
         InputError: a law that is not allowed.
@@ -217,6 +233,7 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
 
 
 def _times(times: Any) -> np.ndarray:
+    """Return the output times, shape (n,); raise an InputError unless they are positive and increasing."""
     listed = [times] if np.ndim(times) == 0 and not isinstance(times, str) else several("heat: times", times, "times")
     found = np.array([positive("heat: times", finite("heat: times", t)) for t in listed])
     if not len(found) or np.any(np.diff(found) <= 0):

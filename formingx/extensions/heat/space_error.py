@@ -1,37 +1,48 @@
-"""Estimate of the discretisation error of a temperature: its change in a space of one degree more.
+r"""Estimate of the discretisation error of a temperature, by its change in a space of one degree more.
 
-The residual of the temperature and of its change in time, tested by cubics, drives a correction over the time that the
-run has taken: (M + t K) e = t (R(T) - M dT/dt). For errors that vary on a short length this is the elliptic
-reconstruction of Makridakis and Nochetto, SIAM J. Numer. Anal. 41 (2003) 1585-1594.
+The residual of the temperature and of its time derivative, tested by cubics, drives a correction e over the time t that
+the run has taken:
+
+.. math:: (M + t K) e = t \left(R(T) - M \frac{dT}{dt}\right)
+
+For errors that vary on a short length this is the elliptic reconstruction of Makridakis and Nochetto, SIAM J. Numer.
+Anal. 41 (2003) 1585-1594.
 """
 
 import numpy as np
 from dolfinx import fem
 
 from .conduction import Conduction
-from .contact import Touch
+from .contact import HeatContact
 
 
 class SpaceError:
-    """Error estimator of a body.
+    """Estimator of the discretisation error of a body.
 
     Args:
-        body: the equations of the run.
-        finer: the same equations of degree 3; `destroy` frees them.
+        body: the heat equation of the run.
+        finer: the same equation of degree 3; `destroy` frees it.
     """
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
         self._values, self._raised_values = fem.Function(body.space), fem.Function(finer.space)
 
-    def of(self, state: list[np.ndarray], time: float) -> float:
-        """Return the largest estimated error of a state that was reached after a time, degrees; collective.
+    def largest(self, state: list[np.ndarray], time: float) -> float:
+        """Estimate the largest error of a state; collective.
 
         The faces of tools keep their temperatures; their lines respond to the correction.
+
+        Args:
+            state: [T, *lines].
+            time: time after which the state was reached.
+
+        Returns:
+            Error, degrees.
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
-        lines = [self._faces(*each) for each in zip(body.touches, finer.touches, state[1:], strict=True)]
+        lines = [self._faces(*each) for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
         rates, _ = finer.rates([self._raised(state[0]), *lines])
         left = time * (rates[0] - finer.mass(self._raised(slope)))
         return finer.difference([left, *(np.zeros_like(line) for line in lines)], time)
@@ -40,7 +51,7 @@ class SpaceError:
         """Free the PETSc objects (collective)."""
         self._finer.destroy()
 
-    def _faces(self, touch: Touch, finer: Touch, lines: np.ndarray) -> np.ndarray:
+    def _faces(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
         """Return lines at the nodes of the finer space, with the temperature of the tool's face and 0 below it."""
         found = np.zeros((len(finer.dofs), lines.shape[1]))
         if touch.conducts:
@@ -50,7 +61,7 @@ class SpaceError:
         return found
 
     def _raised(self, own: np.ndarray) -> np.ndarray:
-        """Return a P2 function, owned part, in the finer space, owned part."""
+        """Return a P2 function, locally owned entries, in the finer space, locally owned entries."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._raised_values.interpolate(self._values)

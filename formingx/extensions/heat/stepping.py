@@ -1,8 +1,8 @@
-"""Steps in time: TR-BDF2, of second order and L-stable, with an estimate of its error.
+"""Time steps by TR-BDF2, which is of second order and L-stable, with an error estimate.
 
 Bank et al., IEEE Trans. CAD 4 (1985) 436-451; as a Runge-Kutta method with an embedded one of third order: Hosea and
-Shampine, Appl. Numer. Math. 20 (1996) 21-37. A jump of temperature at a face dies out in the first steps instead of
-ringing, as it does with the trapezoidal rule.
+Shampine, Appl. Numer. Math. 20 (1996) 21-37. A jump of temperature at a face decays in the first steps. The trapezoidal
+rule would oscillate instead.
 """
 
 from typing import NamedTuple
@@ -21,8 +21,8 @@ class Step(NamedTuple):
 
     Attributes:
         state: [T, *lines] at its end.
-        error: estimated error of this step, degrees.
-        stored: heat that the body stores in it.
+        error: estimated error of the step, degrees.
+        stored: heat that the body stores in the step.
         heats: heat through each boundary and source, in the order of `Conduction.names`.
     """
 
@@ -34,6 +34,14 @@ class Step(NamedTuple):
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
     """Take one step of TR-BDF2 from a state.
+
+    Args:
+        body: the heat equation.
+        state: [T, *lines].
+        dt: length of the step, time.
+
+    Returns:
+        Result of the step.
 
     Raises:
         ConvergenceError: Newton's method found no solution in a stage.
@@ -50,15 +58,32 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
     missing = body.mass(change[0]) - dt * sum(w * r[0] for w, r in zip(WEIGHTS, rates))
     through = dt * (WEIGHTS @ np.array([heats_first, second.heats, third.heats]))
     return Step([a + b for a, b in zip(state, change)], error, body.stored(change[0]),
-                np.concatenate([through, body.held_by(missing)]))
+                np.concatenate([through, body.through_fixed_faces(missing)]))
 
 
 def next_length(dt: float, error: float, tolerance: float) -> float:
-    """Return the step that would just meet the tolerance, with some safety; not more than five times as long."""
+    """Return the length of the step that just meets the tolerance, with a safety factor, at most five times the last.
+
+    Args:
+        dt: length of the last step, time.
+        error: its estimated error, degrees.
+        tolerance: largest allowed error, degrees.
+
+    Returns:
+        Length, time.
+    """
     return dt * float(np.clip(0.9 * (tolerance / max(error, 1e-300)) ** (1 / 3), 0.1, 5.0))
 
 
 def fitted(dt: float, left: float) -> float:
-    """Return a step of about dt that does not leave a sliver before a time that must be hit, `left` away."""
+    """Return the length of a step that leaves no short remainder before a time that must be hit.
+
+    Args:
+        dt: length that the error allows, time.
+        left: time until then.
+
+    Returns:
+        Length, about `dt`.
+    """
     return left if dt >= left * (1 - 1e-9) else min(dt, left / 2)
 

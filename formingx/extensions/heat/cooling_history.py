@@ -1,0 +1,336 @@
+"""History of the temperature during forming: one solution of the heat equation per accepted step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...errors import ConvergenceError, InputError
+from ...findings import Finding
+from ...forms.carry import Carrier
+from ...forms.history import Start
+from ...ranks import gathered
+from ...values.temperature import ABSOLUTE_ZERO
+from . import stepping
+from .conduction import Conduction
+from .layers import graded
+from .run import checked_boundaries, checked_materials
+from .space_error import SpaceError
+
+_MOST_STEPS = 10_000
+"""Largest number of steps of the heat equation in one step of the run."""
+
+_WARNS = 2e-3
+"""Discretisation error over the span of temperatures above which a run warns: the promised accuracy of stresses."""
+
+_LOOKS = 8
+"""Number of states in which the discretisation error is estimated, besides the ends of stages."""
+
+_NEAR = 1e-2
+"""Distance to a tool over the thickness of the body within which a node exchanges heat with it.
+
+A layer of air of this thickness conducts as well as a contact. A sheet that is drawn over a flat face lifts off its
+middle by less.
+"""
+
+
+class HeatState(NamedTuple):
+    """State of the heat equation.
+
+    Attributes:
+        time: process time.
+        temperature: temperatures, locally owned entries, shape (n,).
+        lines: temperatures of the lines of each tool, see `HeatContact`.
+        step: time step to continue with, or None.
+        power: heat of dissipated work (`Conduction.power`), locally owned entries, or None.
+        before: an earlier time and its temperature, or None.
+    """
+
+    time: float
+    temperature: np.ndarray
+    lines: list[np.ndarray]
+    step: float | None
+    power: np.ndarray | None
+    before: tuple[float, np.ndarray] | None
+
+
+class CoolingHistory:
+    """History of the temperature.
+
+    Args:
+        cooling: the `Cooling`.
+        problem: the `Problem`.
+    """
+
+    def __init__(self, cooling: Any, problem: Any):
+        forms, scene = problem.forms, problem.scene
+        self._cooling, self._problem, self._forms = cooling, problem, forms
+        self._field = problem.temperature
+        self._body = self._conduction()
+        self._touches = self._tool_contacts(self._body)
+        self._n = len(self._body.points)
+        self._first = scene.temperature.T.x.array[: self._n]
+        self._seen: Any = None                              # by the field, and by what depends on it
+        low, high = cooling.extremes(scene)
+        self._field.limits = low, np.inf if cooling.work_to_heat else high
+        self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
+        self.start()
+
+    def _conduction(self, degree: int = 2) -> Conduction:
+        """Return the heat equation of the body for a degree of the temperature."""
+        scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
+        laws = [*self._cooling.boundaries, *self._cooling._touches(scene)]
+        return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
+                          checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
+
+    def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
+        """Return (heat contact, contact, conductance in contact) of each tool that exchanges heat."""
+        contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
+        return [(touch, contact, touch.conductance.copy())
+                for touch, contact in zip(body.tool_contacts, contacts, strict=True)]
+
+    def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
+        """Return the estimated discretisation errors of temperatures in states; collective.
+
+        Args:
+            states: the states.
+
+        Returns:
+            Largest error in each state, degrees.
+        """
+        finer, power, found = self._conduction(degree=3), self._body.power, []
+        estimator, touches = SpaceError(self._body, finer), self._tool_contacts(finer)
+        try:
+            for state in states:
+                with self._problem.state_context(state):
+                    self._body.power = 0.0                  # of both, or of none
+                    for body, touching in ((self._body, self._touches), (finer, touches)):
+                        _set_conductances(body, touching, state.control)
+                        body.update()
+                    found.append(estimator.largest(self._state, self._time))
+        finally:
+            self._body.power = power
+            estimator.destroy()
+        return np.array(found)
+
+    def findings(self, states: Sequence[Any]) -> list[Finding]:
+        """Return a finding if the mesh is too coarse for the temperatures in states; collective.
+
+        Args:
+            states: the states.
+
+        Returns:
+            List of the finding, or an empty list.
+        """
+        states = [state for state in states if state.time > 0]
+        if not states:
+            return []
+        begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
+        looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
+        looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
+        errors = self.errors_in_space([states[k] for k in looked])
+        temperatures = [states[k].memory[-1].temperature for k in looked]          # the memory of heat is the last one
+        scene, comm = self._problem.scene, self._problem.comm
+        ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
+        worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
+        duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])    # since it was looked at last
+        allowed = max(self._cooling.tolerance, _WARNS * span)
+        if errors[worst] <= allowed:
+            return []
+        low, high = self._cooling.extremes(scene)
+        most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
+        error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be their whole span, {most:.3g}"
+        return [Finding("warning", "temperature", f"The error of the temperature in space {error} degrees at time"
+                        f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
+                        f" lose heat{_such_as(scene, min(errors[worst], most) / allowed, duration)}.")]
+
+    def start(self) -> None:
+        """Set the initial temperature."""
+        self._time = 0.0
+        self._dt: float | None = None
+        self._power: Any = None if self._dissipated is None else np.zeros(self._n)
+        self._before: Any = None
+        self._state = [self._first.copy(), *(touch.start() for touch in self._body.tool_contacts)]
+        self._take()
+
+    def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
+        """Solve the heat equation over the step in the body halfway through the step.
+
+        A point whose contact status changes in the step has half its conductance, which makes the step of second order.
+
+        Args:
+            x: unknowns at the end of the step, locally owned entries.
+            control: control at the end.
+            start: state at the beginning, or None.
+        """
+        until = self._forms.time_at(control)
+        if self._power is not None:                         # the materials have advanced
+            power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
+            self._body.power, self._power = (self._power + power) / 2, power
+        if until <= self._time:
+            return
+        _set_conductances(self._body, self._touches, control)
+        self._before = self._time, self._state[0]
+        if start is not None:
+            after = [touch.conductance.copy() for touch, *_ in self._touches]
+            self._problem.place(start.x)
+            _set_conductances(self._body, self._touches, start.control)
+            for (touch, *_), conductance in zip(self._touches, after):
+                touch.conductance[:] = (touch.conductance + conductance) / 2
+            self._problem.place((start.x[: len(x)] + x) / 2)
+        self._body.update()
+        self._state[0] = self._body.with_fixed_values(self._state[0])
+        self._integrate(until)
+        self._problem.place(x)
+        self._take()
+
+    def _integrate(self, until: float) -> None:
+        """Take steps of the heat equation, in the body at a fixed position, up to a time."""
+        dt, tolerance = self._dt or 1e-3 * (until - self._time), self._cooling.tolerance
+        for _ in range(_MOST_STEPS):
+            trial = stepping.fitted(dt, until - self._time)
+            found = stepping.step(self._body, self._state, trial)
+            dt = stepping.next_length(trial, found.error, tolerance)
+            if found.error <= tolerance:
+                self._state = found.state
+                self._time = until if trial == until - self._time else self._time + trial
+            if self._time == until:
+                self._dt = max(dt, trial)
+                return
+        raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MOST_STEPS} steps")
+
+    def get(self) -> HeatState:
+        """Return the state of the heat equation.
+
+        Returns:
+            The state.
+        """
+        return HeatState(self._time, self._state[0].copy(), [lines.copy() for lines in self._state[1:]], self._dt,
+                      self._power, self._before)
+
+    def put(self, memory: HeatState) -> None:
+        """Set the state of the heat equation.
+
+        Args:
+            memory: the state.
+        """
+        self._time, self._dt, self._power, self._before = memory.time, memory.step, memory.power, memory.before
+        self._state = [memory.temperature.copy(), *(lines.copy() for lines in memory.lines)]
+        self._take()
+
+    def save(self, memory: HeatState) -> dict[str, Any]:
+        """Return a state of the heat equation as plain data, the same on all ranks; collective.
+
+        Args:
+            memory: the state.
+
+        Returns:
+            The data.
+        """
+        plain = partial(gathered, self._problem.comm)
+        return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
+                "temperature": plain(memory.temperature),
+                **({} if memory.before is None else {"before": [memory.before[0], plain(memory.before[1])]}),
+                **({} if memory.power is None else {"power": plain(memory.power)}),
+                "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
+                          for touch, lines in zip(self._body.tool_contacts, memory.lines, strict=True)]}
+
+    def load(self, data: dict[str, Any]) -> HeatState:
+        """Return the state of this rank from the result of `save`.
+
+        Args:
+            data: result of `save`.
+
+        Returns:
+            The state.
+
+        Raises:
+            InputError: the data do not match the scene.
+        """
+        rows = _rows(self._body.points, data["points"])
+        if ("power" in data) != (self._dissipated is not None):
+            raise InputError("the temperature history belongs to a scene with another work_to_heat")
+        power = np.array(data["power"])[rows] if "power" in data else None
+        lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
+                 for touch, d in zip(self._body.tool_contacts, data["lines"], strict=True)]
+        before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
+        return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
+
+    def carry(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
+              mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
+        """Interpolate the state on another mesh; the material histories have been transferred before.
+
+        Args:
+            source: history on the other mesh.
+            memory: its state.
+            x: unknowns of this problem, locally owned entries.
+            control: control of the state.
+            mapping: function from reference points of the other mesh, shape (n, 2), to points of this mesh.
+
+        Returns:
+            The state on this mesh.
+        """
+        comm, before = self._problem.comm, memory.before
+        to_body = Carrier(comm, mapping(source._body.points), self._body.points).fitted
+        touched = zip(source._body.tool_contacts, memory.lines, strict=True) if self._body.tool_contacts else ()
+        lines = [Carrier(comm, mapping(other.points), touch.points).fitted(kept)  # what is released touches nothing
+                 for touch, (other, kept) in zip(self._body.tool_contacts, touched, strict=True)]
+        power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
+        return HeatState(memory.time, to_body(memory.temperature), lines, memory.step, power,
+                      before and (before[0], to_body(before[1])))
+
+    def _take(self) -> None:
+        """Set the temperature of the problem and the coefficients that depend on it."""
+        field, T, before = self._field, self._state[0], self._before
+        seen = self._time, T, before
+        if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
+            self._seen = seen
+            field.T.x.array[: self._n] = T
+            field.T.x.scatter_forward()
+            field.time, field.before = self._time, None
+            if before is not None:
+                earlier = field.T.copy()
+                earlier.x.array[: self._n] = before[1]
+                earlier.x.scatter_forward()
+                field.time_before, field.before = before[0], earlier.x.array
+            self._problem.take_temperature()
+
+
+def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
+    """Set the conductance of the nodes in contact, and 0 where no tool is in contact with the deformed body."""
+    u = body.displacements()
+    for touch, contact, conductance in touches:
+        depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
+        touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
+
+
+def _such_as(scene: Any, times: float, duration: float) -> str:
+    """Return the advice on elements that reduce an error by a factor (of third order)."""
+    laws = {law.on for law in [*scene.heat.boundaries, *scene.heat._touches(scene)]}
+    faces = [face for face in ("bottom", "top") if face in laws]
+    if not faces or len(scene.mesh.layers) > 1:
+        return ""
+    material, = checked_materials(scene.mesh, scene.heat.materials).values()
+    sizes = graded(scene.mesh, faces, 0.8 * times ** (-1 / 3), float(np.sqrt(material.diffusivity * duration)))
+    return f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
+
+
+def _equal(a: Any, b: Any) -> bool:
+    """Return True if two (time, temperature, before) are equal."""
+    same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
+    return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
+
+
+def _rows(points: np.ndarray, others: Any) -> np.ndarray:
+    """Return the row of `others` at the position of each point, shape (n,); raise an InputError if there is none."""
+    from scipy.spatial import cKDTree
+    others = np.reshape(others, (-1, points.shape[-1]))
+    if not len(points):
+        return np.zeros(0, dtype=int)
+    away, rows = cKDTree(others).query(points)
+    if np.any(away > 1e-9 * np.abs(others).max()):
+        raise InputError("the temperature history belongs to another mesh")
+    return rows

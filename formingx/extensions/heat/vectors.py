@@ -1,0 +1,125 @@
+"""Vectors of the heat equation: assembly of forms, heat capacity, sums over ranks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from dolfinx import fem, la
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ... import _compat
+from ...mesh.mesh import Mesh
+
+
+class HeatVectors:
+    """Vectors and forms of the heat equation; `Conduction` sets the attributes.
+
+    Attributes:
+        mesh: the `Mesh`.
+        comm: MPI communicator.
+        T: the temperature `Function` of the forms.
+        capacity: heat capacity of the whole body, heat per degree.
+        power: heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
+    """
+
+    mesh: Mesh
+    comm: Any
+    T: fem.Function
+    capacity: float
+    power: Any
+    _n: int
+    _buffer: la.Vector
+    _change: fem.Function
+    _scale: fem.Constant
+    _v: Any
+    _rate_form: Any
+    _mass_form: Any
+
+    def constant(self, value: float) -> fem.Constant:
+        """Return a number in a form that can be changed without recompiling the form.
+
+        Args:
+            value: initial value.
+
+        Returns:
+            The `Constant`.
+        """
+        return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
+
+    def stored(self, change: np.ndarray) -> float:
+        """Return the heat that the whole body stores by a change of temperature.
+
+        Args:
+            change: change of T, locally owned entries, shape (n,).
+
+        Returns:
+            Heat.
+        """
+        return self.capacity * self._sum(self._mass(change))
+
+    def mass(self, change: np.ndarray) -> np.ndarray:
+        """Return M times a change of temperature.
+
+        Args:
+            change: change of T, locally owned entries, shape (n,).
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
+        return self._mass(change)
+
+    def source(self, make: Any) -> Any:
+        """Return a compiled form of a heat source for `assembled`.
+
+        Args:
+            make: function of a test function v that returns the integral (UFL) of heat per time, times v.
+
+        Returns:
+            The compiled form.
+        """
+        return self._form(make(self._scale * self._v))
+
+    def assembled(self, form: Any) -> np.ndarray:
+        """Return the values of a form of `source` at the nodes, for `power`.
+
+        Args:
+            form: compiled form.
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
+        return self._assemble(form)
+
+    def _form(self, form: Any) -> Any:
+        """Return a compiled form."""
+        return _compat.compile_form(form)
+
+    def _integral(self, form: Any) -> float:
+        """Return the value of an integral (UFL) over all ranks."""
+        return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
+
+    def _assemble(self, form: Any) -> np.ndarray:
+        """Return the locally owned entries of a compiled linear form, shape (n,)."""
+        return _compat.assemble_vector(self._buffer, form).copy()
+
+    def _body_rate(self, T: np.ndarray) -> np.ndarray:
+        """Return R(T) without contact, locally owned entries; leaves T in `T`."""
+        self.T.x.array[: self._n] = T
+        self.T.x.scatter_forward()
+        return self._assemble(self._rate_form) + self.power
+
+    def _mass(self, change: np.ndarray) -> np.ndarray:
+        """Return M times a change of T, locally owned entries, shape (n,)."""
+        self._change.x.array[: self._n] = change
+        self._change.x.scatter_forward()
+        return self._assemble(self._mass_form)
+
+    def _largest(self, values: np.ndarray) -> float:
+        """Return the largest absolute value over all ranks."""
+        return float(self.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
+
+    def _sum(self, values: np.ndarray) -> float:
+        """Return the sum over all ranks."""
+        return float(self.comm.allreduce(values.sum(), MPI.SUM))
