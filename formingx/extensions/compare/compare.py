@@ -260,7 +260,15 @@ class Smooth:
         self.line = self.at(self.s)
 
     def foot(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
-        """Return the closest point between the neighbours of sample k, and True if `point` is beyond the end."""
+        """Return the closest point of the curve between the neighbours of a sample.
+
+        Args:
+            point: the point, shape (2,).
+            k: number of the sample.
+
+        Returns:
+            The closest point, shape (2,); True if `point` lies beyond the end of the curve.
+        """
         low, high = max(k - 1, 0), min(k + 1, _SAMPLES - 1)
         line = self.at(np.linspace(self.s[low], self.s[high], _FINE))
         d = np.diff(line, axis=0)

@@ -71,6 +71,12 @@ class MeasuredWall:
 
         Numbers are in the unit of the run; units in the header ("wall [mm]") must be the same in all columns.
 
+        Args:
+            file: path of the file.
+
+        Returns:
+            The measured wall.
+
         Raises:
             InputError: the file cannot be read, lacks a column, or has columns in different units.
         """
@@ -90,7 +96,13 @@ class MeasuredWall:
                    points=None if r is None or z is None else np.column_stack([r, z]))
 
     def of_path(self, path: Path) -> np.ndarray:
-        """Return the wall of the last state of a path at these points, shape (m,), length.
+        """Return the wall of the last state of a path at the measured points.
+
+        Args:
+            path: the path.
+
+        Returns:
+            Wall, shape (m,), length.
 
         Raises:
             InputError: a length is more than a tenth beyond the end of the computed part.
@@ -99,7 +111,13 @@ class MeasuredWall:
         return np.interp(self._numbers(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
 
     def compare(self, path: Path) -> WallComparison:
-        """Return the walls of the last state of a path beside the measured ones; collective.
+        """Compare the wall of the last state of a path with the measured one; collective.
+
+        Args:
+            path: the path.
+
+        Returns:
+            The comparison.
 
         Raises:
             InputError: a length is more than a tenth beyond the end of the computed part; a sheet in three dimensions.

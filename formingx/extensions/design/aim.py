@@ -43,7 +43,16 @@ SEARCH = Search()
 
 
 def lack(what: str, requested: float | None, found: float) -> str:
-    """Return the target and the value found, as text, if the target was missed; else ""."""
+    """Return a missed target and the value found, as text.
+
+    Args:
+        what: name of the quantity.
+        requested: its target, or None.
+        found: the value found.
+
+    Returns:
+        The text; "" if the target was met.
+    """
     if requested is None or abs(found / requested - 1) < SEARCH.kept:
         return ""
     return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
@@ -83,7 +92,14 @@ class WallTarget:
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
+        """Return the residuals and their derivatives by the parameters.
+
+        Args:
+            run: the run.
+
+        Returns:
+            Residuals, shape (m,), and derivatives, shape (m, n).
+        """
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
         target = wall.mean() if self.wanted is None else self.wanted
@@ -103,13 +119,30 @@ class WallTarget:
         return left, slopes
 
     def cost(self, run: DesignRun) -> float:
-        """Return the mean square of the relative deviations plus the square of the volume's relative deviation."""
+        """Return the cost of a run.
+
+        It is the mean square of the relative deviations of the wall, plus the square of the volume's relative
+        deviation.
+
+        Args:
+            run: the run.
+
+        Returns:
+            The cost.
+        """
         wall = run.wall[self.inside]
         left = np.mean((wall / (wall.mean() if self.wanted is None else self.wanted) - 1) ** 2)
         return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return the deviation of the best run from the wanted wall and the reason for the end of the search, or ""."""
+        """Return the deviation of the best run from the wanted wall, and the reason for the end of the search.
+
+        Args:
+            run: the best run.
+
+        Returns:
+            The text; "" if the wall was reached.
+        """
         if self.wanted is None:
             return ""
         wall = run.wall[self.inside]
@@ -164,12 +197,29 @@ class MeasuredWallTarget(WallTarget):
         self.measured = measured
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals, shape (m,), and their derivatives by the n parameters, shape (m, n)."""
+        """Return the residuals and their derivatives by the parameters.
+
+        Args:
+            run: the run.
+
+        Returns:
+            Residuals, shape (m,), and derivatives, shape (m, n).
+        """
         wall, jacobian = run.derivative(self.measured.of_path)
         return self._with_volume(run, wall / self.measured.wall - 1, jacobian / self.measured.wall[:, None])
 
     def cost(self, run: DesignRun) -> float:
-        """Return the mean square of the relative deviations plus the square of the volume's relative deviation."""
+        """Return the cost of a run.
+
+        It is the mean square of the relative deviations of the wall, plus the square of the volume's relative
+        deviation.
+
+        Args:
+            run: the run.
+
+        Returns:
+            The cost.
+        """
         left = self.measured.of_path(run.path) / self.measured.wall - 1
         return float(np.mean(left**2) + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
 
@@ -189,7 +239,14 @@ def _range(values: np.ndarray) -> str:
 
 
 def inside_of(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    """Return the mask of the nodes of the wall that count, shape (k,).
+    """Return the mask of the nodes of the wall that count.
+
+    Args:
+        run: the run.
+        within: reference lengths (low, high), or None for all.
+
+    Returns:
+        Mask, shape (k,).
 
     Raises:
         InputError: fewer than two nodes count.

@@ -20,7 +20,14 @@ _SCATTER = 6e-5
 
 
 def unevenness(wall: np.ndarray) -> float:
-    """Return the standard deviation of the wall over its mean."""
+    """Return the standard deviation of the wall over its mean.
+
+    Args:
+        wall: thicknesses, shape (k,), length.
+
+    Returns:
+        The ratio.
+    """
     return float(wall.std() / wall.mean())
 
 
@@ -79,7 +86,11 @@ class Answer:
         return unevenness(self.before.wall[self.inside]), unevenness(self.best.wall[self.inside])
 
     def at_bounds(self) -> list[str]:
-        """Return the parameters that lie on a bound, as text."""
+        """Return the parameters that lie on a bound, as text.
+
+        Returns:
+            A text for each such parameter.
+        """
         p, v = self.best.parameters, self.best.vector
         near = 1e-6 * p.size
         return [f"{name} at its {'lowest' if x <= a + h else 'highest'}, {x:.6g}"
@@ -89,6 +100,9 @@ class Answer:
         """Return the names of the parameters without effect.
 
         Their whole range changes the wall, as predicted by the derivatives, by less than its scatter.
+
+        Returns:
+            The names.
         """
         by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
@@ -98,6 +112,9 @@ class Answer:
         """Return the lowest unevenness that the parameters can reach within their bounds, for any volume.
 
         The derivatives of the best run predict it.
+
+        Returns:
+            Standard deviation of the wall over its mean.
         """
         from scipy.optimize import lsq_linear
         p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")

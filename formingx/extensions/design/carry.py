@@ -45,6 +45,7 @@ def carry(path: Path, end: Any, neighbours: Sequence[PerturbedRun]) -> None:
 
 
 class _StateTransfer:
+    """Transfer of the perturbed runs along the base run."""
     def __init__(self, path: Path, end: Any, neighbours: Sequence[PerturbedRun]):
         if len(path.segments) > 1:
             raise Failure("the body was remeshed", [])
@@ -238,7 +239,7 @@ class _StateTransfer:
         return self._until[key]
 
     def _gaps(self) -> tuple[Any, list[Any]]:
-        """Return the gap of a point that closes at the end of the step and turns the path; None if no point does."""
+        """Return the gap of a point that closes at the end of the step and turns the path, or None."""
         for number, late in enumerate(self._late):
             face = self.problem.contacts[number]
             size = np.where(late, abs(face.rule.area), 0.0)
@@ -259,6 +260,7 @@ def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
     law = face.law.part(mine)
 
     def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+        """Return the gap and its derivative by the control; set its gradient."""
         near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[mine])
         found, rate = float(near.distance.sum()), 0.0
         if sloped:

@@ -96,6 +96,13 @@ def confidence(run: Any, measured: Any) -> Confidence:
 
     where r are the relative deviations of the walls.
 
+    Args:
+        run: the run.
+        measured: the `MeasuredWall`.
+
+    Returns:
+        The confidence.
+
     Raises:
         InputError: the wall has no more points than there are parameters.
     """

@@ -79,6 +79,7 @@ class Design:
         return self._run(self.parameters.vector(values or {}))
 
     def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
+        """Return (scene, target or stages) from the user's function for a vector of numbers."""
         made = self._build(**self.parameters.values(vector))
         if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
             raise InputError("Design: build must return (scene, target) or (scene, stages)")
@@ -91,6 +92,7 @@ class Design:
         return scene, end
 
     def _run(self, vector: np.ndarray) -> DesignRun:
+        """Return a run for a vector of numbers."""
         scene, end = self._make(vector)
         scene = copy.copy(scene)                             # the script's scene is left as it is
         scene.one_by_one = True
@@ -217,6 +219,7 @@ class Design:
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
+            """Return the relative volume of a run plus a penalty for a wall below the minimum."""
             return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
         while len(taken) + len(notes) < most:
             try:

@@ -1,13 +1,14 @@
-"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
+r"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
 
-Each perturbed run has a problem of its own, built from the scene of the user's function. So every effect of a parameter
-is included (nodes, constants, tools, friction, targets, temperatures). At a state of the base run with dF/dx = K, a
-perturbed run solves its own equilibrium F' = 0 and its own constraint c' = 0 by modified Newton iterations,
+Each perturbed run has a problem of its own, built from the scene of the user's function. It therefore includes every
+effect of a parameter (nodes, constants, tools, friction, targets, temperatures). At a state of the base run with dF/dx
+= K, a perturbed run solves its own equilibrium F' = 0 and its own constraint c' = 0 by modified Newton iterations:
 
-    K dx + F_c dc = -F',    c_x dx + c_c dc = -c'.
+.. math::
+    K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
 
-The derivative of an output quantity is its central difference between two perturbed runs, over 2 dp, with an error of
-second order in dp.
+:math:`\lambda` is the control. The derivative of an output quantity is its central difference between two perturbed
+runs, over 2 dp, with an error of second order in dp.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ class PerturbedRun:
     """Problem and state of one perturbed run.
 
     Args:
-        scene, end: scene and target (or stages) with the perturbed parameter.
+        scene: scene with the perturbed parameter.
+        end: target or stages with the perturbed parameter.
         base: the `Problem` of the base run.
         name: name of the parameter.
 
@@ -79,12 +81,26 @@ class PerturbedRun:
         self.then = 0.0
 
     def state(self, like: State) -> State:
-        """Return its state, with the path data of a state of the base run."""
+        """Return its state, with the path data of a state of the base run.
+
+        Args:
+            like: state of the base run.
+
+        Returns:
+            The state.
+        """
         return State(self.x, self.control, like.direction, like.slope, memory=self.memory, stage=like.stage,
                      kind=like.kind, time=self.problem.time_at(self.control))
 
     def residual(self, left_over: np.ndarray) -> np.ndarray:
-        """Return F at its state less the residual of the base run, locally owned entries, shape (n,)."""
+        """Return F at its state minus the residual of the base run.
+
+        Args:
+            left_over: residual of the base run, locally owned entries, shape (n,).
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
         self.problem.x.array_w[:] = self.x
         self.problem.residual(self.problem.x, self.control, self.F)
         self.F.array_w[:] -= left_over
@@ -110,7 +126,14 @@ class PerturbedRun:
                 F[numbers] = 0.0                                 # a node between two tools counts once
 
     def constraint(self, equation: Any) -> float:
-        """Return the residual of an equation at its state."""
+        """Return the residual of an equation at its state.
+
+        Args:
+            equation: the equation, see `Bound.equation`.
+
+        Returns:
+            The residual.
+        """
         self.problem.x.array_w[:] = self.x
         return float(equation(self.problem.x, self.control, self.gradient)[0])
 
@@ -159,6 +182,7 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
     left_over = newton.F.array_r.copy()                      # round-off, and the forces of points kept open
 
     def constraint(k: int) -> float:
+        """Return the residual of the constraint of perturbed run k."""
         entry = neighbours[k]
         if equation is None:
             return float(problem.comm.allreduce(float(g @ (entry.x - state.x))) + by_control * (
@@ -200,4 +224,5 @@ def settle(curve: Any, state: State, neighbours: Sequence[PerturbedRun], equatio
 
 
 def _norm(problem: Any, x: np.ndarray) -> float:
+    """Return the norm of locally owned entries over all ranks."""
     return float(np.sqrt(problem.comm.allreduce(float(x @ x))))

@@ -37,6 +37,7 @@ class Knots:
 
     @cached_property
     def _spline(self) -> Any:
+        """Cubic spline through the knots."""
         from scipy.interpolate import CubicSpline
         return CubicSpline(self.coordinates, self.values)
 
@@ -140,13 +141,26 @@ class Parameters:
         return {name: (entry.low, entry.high) for name, entry in self._given.items() if entry.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
-        """Return the arguments of the user's function, {name: number or `Knots`}."""
+        """Return the arguments of the user's function.
+
+        Args:
+            vector: numbers of the parameters, shape (n,).
+
+        Returns:
+            {name: number or `Knots`}.
+        """
         parts = np.split(vector, np.cumsum([len(entry.start) for entry in self._given.values()])[:-1])
         return {name: Knots(part, entry.smooth) if entry.profile else float(part[0])
                 for (name, entry), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
-        """Return the numbers for values of some parameters, the others at their start, shape (n,).
+        """Return the numbers for values of some parameters; the others have their start values.
+
+        Args:
+            values: {name: value}.
+
+        Returns:
+            Numbers, shape (n,).
 
         Raises:
             InputError: an unknown name, or the wrong number of values.

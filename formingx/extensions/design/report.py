@@ -18,7 +18,18 @@ from .scatter import deviations as deviations_of
 
 
 def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a search, see `Answer.report`."""
+    """Write the report of a search; see `Answer.report`.
+
+    Args:
+        answer: result of the search.
+        file: path of the file.
+        title: heading of the page.
+        deviations: standard deviations of the parameters, or None.
+        units: units of the labels.
+
+    Returns:
+        Path of the file.
+    """
     units = _of_scene(answer.best, units)
     before, best, (a, b) = answer.before, answer.best, answer.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
@@ -44,6 +55,7 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
                        units.label("volume")], rows)
 
     def pictures() -> list[str]:
+        """Return the pictures of a search as HTML."""
         return [_sections([before, best], ["before", "after"], units),
                 _walls(answer, spread, deviations, units), _patterns(before, best), _heat_map(effects, units)]
     tail = [*_sure(best, deviations, units), "<h2>Runs of the search</h2>", runs]
@@ -52,7 +64,18 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a run, see `DesignRun.report`."""
+    """Write the report of a run; see `DesignRun.report`.
+
+    Args:
+        run: the run.
+        file: path of the file.
+        title: heading of the page.
+        deviations: standard deviations of the parameters, or None.
+        units: units of the labels.
+
+    Returns:
+        Path of the file.
+    """
     units = _of_scene(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
@@ -62,6 +85,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
     said = [("bad", found.text) for found in alarming(run.path.findings())]
 
     def pictures() -> list[str]:
+        """Return the pictures of a run as HTML."""
         drawing, axes = figure(1, width=9, height=4)
         _line(axes, run, "C0", "wall", spread, deviations, units)
         return [_sections([run], ["the part"], units), page.figure(drawing, "Wall over the reference length."),
@@ -77,7 +101,9 @@ def _of_scene(run: Any, units: Units) -> Units:
 
 def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictures: Any, table: str, tail: list[str],
            comm: Any) -> FilePath:
+    """Write an HTML page on rank 0."""
     def make() -> None:
+        """Write the page."""
         body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(how))}</p>"]
         body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>" for kind, text in said if text]
         body.append("<div class=cards>" + "".join(
@@ -113,6 +139,7 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
 
 
 def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
+    """Draw a wall over the reference length, with its standard deviation."""
     s = run.profile.reference_length
     axes.plot(s, run.wall, color=colour, label=label)
     if spread is not None:
@@ -125,6 +152,7 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
 
 def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
+    """Draw the walls of a search."""
     drawing, axes = figure(1, width=9, height=4)
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
@@ -158,6 +186,7 @@ def _patterns(before: Any, best: Any) -> str:
 
 
 def _heat_map(effects: Any, units: Units) -> str:
+    """Draw the effects of the parameters on the wall."""
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(

@@ -91,6 +91,14 @@ class Effects:
 class DesignRun:
     """A run of the user's scene for given parameter values.
 
+    Args:
+        make: function of a vector of numbers that returns (scene, target or stages).
+        parameters: the `Parameters` of the design.
+        vector: values of the n numbers of the parameters, shape (n,).
+        path: the `Path`.
+        end: target or stages of the run.
+        tolerances: tolerances of the run, or None.
+
     Attributes:
         vector: values of the n numbers of the parameters, shape (n,).
         values: {parameter: number or `Knots`}.
@@ -111,6 +119,7 @@ class DesignRun:
 
     @cached_property
     def _profiles(self) -> Profiles:
+        """Evaluation of profiles on the mesh of the last state."""
         return Profiles(self.path.problem)
 
     @property
@@ -246,6 +255,7 @@ class DesignRun:
         return of_run(self, file, title, deviations, units or NONE)
 
     def _here(self, measure: Any) -> np.ndarray:
+        """Return the values of a quantity in the last state, shape (m,)."""
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
                 return np.atleast_1d(getattr(self, measure))
@@ -265,6 +275,7 @@ class DesignRun:
         return whole
 
     def _at(self, entry: PerturbedRun, measure: Any) -> Any:
+        """Return the values of a quantity in a perturbed run."""
         if measure == "volume":
             return _volume(entry.problem)
         state = entry.state(self.path.last)

@@ -49,6 +49,7 @@ class Band:
 
     @property
     def _width(self) -> np.ndarray:
+        """Half width of the band, shape (m,)."""
         from scipy.stats import norm
         return norm.ppf((1 + self.confidence) / 2) * self.deviation
 
@@ -83,13 +84,16 @@ class Band:
 
 
 def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray:
-    """Return the covariance of the n numbers of a design, shape (n, n).
+    """Return the covariance of the n numbers of a design.
 
     Args:
         caller: name of the caller, for messages.
         parameters: the parameters of the design.
-        given: {parameter: standard deviation}. The knots of a profile are independent and have the same deviation.
-            Or a fit (`Fit`) whose constants have the names of parameters. Or a list of such, independent of each other.
+        given: {parameter: standard deviation}. The knots of a profile are independent and have the same deviation. Or a
+            fit (`Fit`) whose constants have the names of parameters. Or a list of such, independent of each other.
+
+    Returns:
+        Covariance, shape (n, n).
 
     Raises:
         InputError: a name is no parameter, or the tests of a fit leave constants undetermined.
@@ -120,7 +124,16 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
-    """Return the band of `DesignRun.band`.
+    """Return the confidence band of a quantity; see `DesignRun.band`.
+
+    Args:
+        run: the run.
+        given: standard deviations of the parameters.
+        measure: the quantity.
+        confidence: confidence level.
+
+    Returns:
+        The band.
 
     Raises:
         InputError: a confidence outside (0, 1), or as `DesignRun.spread`.
@@ -133,7 +146,15 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
 
 
 def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of m values with derivatives `by`, shape (m, n); the result has shape (m,)."""
+    """Return the standard deviations of m values, to first order.
+
+    Args:
+        by: derivatives of the values by the n parameters, shape (m, n).
+        covariance: covariance of the parameters, shape (n, n).
+
+    Returns:
+        Standard deviations, shape (m,).
+    """
     return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", by, covariance, by), 0.0))
 
 

@@ -1,4 +1,4 @@
-"""Checks of a run against the tests that its materials' constants come from."""
+"""Check of a run against the tests from which the constants of its materials were fitted."""
 
 from __future__ import annotations
 
@@ -23,7 +23,14 @@ _SHARE = 0.005             # of a layer's volume that may lie outside the tests 
 
 @register("scene")
 def draws_beyond_tests(body: Any) -> Iterator[Finding]:
-    """Constants that tests leave open, and expected stretches that they do not cover."""
+    """Find constants that tests leave undetermined, and expected stretches beyond the tests.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        Findings.
+    """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
         if tested.undetermined and tested.of_one_mode:
@@ -39,7 +46,14 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def ends_beyond_tests(path: Any) -> Iterator[Finding]:
-    """Parts of the body whose last deformation the tests of its material do not cover; collective."""
+    """Find parts of the body whose last deformation the tests of its material do not cover; collective.
+
+    Args:
+        path: the path.
+
+    Yields:
+        Findings.
+    """
     problem, scene = path.problem, path.problem.scene
     known = dict(_tested(scene))
     for terms in problem.forms.terms if known else ():

@@ -17,7 +17,10 @@ _TRELOAR_1944 = {
 
 
 def treloar1944() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Treloar's (1944) vulcanised rubber: {test: (stretch, nominal stress in MPa)}, digitised from his curves.
+    """Return Treloar's (1944) tests of vulcanised rubber, digitised from his curves.
+
+    Returns:
+        {test: (stretch, nominal stress in MPa)}, arrays of shape (n,).
 
     >>> sorted(fx.treloar1944())
     ['equibiaxial', 'pure_shear', 'uniaxial']

@@ -1,4 +1,4 @@
-"""Constants of a material from tests."""
+"""Fit of the constants of a material to tests."""
 
 from __future__ import annotations
 
@@ -66,6 +66,9 @@ class Fit(NamedTuple):
 
         Args:
             confidence: confidence level, between 0 and 1.
+
+        Returns:
+            {constant: (lowest, highest)}.
 
         Raises:
             InputError: a confidence outside (0, 1).
@@ -178,6 +181,7 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
+    """Return the result of a fit from its misfits."""
     card = copy.copy(material)
     card.tested = tested
     deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), 0.02 * abs(measured[part]).max()))
@@ -210,6 +214,7 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         return found.cost, guess, found.x
 
     def cost(trial: tuple) -> float:
+        """Return the cost of a trial, for sorting."""
         return trial[0]
 
     trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)
@@ -237,6 +242,7 @@ def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
 
 
 def _tests_in_time(file: Any) -> list[TimedTest]:
+    """Return the tests in time of a file."""
     tests = read_tests(place("fit: data", file))
     if any(len(columns) != 3 for _, columns in tests):
         raise InputError(f"fit: data: {file}: has no times: a material that relaxes needs a fourth column with"
@@ -245,6 +251,7 @@ def _tests_in_time(file: Any) -> list[TimedTest]:
 
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:
+    """Return the initial materials of a fit."""
     if isinstance(material, Material):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r} is for the class Ogden; {material} has its terms already")
@@ -261,4 +268,5 @@ def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]
 
 
 def _rms(values: np.ndarray) -> float:
+    """Return the root mean square of values."""
     return float(np.sqrt(np.mean(values**2)))

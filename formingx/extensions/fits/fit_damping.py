@@ -1,4 +1,4 @@
-"""Relaxation spectrum of a melt from its moduli in oscillation, and its damping from tests at large strain."""
+"""Relaxation spectrum of a melt from oscillation tests, and its damping from tests at large strain."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Spectrum(NamedTuple):
     """Relaxation spectrum of a melt.
 
     Attributes:
-        pairs: [(modulus, relaxation time), ...], stress and time, as `KBKZ` takes them.
+        pairs: list of (modulus, relaxation time), stress and time, for `KBKZ`.
         deviation: root mean square of the relative misfit of both moduli.
     """
 
@@ -83,7 +83,22 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
 
 def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
-    """Return (the material, its constants of damping, the tests, their uncertainty); see `fit`."""
+    """Fit the damping of a melt; see `fit`.
+
+    Args:
+        material: a `KBKZ` with the initial damping.
+        tests: list of `TimedTest`.
+        terms: must be None.
+        relative: see `fit`.
+        weights: weight of each test.
+        within: see `fit`.
+
+    Returns:
+        The material, its constants of damping, the tests, and their uncertainty.
+
+    Raises:
+        InputError: the tests or arguments do not fit the material.
+    """
     from scipy.optimize import least_squares
     if not isinstance(material, KBKZ) or material.damping is None or not material.damping.bounds:
         raise InputError("fit: KBKZ: give a card with a spectrum and a damping to begin with, such as"
@@ -99,9 +114,11 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
         raise InputError(f"fit: {len(row)} points cannot fix the {len(names)} constants of {law.__name__}")
 
     def with_damping(damping: Damping) -> KBKZ:
+        """Return the material with another damping."""
         return KBKZ(material.spectrum, damping, material.equilibrium, irreversible=material.integral.irreversible)
 
     def stress(x: np.ndarray) -> np.ndarray:
+        """Return the nominal stresses for constants of damping, shape (n,)."""
         if np.any(x < low) or np.any(x > high):
             return np.full(len(row), np.nan)
         card = with_damping(law(*map(float, x)))

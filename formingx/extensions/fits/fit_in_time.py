@@ -55,6 +55,9 @@ class TimedTest(NamedTuple):
             stretch: the stretch.
             times: times of the stresses, above 0, rising, shape (n,).
             stress: nominal stress at these times, shape (n,).
+
+        Returns:
+            The test.
         """
         t = np.append(0.0, np.asarray(times, float))
         return cls(mode, t, np.full(len(t), stretch), np.append(np.nan, stress))
@@ -68,6 +71,9 @@ class TimedTest(NamedTuple):
             rate: Hencky rate, 1/time, above 0.
             stretches: stretches, in order, shape (n,).
             stress: nominal stress at these stretches, shape (n,).
+
+        Returns:
+            The test.
         """
         l = np.append(1.0, np.asarray(stretches, float))
         times = np.abs(np.log(l)) / positive("TimedTest: rate", rate)
@@ -77,7 +83,22 @@ class TimedTest(NamedTuple):
 def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
                    weights: list[float], within: Any
                    ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
-    """Return (the material, its constants, the tests, their uncertainty); see `fit`."""
+    """Fit a relaxing material to tests in time; see `fit`.
+
+    Args:
+        material: class, or material with initial constants.
+        tests: list of `TimedTest`.
+        terms: number of branches, or None.
+        relative: see `fit`.
+        weights: weight of each test.
+        within: see `fit`.
+
+    Returns:
+        The material, its constants, the tests, and their uncertainty.
+
+    Raises:
+        InputError: the tests or arguments do not fit the material.
+    """
     data = _Data(checked_tests(tests, within), material if isinstance(material, type) else type(material), relative,
                  weights)
     if isinstance(material, RelaxingMaterial):
@@ -98,7 +119,14 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """Return the tests as arrays, with nan for stresses at stretches outside `within`."""
+    """Return the tests as arrays, with nan for stresses at stretches outside `within`.
+
+    Returns:
+        The tests.
+
+    Raises:
+        InputError: an argument that is no list of tests, or a test with inconsistent arrays.
+    """
     found = []
     for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         if not isinstance(test, TimedTest):
@@ -223,6 +251,7 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
 
 
 def _checked(name: str, test: TimedTest) -> dict[str, Any]:
+    """Return the arguments of a test as arrays; raise an InputError for inconsistent ones."""
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:
         stress = np.asarray(test.stress, float)

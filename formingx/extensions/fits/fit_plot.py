@@ -9,7 +9,21 @@ from ...figures import figure
 
 
 def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
-    """See `Fit.plot`."""
+    """Draw data and fitted material; see `Fit.plot`.
+
+    Args:
+        material: the material.
+        data: the tests.
+        axes: matplotlib axes, or None.
+        unit: unit of stress, for the label.
+        unit_of_time: unit of time, for the label.
+
+    Returns:
+        The matplotlib axes.
+
+    Raises:
+        InputError: relaxation tests and other tests on one axes.
+    """
     held = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
     count = 1 + (any(held) and not all(held))
     if axes is None:
@@ -31,6 +45,7 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
 
 
 def _stretched(material: Any, data: dict, panel: Any) -> None:
+    """Draw tests without time, and the curves of the material."""
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _biaxial(material, (l, *others, P), panel)

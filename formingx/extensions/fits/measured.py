@@ -1,4 +1,4 @@
-"""Tests from a file: columns test, stretch, stress, and time if there is any."""
+"""Tests from a file with columns test, stretch, stress, and optionally time."""
 
 import itertools
 from pathlib import Path
@@ -18,9 +18,18 @@ _UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
 
 
 def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
-    """Return [(test, columns)] of a CSV file; a test ends where its name changes or the time falls; see `fit`.
+    """Read the tests of a CSV file; see `fit`.
 
     The columns are (stretch, stress) or (stretch, stress, time), shape (2 or 3, n); an empty stress is nan.
+
+    A test ends where its name changes or the time decreases. The columns are (stretch, stress) or (stretch, stress,
+    time); an empty stress is nan.
+
+    Args:
+        file: path of the file.
+
+    Returns:
+        List of (test, columns), columns of shape (2 or 3, n).
 
     Raises:
         InputError: a file that cannot be read, has no rows, a header without these columns or with another unit, or a
@@ -64,6 +73,7 @@ def _columns(caller: str, head: list[str]) -> list[int]:
 
 
 def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
+    """Return the name of the test in a row."""
     if len(row) != width or len(columns) not in (3, 4):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")
@@ -72,6 +82,7 @@ def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
 
 
 def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
+    """Return the numbers of a row."""
     cells = [row[k] for k in columns[1:]]
     for i, cell in enumerate(cells):
         if not is_number(cell) and not (cell == "" and i == 1 and len(cells) == 3):

@@ -1,4 +1,4 @@
-"""Measured stresses of homogeneous tests, in one row."""
+"""Measured stresses of homogeneous tests as one vector."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ class Points:
     """Measured stresses of all tests of a material without time, checked.
 
     Args:
-        data, relative, weights, within: see `fit`.
+        data: see `fit`.
+        relative: see `fit`.
+        weights: see `fit`.
+        within: see `fit`.
 
     Attributes:
         data: the tests as given.
@@ -59,11 +62,23 @@ class Points:
         self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
 
     def stress(self, response: Any, constants: Any) -> np.ndarray:
-        """Return the nominal stress at every measured point, shape (m,), not finite beyond a limit."""
+        """Return the nominal stress at every measured point; not finite beyond a limit.
+
+        Args:
+            response: derivatives of the energy.
+            constants: values of its constants.
+
+        Returns:
+            Stresses, shape (m,).
+        """
         return self._in_order(response.stress(self._stretches, list(constants)))
 
     def modulus(self) -> float:
-        """Return the median ratio of the stresses to a neo-Hookean body of unit modulus, stress."""
+        """Return the median ratio of the stresses to a neo-Hookean body of unit modulus, stress.
+
+        Returns:
+            Modulus, stress.
+        """
         l1, l2 = self._stretches
         with np.errstate(divide="ignore"):
             shape = self._in_order(np.stack([l1 - 1 / (l1**3 * l2**2), l2 - 1 / (l2**3 * l1**2)]))
@@ -76,12 +91,20 @@ class Points:
 
 
 def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of a test at stretches within a range."""
     inside = in_range(within, l).all(0) if mode == "biaxial" else in_range(within, l[0])
     return l[:, inside], P[:, inside]
 
 
 def strains(values: np.ndarray) -> str:
-    """Return the question whether stretches were meant as strains, or "" if they cannot be."""
+    """Return the question whether stretches were meant as strains, or "" if they cannot be.
+
+    Args:
+        values: stretches of a test.
+
+    Returns:
+        The text.
+    """
     if not np.all(np.isfinite(values)) or np.min(values) > 0 and np.max(values) > 1 or np.min(values) <= -1:
         return ""
     return ". Is it strain? The stretch is 1 + strain, of percent 1 + strain/100"

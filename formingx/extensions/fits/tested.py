@@ -51,6 +51,9 @@ class MeasuredRange:
             stretches: {test: stretches, shape (n,)}; of "biaxial" shape (2, n).
             undetermined, rates: see the class.
 
+        Returns:
+            The record.
+
         Raises:
             InputError: unknown test, or a stretch that is not above 0.
         """
@@ -65,7 +68,14 @@ class MeasuredRange:
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:
-        """Return the distance of strains (largest and middle), shape (m, 2), from the tested ones, shape (m,)."""
+        """Return the distance of strains from the tested ones.
+
+        Args:
+            strains: largest and middle logarithmic strain, shape (m, 2).
+
+        Returns:
+            Distances, shape (m,).
+        """
         corners = self._corners
         after = np.roll(corners, -1, axis=0)
         edges = after - corners
@@ -78,12 +88,23 @@ class MeasuredRange:
         return np.where(np.all(side >= 0, axis=1) & (len(corners) > 2), 0.0, found)
 
     def outside(self, strains: np.ndarray) -> np.ndarray:
-        """Return the mask, shape (m,), of the strains, shape (m, 2), that the tests do not cover."""
+        """Return the mask of the strains that the tests do not cover.
+
+        Args:
+            strains: largest and middle logarithmic strain, shape (m, 2).
+
+        Returns:
+            Mask, shape (m,).
+        """
         size = np.hypot(*strains.T)
         return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return (what, value) for the rows of a material's report."""
+        """Return the rows of a material's report.
+
+        Returns:
+            List of (quantity, value).
+        """
         found = [("tested at stretches", str(self))]
         if self.undetermined:
             found.append(("not determined by these tests", ", ".join(self.undetermined)))
@@ -115,6 +136,9 @@ def with_tests(material: Material, **stretches: Any) -> Material:
         material: any material.
         stretches: of each test, any shape, such as uniaxial=(1, 4), equibiaxial=(1, 2.5); of "biaxial" shape (2, n).
 
+    Returns:
+        The material.
+
     Raises:
         InputError: unknown test, or a stretch that is not above 0.
 
@@ -127,13 +151,28 @@ def with_tests(material: Material, **stretches: Any) -> Material:
 
 
 def principal(stretches: Any) -> np.ndarray:
-    """Return the largest and the middle logarithmic strain, shape (n, 2), of (l1, l2), shape (2, n)."""
+    """Return the principal logarithmic strains.
+
+    Args:
+        stretches: (l1, l2), shape (2, n).
+
+    Returns:
+        Largest and middle strain, shape (n, 2).
+    """
     e = np.log(np.asarray(stretches, float))
     return -np.sort(-np.stack([*e, -e[0] - e[1]]), axis=0)[:2].T
 
 
 def mode_of(largest: float, middle: float) -> str:
-    """Return the name of the test that is nearest to these two logarithmic strains."""
+    """Return the name of the test that is nearest to these two logarithmic strains.
+
+    Args:
+        largest: largest logarithmic strain.
+        middle: middle logarithmic strain.
+
+    Returns:
+        The name.
+    """
     share = middle / largest if largest > 0 else 0.0
     return min(MODES, key=lambda mode: abs(MODES[mode] - share)).replace("_", " ")
 
@@ -145,6 +184,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
         return np.array(ordered)
 
     def half(chain: Any) -> list[tuple[float, float]]:
+        """Return one half of the hull."""
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])

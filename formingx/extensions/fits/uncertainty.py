@@ -44,6 +44,9 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
         constants: {name: value} of the fit, with p entries.
         measured: the measured stresses, shape (n,).
         sizes: stress by which each misfit is divided, shape (n,).
+
+    Returns:
+        The uncertainty.
     """
     values = np.array(list(constants.values()), float)
     first = stress(values)

@@ -13,7 +13,16 @@ _LEAST = 0.02
 
 
 def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
-    """Return the size by which each misfit is divided, shape (n,), stress, for stresses test by test."""
+    """Return the stress by which each misfit is divided, test by test.
+
+    Args:
+        parts: measured stresses of each test.
+        relative: see `fit`.
+        weights: weight of each test.
+
+    Returns:
+        Divisors, shape (n,), stress.
+    """
     relative = instance("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
     found = []
@@ -25,7 +34,18 @@ def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.n
 
 
 def of_names(weights: Any, names: list[str]) -> list[float]:
-    """Return the weight of each test of a dictionary; a test that is not named has 1."""
+    """Return the weights of named tests; the default is 1.
+
+    Args:
+        weights: {test: weight}, or None.
+        names: names of the tests.
+
+    Returns:
+        Weight of each test.
+
+    Raises:
+        InputError: an unknown test, or a weight that is not positive.
+    """
     if weights is None:
         return [1.0] * len(names)
     if not isinstance(weights, dict):
@@ -37,7 +57,18 @@ def of_names(weights: Any, names: list[str]) -> list[float]:
 
 
 def of_numbers(weights: Any, count: int) -> list[float]:
-    """Return the weight of each of the numbered tests in time; None: 1."""
+    """Return the weights of numbered tests; the default is 1.
+
+    Args:
+        weights: list of weights, or None.
+        count: number of tests.
+
+    Returns:
+        Weight of each test.
+
+    Raises:
+        InputError: another number of weights, or a weight that is not positive.
+    """
     if weights is None:
         return [1.0] * count
     given = several("fit: weights", weights, "numbers, one for each test")
@@ -47,13 +78,25 @@ def of_numbers(weights: Any, count: int) -> list[float]:
 
 
 def _weight(name: str, value: Any) -> float:
+    """Return a weight; raise an InputError unless it is positive."""
     if not (found := non_negative(name, value)) > 0:
         raise InputError(f"{name} = {value!r}: must be above 0; leave the test out instead")
     return found
 
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the stretches, any shape, that lie within (lowest, highest); None: all."""
+    """Return the mask of the stretches within a range.
+
+    Args:
+        within: (lowest, highest), or None for all.
+        stretches: stretches, any shape.
+
+    Returns:
+        Mask, the same shape.
+
+    Raises:
+        InputError: `within` is no range.
+    """
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
     low, high = pair("fit: within", within)

@@ -112,7 +112,7 @@ class Cooling:
                              f" work: give one that relaxes, or leave it out")
         zero = ABSOLUTE_ZERO[self.unit]
         checked_materials(scene.mesh, self.materials)
-        checked_boundaries(scene.mesh, [*self.boundaries, *self._contacts_with_tools(scene)], zero)
+        checked_boundaries(scene.mesh, [*self.boundaries, *self.contacts_with_tools(scene)], zero)
 
     def without_tools(self, mesh: Any, thickness: float, boundaries: Any) -> Cooling:
         """Return the same cooling without tools, with other laws at the faces of a body.
@@ -172,7 +172,7 @@ class Cooling:
         """
         first = scene.temperature.T.x.array
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
-        return _extremes([*np.ravel(ends)], [*self.boundaries, *self._contacts_with_tools(scene)])
+        return _extremes([*np.ravel(ends)], [*self.boundaries, *self.contacts_with_tools(scene)])
 
     def conductances(self, scene: Any) -> dict[str, float]:
         """Return the largest conductance of the laws of each boundary.
@@ -184,7 +184,7 @@ class Cooling:
             {boundary: conductance, heat per time, area and degree}; infinite for a fixed temperature.
         """
         found: dict[str, float] = {}
-        for law in [*self.boundaries, *self._contacts_with_tools(scene)]:
+        for law in [*self.boundaries, *self.contacts_with_tools(scene)]:
             given = np.inf if isinstance(law, FixedTemperature) else getattr(law, "conductance", None) or getattr(
                 law, "parameters", {}).get("h", 0.0)
             value = float(np.max(given.y)) if isinstance(given, Table) else float(given)
@@ -202,8 +202,15 @@ class Cooling:
         """
         return contact.name in self.tools
 
-    def _contacts_with_tools(self, scene: Any) -> list[ContactWithTool]:
-        """Return the contacts with tools that exchange heat."""
+    def contacts_with_tools(self, scene: Any) -> list[ContactWithTool]:
+        """Return the contacts with tools that exchange heat.
+
+        Args:
+            scene: the `Scene`.
+
+        Returns:
+            A `ContactWithTool` for each contact of the scene with heat exchange.
+        """
         names = [contact.name for contact in scene.contacts]
         for name in self.tools:
             known("Cooling: tools: contact", name, names)

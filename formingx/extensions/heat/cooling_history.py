@@ -82,7 +82,7 @@ class CoolingHistory:
     def _conduction(self, degree: int = 2) -> Conduction:
         """Return the heat equation of the body for a degree of the temperature."""
         scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
-        laws = [*self._cooling.boundaries, *self._cooling._touches(scene)]
+        laws = [*self._cooling.boundaries, *self._cooling.contacts_with_tools(scene)]
         return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
@@ -309,7 +309,7 @@ def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.nda
 
 def _such_as(scene: Any, times: float, duration: float) -> str:
     """Return the advice on elements that reduce an error by a factor (of third order)."""
-    laws = {law.on for law in [*scene.heat.boundaries, *scene.heat._touches(scene)]}
+    laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
     if not faces or len(scene.mesh.layers) > 1:
         return ""

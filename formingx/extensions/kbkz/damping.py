@@ -13,7 +13,7 @@ _NEAR = 1e-4
 
 
 class Damping:
-    """h(I1, I2) of the Finger tensor since a past state: 1 where I1 = I2 = 3.
+    """Damping function h(I1, I2) of the Finger tensor since a past state, with h = 1 where I1 = I2 = 3.
 
     With a term in I2 the stress h B has no potential: only functions of I1 alone have one.
     """
@@ -23,7 +23,15 @@ class Damping:
         return self.derivatives(I1, I2)[0]
 
     def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-        """Return (h, dh/dI1, dh/dI2) at invariants of any shape."""
+        """Return h and its derivatives.
+
+        Args:
+            I1: first invariant, any shape.
+            I2: second invariant, the same shape.
+
+        Returns:
+            h, dh/dI1 and dh/dI2, the same shape each.
+        """
         raise NotImplementedError
 
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
@@ -85,7 +93,16 @@ class Wagner(Damping):
 
 
 def LuoTanner(n: float, beta: float) -> Wagner:  # noqa: N802  a card's name for a law
-    """`Wagner` in the letters of Luo and Tanner: h = exp(-n sqrt(beta I1 + (1 - beta) I2 - 3)); n above 0.
+    r"""Return Wagner's damping in the notation of Luo and Tanner.
+
+    .. math:: h = \exp\left(-n \sqrt{\beta I_1 + (1 - \beta) I_2 - 3}\right)
+
+    Args:
+        n: exponent n, positive; damping increases with it.
+        beta: share of I1, from 0 to 1.
+
+    Returns:
+        The damping.
 
     >>> fx.LuoTanner(n=0.2, beta=0.1)
     Wagner(alpha=0.1, beta=0.2)
@@ -160,6 +177,7 @@ def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: An
 
 
 def _share(name: str, value: Any) -> float:
+    """Return a share; raise an InputError unless it lies between 0 and 1."""
     if not 0 <= (number := finite(name, value)) <= 1:
         raise InputError(f"{name} = {value!r}: must be from 0 to 1")
     return number

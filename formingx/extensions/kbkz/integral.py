@@ -1,8 +1,10 @@
-"""Stress of a fading memory of all past states at points: `KBKZ` in a scene.
+r"""Stress of a fading memory of all past states at points: `KBKZ` in a scene.
 
 With Cbar = J^(-2/3) C and the past states C_k at reduced ages, the second Piola-Kirchhoff stress is, up to a pressure,
 
-    S = sum_k W_k h(I1, I2) C_k^-1,   I1 = Cbar : C_k^-1,   I2 = Cbar^-1 : C_k,   W_k = sum_j G_j w_kj,
+.. math::
+    S = \sum_k W_k \, h(I_1, I_2) \, C_k^{-1}, \qquad I_1 = \bar C : C_k^{-1}, \quad I_2 = \bar C^{-1} : C_k, \quad
+    W_k = \sum_j G_j w_{kj}
 
 with the weights w_kj of mode j. They are exact if h C_k^-1 is linear in the age between states. The first state,
 undeformed, represents all earlier time; the last one contributes only a pressure. In a form S is linear in Cbar and in
@@ -22,11 +24,11 @@ _COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
 
 
 class Integral:
-    """Past states' weights and stress.
+    """Weights and stress of past states.
 
     Args:
-        spectrum: [(G, tau), ...], stress and time.
-        damping: a `Damping` or None.
+        spectrum: list of (G, tau), stress and time.
+        damping: a `Damping`, or None.
         irreversible: see `KBKZ`.
         shifted: True if the reduced time of the material depends on the temperature.
     """
@@ -44,12 +46,23 @@ class Integral:
         """Return the history of a material with this stress.
 
         Args:
-            forms: the `Formulation`. terms: the `MaterialTerms` of the material.
+            forms: the `Formulation`.
+            terms: the `MaterialTerms` of the material.
+
+        Returns:
+            The history.
         """
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights w of states, shape (K, modes[, n]), at falling ages, the last 0, shape (K,) or (K, n)."""
+        """Return the weights of K states in each mode.
+
+        Args:
+            ages: reduced ages, descending, the last 0, shape (K,) or (K, n), time.
+
+        Returns:
+            Weights w, shape (K, modes) or (K, modes, n).
+        """
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
         mean = _mean_decay(step)
@@ -67,7 +80,7 @@ class Integral:
 
     def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
               near: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return (W, dW/dstep) of the states after a step in reduced time, shape (K, n or 1).
+        """Return the weights of the states after a step in reduced time.
 
         The step is exact if h C_k^-1 is a parabola through the last states. So it is of second order even for steps far
         longer than tau (`TransientNetwork`).
@@ -77,6 +90,9 @@ class Integral:
             step: step in reduced time.
             before: reduced time between the last two states; 0: not known.
             near: 1, or 0 where these two are far apart, shape (n,).
+
+        Returns:
+            W and dW/dstep, shape (K, n or 1) each.
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
@@ -99,7 +115,16 @@ class Integral:
         return W, slope
 
     def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
-        """Return (C_k^-1, h, dh/dI1, dh/dI2) of past states, shape (K, 4, n), at C; h has shape (K, n)."""
+        """Return inverse tensors and damping of past states.
+
+        Args:
+            C: entries of Cbar, shape (4, n).
+            past: entries of the past states, shape (K, 4, n).
+            least: smallest h of each state so far, shape (K, n), or None.
+
+        Returns:
+            C_k^-1, shape (K, 4, n); h, dh/dI1 and dh/dI2, shape (K, n) each.
+        """
         inverse = _inverse(past)
         if self.damping is None:
             ones = np.ones((len(past), C.shape[1]))
@@ -114,7 +139,18 @@ class Integral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                least: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return (S, dS/dC, dS/dstep), shapes (4, n), (4, 4, n), (4, n), at C, of past states with weights W."""
+        """Return the stress of past states and its derivatives.
+
+        Args:
+            C: entries of Cbar, shape (4, n).
+            past: entries of the past states, shape (K, 4, n).
+            W: weights of the states, shape (K, n).
+            slope: dW/dstep, shape (K, n).
+            least: smallest h of each state so far, shape (K, n), or None.
+
+        Returns:
+            S, dS/dC and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
+        """
         inverse, h, h1, h2 = self.damped(C, past, least)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
@@ -126,15 +162,31 @@ class Integral:
         return S, np.einsum("kin,kjn->ijn", inverse, by), T
 
     def potential(self, C: Any, held: dict[str, Any], time_step: Any) -> Any:
-        """Return a UFL scalar whose derivative by F is the stress, but for the unsymmetric part of dS/dC; `held`: see
-        `coefficients`; C: entries of Cbar."""
+        """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dC.
+
+        Args:
+            C: entries of Cbar (UFL).
+            held: {name: coefficient}, see `coefficients`.
+            time_step: length of the step (UFL scalar, time).
+
+        Returns:
+            The potential (UFL, stress).
+        """
         S, D, T, change = held["past_S"], held["past_D"], held["past_T"], _change(C, held)
         linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
     def unsymmetric_work(self, C: Any, dC: Any, held: dict[str, Any]) -> Any:
-        """Return the virtual work of the unsymmetric part of dS/dC, which `potential` lacks, for the entries dC of a
-        virtual change of Cbar (UFL); 0 where refreshed."""
+        """Return the virtual work of the unsymmetric part of dS/dC, which `potential` lacks.
+
+        Args:
+            C: entries of Cbar (UFL).
+            dC: their virtual changes (UFL).
+            held: {name: coefficient}, see `coefficients`.
+
+        Returns:
+            Virtual work (UFL, stress); 0 where the coefficients are exact.
+        """
         D, change = held["past_D"], _change(C, held)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
@@ -145,6 +197,7 @@ def _inverse(C: np.ndarray) -> np.ndarray:
 
 
 def _change(C: Any, held: dict[str, Any]) -> list[Any]:
+    """Return the change of Cbar since the coefficients were refreshed."""
     return [C[i] - held["past_C"][i] for i in range(4)]
 
 
@@ -162,9 +215,9 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 
 
 def _parabola(s: Any) -> tuple[Any, Any, Any]:
-    """(f, f (1 + s), f s), f = s/(1 + s), of a step over the one before: its bulge times (-C^-1, C_n^-1, -C_n-1^-1).
+    """Return the factors of (-C^-1, C_n^-1, -C_n-1^-1) for a ratio s of the step to the previous one.
 
-    0 from s = 4 on, and less from 2 on: steps that grow by more leave BDF2 unstable.
+    They are f, f (1 + s) and f s with f = s/(1 + s), reduced from s = 2 on and 0 from s = 4 on, where BDF2 is unstable.
     """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s

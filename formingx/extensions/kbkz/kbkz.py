@@ -77,31 +77,76 @@ class KBKZ(Relaxing):
 
     @classmethod
     def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **more: Any) -> KBKZ:
-        """Return the same from a card of viscosities and times, [(eta, lambda), ...]: G = eta/lambda."""
+        r"""Return a material from viscosities and relaxation times.
+
+        .. math:: G_k = \eta_k / \tau_k
+
+        Args:
+            spectrum: list of (viscosity, relaxation time), stress times time and time.
+            args: further arguments of the class.
+            more: further arguments of the class.
+
+        Returns:
+            The material.
+        """
         return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
                    *args, **more)
 
     @property
     def symmetric(self) -> bool:  # type: ignore[override]  # read only here
-        """See `Material`."""
+        """True if the damping depends on I1 alone, so that the tangent is symmetric."""
         return self.damping is None or self.damping.of_I1_alone
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
+        """Return the shear modulus, equal at all points of a sample.
+
+        Args:
+            sample: the sample.
+
+        Returns:
+            Moduli, shape (n,), stress.
+        """
         rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
 
     def strain_energy(self, F, **constants):
-        """Return the instantaneous energy of the undamped network: for moduli and stresses in the reference
-        configuration."""
+        """Return the instantaneous energy of the undamped network, for moduli and stresses at F = I.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            constants: values of the constants by name.
+
+        Returns:
+            Energy (UFL, stress).
+        """
         G = sum(G for G, _ in self.spectrum)
         return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """Return a UFL scalar whose derivative by F is the stress at the end of a step; no energy."""
+        """Return a potential whose derivative by F is the stress at the end of a step; it is no energy.
+
+        Args:
+            F: deformation gradient at the end (UFL, shape (3, 3)).
+            internal: coefficients of the integral.
+            time_step: length of the step (UFL scalar, time).
+            constants: values of the constants by name.
+
+        Returns:
+            Potential (UFL, stress).
+        """
         return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
-        """Return `step_energy` where no time passes: its derivative is the stress; its value has no meaning."""
+        """Return `step_energy` for no step: its derivative is the stress; its value has no meaning.
+
+        Args:
+            F: deformation gradient (UFL, shape (3, 3)).
+            internal: coefficients of the integral.
+            constants: values of the constants by name.
+
+        Returns:
+            Potential (UFL, stress).
+        """
         return self.step_energy(F, internal, 0.0, **constants)
 
     def _modulus(self, times):
@@ -109,16 +154,20 @@ class KBKZ(Relaxing):
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
-        """Return the nominal stress of a test, force over reference area (`true`: over the present area).
+        """Return the nominal stress of a test, force over reference area.
 
         Its relative error is below 1e-8.
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial", see `Material.stress`, too.
-            stretches: of any shape without times, (n,) with them.
-            times: when the stretches are met, shape (n,), not falling; a step from one stretch to another at the same
-                time is put on at once, and so is the first stretch. None: every stretch is put on at once.
-            between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial" too, see `Material.stress`.
+            stretches: stretches, any shape without times, shape (n,) with times.
+            times: times of the stretches, shape (n,), not descending. The first stretch is applied suddenly; two
+                stretches at the same time are a jump. None: every stretch is applied suddenly.
+            between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
+            true: True for the true stress, force over current area.
+
+        Returns:
+            Stress of the shape of `stretches`.
 
         Raises:
             InputError: unknown mode, a stretch that is not above 0, times that fall or are not one for each stretch.
@@ -142,8 +191,11 @@ class KBKZ(Relaxing):
         The equilibrium beside it, if any, is left out.
 
         Args:
-            rate: shear rate, 1/time, above 0.
-            times: since the beginning, shape (n,), above 0.
+            rate: shear rate, 1/time, positive.
+            times: times since the start of the shear, shape (n,), positive.
+
+        Returns:
+            Shear stress, shape (n,), stress.
 
         >>> melt = fx.KBKZ([(1000.0, 1.0)])                                    # viscosity 1000 Pa s
         >>> round(float(melt.shear(0.1, [50.0])[0]), 6)
@@ -153,6 +205,7 @@ class KBKZ(Relaxing):
         modulus, tau = np.array(self.spectrum).T
 
         def strained(strain: np.ndarray) -> np.ndarray:
+            """Return h times the shear strain."""
             return strain * (1.0 if self.damping is None else self.damping(3 + strain**2, 3 + strain**2))
         found = []
         for now in np.atleast_1d(t):
@@ -173,11 +226,16 @@ class KBKZ(Relaxing):
         return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the stretch at which h (B_11 - B_33) of a step of strain is largest; infinity without a maximum up
-        to 100.
+        """Return the sudden stretch with the largest stress h (B_11 - B_33).
 
-        A sudden stretch beyond it carries no more stress: a damped melt that is stretched faster than it relaxes thins
-        there without end.
+        A larger sudden stretch carries no more stress: a damped melt that is stretched faster than it relaxes thins
+        without end.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+
+        Returns:
+            The stretch; infinity without a maximum up to 100.
         """
         known(f"{self}: rupture_stretch: mode", mode, MODES)
         l = np.geomspace(1, 100, 4000)

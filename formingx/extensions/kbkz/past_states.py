@@ -19,8 +19,10 @@ from ...materials.tensors import IDENTITY, cofactor, deviator_squared, entries, 
 from ...ranks import gathered
 
 _NOTHING = 3e-7
-"""Error of the present stress, relative, up to which interpolation between its neighbours replaces a past state. (In a
-fine run of a thousand states the errors add up to 3e-4 of the stress; with 3e-6 to 4e-3.)"""
+"""Relative error of the present stress up to which interpolation between its neighbours replaces a past state.
+
+In a fine run of a thousand states the errors add up to 3e-4 of the stress (with 3e-6 to 4e-3).
+"""
 
 
 class Past(NamedTuple):
@@ -76,21 +78,29 @@ class PastStates:
         self.start()
 
     def start(self) -> None:
-        """See `History`."""
+        """Store the undeformed state as the only past state."""
         rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
         self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """See `ConstitutiveHistory`."""
+        """Reset the motion of the last step, so it predicts nothing of the next one."""
         self._before = 0.0
         self._seen = None
 
     def get(self) -> Memory:
-        """See `History`."""
+        """Return the past states.
+
+        Returns:
+            The history variables.
+        """
         return self._memory
 
     def put(self, memory: Memory) -> None:
-        """See `History`."""
+        """Set the past states.
+
+        Args:
+            memory: the history variables.
+        """
         self._memory, self._terms.start.value = memory, memory.time
         felt = np.array([state.felt for state in memory.states])
         self._past = np.array([state.C for state in memory.states])
@@ -116,7 +126,13 @@ class PastStates:
         self._seen = C, step
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`."""
+        """Add the state of the forms to the past states, and drop the states that are no longer needed.
+
+        Args:
+            x: unknowns of the state, locally owned entries.
+            control: control of the state.
+            start: state at the beginning of the step, or None.
+        """
         (C, step, _), memory = self._now(), self._memory
         states, least = [*memory.states, Past(memory.states[-1].felt + step, C)], memory.least
         if least is not None:
@@ -131,7 +147,18 @@ class PastStates:
 
     def carry(self, source: PastStates, memory: Memory, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
-        """See `History`."""
+        """Interpolate the past states on another mesh; collective.
+
+        Args:
+            source: history on the other mesh.
+            memory: its history variables.
+            x: unknowns of this problem, locally owned entries.
+            control: control of the state.
+            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
+
+        Returns:
+            The history variables on this mesh.
+        """
         carrier = Carrier(self._forms.comm, mapping(source.points), self.points)
         F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 
@@ -188,11 +215,15 @@ class PastStates:
 
     @property
     def material(self) -> Any:
-        """The material."""
+        """The `Material`."""
         return self._terms.material
 
     def thinnest(self) -> tuple[float, np.ndarray]:
-        """Return the smallest stretch at the present fields and its reference position, length; collective."""
+        """Return the smallest stretch of the current fields; collective.
+
+        Returns:
+            The stretch and its reference position, length.
+        """
         C = self._now()[0]
         half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
         least = np.minimum(half - apart, C[3])
@@ -202,7 +233,14 @@ class PastStates:
         return float(np.sqrt(square)), np.array(point)
 
     def save(self, memory: Memory) -> dict[str, Any]:
-        """See `History`."""
+        """Return past states as plain data, the same on all ranks; collective.
+
+        Args:
+            memory: the history variables.
+
+        Returns:
+            The data.
+        """
         numbers = gathered(self._forms.comm, self._numbers)
         order = np.argsort(numbers)
 
@@ -214,7 +252,17 @@ class PastStates:
                 **({} if memory.least is None else {"least": of_all(memory.least)})}
 
     def load(self, data: dict[str, Any]) -> Memory:
-        """See `History`."""
+        """Return the past states of this rank from the result of `save`.
+
+        Args:
+            data: result of `save`.
+
+        Returns:
+            The history variables.
+
+        Raises:
+            InputError: the data belong to another mesh or another material.
+        """
         numbers = np.array(data.get("cells", []), dtype=np.int64)
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = [(np.array(s["felt"], float), np.array(s["C"], float)) for s in data.get("states", [])]

@@ -9,7 +9,11 @@ _LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), 
 
 @register_published
 def melts() -> dict[str, Published]:
-    """Return {name: constants that can be cited} of melts, in Pa and s."""
+    """Return published constants of melts, in Pa and s.
+
+    Returns:
+        {name: `Published`}.
+    """
     return {"LDPE melt 150 C": Published(
         KBKZ(_LDPE, PSM(alpha=14.38, beta=0.018)), "Pa", "low-density polyethylene, melt I", 150.0,
         "relaxation times from 1e-4 to 1000 s",

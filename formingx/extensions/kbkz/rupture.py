@@ -1,4 +1,4 @@
-"""Check of damped melts: the draw of a part against the stretch beyond which the melt bears no more."""
+"""Check of damped melts: draw of a part against the stretch with the largest stress."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,7 +14,14 @@ from .past_states import PastStates
 
 @register("scene")
 def ruptures(body: Any) -> Iterator[Finding]:
-    """Draws beyond the equibiaxial `rupture_stretch` of a material."""
+    """Find draws beyond the equibiaxial `rupture_stretch` of a material.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        A finding for each such material.
+    """
     for name, material in body.scene.materials.items():
         most = material.base.rupture_stretch("equibiaxial")
         for about, stretch in expected_stretches(body) if np.isfinite(most) else ():
@@ -29,7 +36,14 @@ def ruptures(body: Any) -> Iterator[Finding]:
 
 @register("failure")
 def thins(failure: Any) -> Iterator[Finding]:
-    """A damped melt that thins without end in the last good state; collective."""
+    """Find a damped melt that thins without end in the last good state; collective.
+
+    Args:
+        failure: the failed run.
+
+    Yields:
+        A finding for each such material.
+    """
     if failure.last is None:
         return
     problem, drawn = failure.problem, None

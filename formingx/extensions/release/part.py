@@ -18,6 +18,9 @@ def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
         line: points of the line, shape (n, 2), length.
         pieces: number of its n - 1 segments that are kept.
 
+    Returns:
+        The mesh.
+
     Raises:
         InputError: nothing is left of a layer.
     """

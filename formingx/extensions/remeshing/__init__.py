@@ -11,6 +11,7 @@ from .remeshing import Remesh
 
 
 def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
+    """Return the problem of a checkpoint on a mesh that was made during the run."""
     return files.load((problem, last), data, Preformed)
 
 

@@ -42,6 +42,9 @@ class ContactState(NamedTuple):
             face: the face on the old mesh.
             fields: locally owned unknowns.
             control: value of the control.
+
+        Returns:
+            The contact state.
         """
         found, rule, x = face.tractions(fields, control), face.rule, face.positions(fields, control)
         assert isinstance(rule, Lobatto)
@@ -57,9 +60,16 @@ class ContactState(NamedTuple):
         return cls(x, d, touches, traction, pairs, slip)
 
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return the motion out of the tool of points x, shape (n, 2), at distances d, shape (n,), length.
+        """Return the motion out of the tool that gives points the depth of their neighbours in contact.
 
         A point is moved until it is as deep as its neighbours in contact.
+
+        Args:
+            x: positions in the frame of the tool, shape (n, 2), length.
+            d: their distances from the tool, shape (n,), length.
+
+        Returns:
+            Motion, shape (n,), length.
         """
         pair, share = self._near(x)
         both = self.touches[pair]
@@ -68,7 +78,14 @@ class ContactState(NamedTuple):
         return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
 
     def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return (pressure, friction, mask of points between two contacts) at points x, shape (n,) each."""
+        """Interpolate pressure and friction at points.
+
+        Args:
+            x: positions in the frame of the tool, shape (n, 2), length.
+
+        Returns:
+            Pressure and friction, stress, and mask of the points between two contacts, shape (n,) each.
+        """
         pair, share = self._near(x)
         found = _between(self.traction[pair], share[:, None])
         return found[:, 0], found[:, 1], self.touches[pair].all(1)

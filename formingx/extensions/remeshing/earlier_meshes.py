@@ -20,6 +20,10 @@ _NEAR = 0.02
 class FollowedProbe(Probe):
     """Probe of the displacement at points of the first mesh, tracked from mesh to mesh.
 
+    Args:
+        problem: the `Problem` on the present mesh.
+        points: positions (R, Z) on the first mesh, shape (n, 2), length.
+
     Attributes:
         points: (R, Z) on the first mesh, shape (n, 2), length.
         so_far: their displacement when the last mesh was made, shape (n, 2), length.
@@ -31,11 +35,20 @@ class FollowedProbe(Probe):
         self.points, self.so_far = first, self.points - first
 
     def _read(self) -> np.ndarray:
+        """Return the displacement at the points for the current fields, shape (n, 2), length."""
         return super()._read() + self.so_far
 
 
 def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
-    """Return the first-mesh positions of points of a new mesh, shape (n, 2), fitted to the nodes of the old mesh."""
+    """Return the first-mesh positions of points of a new mesh, fitted to the nodes of the old mesh.
+
+    Args:
+        preformed: the transferred deformation.
+        points: positions on the new mesh, shape (n, 2), length.
+
+    Returns:
+        Positions on the first mesh, shape (n, 2), length.
+    """
     old, state = preformed.before
     nodes = of_mesh(old.forms.domain)
     first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
@@ -44,7 +57,15 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on(mesh: Any, preformed: Any) -> Any:
-    """Return the scene of the old mesh on a new mesh of the deformed body, with its last temperature."""
+    """Return the scene of the old mesh on a new mesh of the deformed body, with its last temperature.
+
+    Args:
+        mesh: the new mesh.
+        preformed: the transferred deformation.
+
+    Returns:
+        The scene.
+    """
     old, state = preformed.before
     if old.temperature is None:
         return old.scene.with_mesh(mesh, preformed)
@@ -57,7 +78,15 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Return the positions in the mesh of a problem of points of the first mesh, shape (n, 2)."""
+    """Return the positions in the mesh of a problem of points of the first mesh.
+
+    Args:
+        problem: the `Problem`.
+        points: positions on the first mesh, shape (n, 2), length.
+
+    Returns:
+        Positions, shape (n, 2), length.
+    """
     if problem.scene.preformed is None:
         return points
     old, state = problem.scene.preformed.before
@@ -74,6 +103,7 @@ class _Onto:
 
     @cached_property
     def _tree(self) -> Any:
+        """Search tree of the outline points."""
         from scipy.spatial import cKDTree
         return cKDTree(along(self._edges, FINE_PIECES).reshape(-1, self._edges.shape[-1]))
 
@@ -93,4 +123,5 @@ class _Onto:
 
 
 def _on(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return points of a parabolic edge at parameters s, shape (n, 2)."""
     return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

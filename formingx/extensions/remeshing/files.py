@@ -16,7 +16,14 @@ from .earlier_meshes import scene_on
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """Return the data from which `load` makes the problem again, on one rank, in the original order of the mesh."""
+    """Return the data of a problem on a mesh of the run, for `load`; on one rank, in the original order of the mesh.
+
+    Args:
+        problem: the `Problem`.
+
+    Returns:
+        The data.
+    """
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
     number = mesh.domain.topology.original_cell_index
@@ -37,6 +44,9 @@ def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callabl
         before: the problem and the last state on the old mesh.
         data: the result of `save`.
         preformed: function that makes the earlier deformation from its fields (`Preformed`).
+
+    Returns:
+        The problem.
 
     Raises:
         InputError: data that `save` did not write.

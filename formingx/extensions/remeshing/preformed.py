@@ -66,7 +66,15 @@ class Preformed(NamedTuple):
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
-        """Return the transfer data of the body of a state."""
+        """Return the transfer data of the body of a state.
+
+        Args:
+            problem: the `Problem`.
+            state: the state.
+
+        Returns:
+            The data.
+        """
         forms = problem.forms
         with problem.state_context(state):
             both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _PLACES)
@@ -82,23 +90,60 @@ class Preformed(NamedTuple):
         return cls(x, rest, b, pressures, held, (problem, state))
 
     def followed(self, problem: Any, points: np.ndarray) -> np.ndarray:
-        """Return the positions on the new mesh of points of the first mesh, shape (n, 2), length."""
+        """Return points of the first mesh as points of the new mesh.
+
+        Args:
+            problem: the `Problem` on the new mesh.
+            points: positions on the first mesh, shape (n, 2), length.
+
+        Returns:
+            Positions on the new mesh, shape (n, 2), length.
+        """
         return followed(problem, points)
 
     def probe(self, problem: Any, points: np.ndarray) -> FollowedProbe:
-        """Return a probe of the displacement at points of the first mesh, shape (n, 2), length."""
+        """Return a probe of the displacement at points of the first mesh.
+
+        Args:
+            problem: the `Problem` on the new mesh.
+            points: positions on the first mesh, shape (n, 2), length.
+
+        Returns:
+            The probe.
+        """
         return FollowedProbe(problem, points)
 
     def save(self, problem: Any) -> dict[str, Any]:
-        """Return the data of a checkpoint from which the problem on this mesh is made again."""
+        """Return the data of a checkpoint from which the problem on this mesh is made again.
+
+        Args:
+            problem: the `Problem` on the new mesh.
+
+        Returns:
+            The data.
+        """
         return save(problem)
 
     def first_places(self, points: np.ndarray) -> np.ndarray:
-        """Return the positions on the first mesh of points of the new mesh, shape (n, 2)."""
+        """Return points of the new mesh as points of the first mesh.
+
+        Args:
+            points: positions on the new mesh, shape (n, 2), length.
+
+        Returns:
+            Positions on the first mesh, shape (n, 2), length.
+        """
         return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
-        """Return F_old on the elements of a formulation (UFL, shape (3, 3)), and det F_old."""
+        """Return the transferred deformation gradient on the elements of a formulation.
+
+        Args:
+            forms: the `Formulation`.
+
+        Returns:
+            F_old (UFL, shape (3, 3)) and det F_old (UFL scalar).
+        """
         space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
         field, values = fem.Function(space), self._carried(forms)[0]
         field.x.array.reshape(-1, 6)[space.dofmap.list[: len(values)]] = values
@@ -109,7 +154,14 @@ class Preformed(NamedTuple):
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
-        """Return the unknowns of the present body, locally owned entries: no displacement, its pressures."""
+        """Return the unknowns of the present body: no displacement, its pressures.
+
+        Args:
+            problem: the `Problem` on the new mesh.
+
+        Returns:
+            Locally owned entries.
+        """
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
         for k in range(fitted.shape[2]):
@@ -131,6 +183,7 @@ class Preformed(NamedTuple):
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+            """Return the coefficients of the least-squares fit in each cell."""
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]

@@ -35,6 +35,9 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
         outside: function of points, shape (n, 2), and names of their boundaries; it returns the points moved out of the
             tools, length.
 
+    Returns:
+        The mesh.
+
     Raises:
         InputError: gmsh made no mesh.
     """
@@ -73,6 +76,7 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     extra: list[np.ndarray] = []
 
     def between_nodes(i: int, j: int) -> int:
+        """Return the number of the node between two nodes, created at the first call."""
         key = (min(i, j), max(i, j))
         if key not in known:
             known[key] = len(points) + len(extra)
@@ -94,7 +98,15 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
 
 
 def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume of revolution (or the area) inside a closed outline of parabolas, counter-clockwise; exact."""
+    """Return the volume of revolution, or the area, inside a closed outline of parabolas; exact.
+
+    Args:
+        edges: edges of the outline in counter-clockwise order, shape (m, 3, 2), length.
+        axisymmetric: True for the volume of revolution.
+
+    Returns:
+        Volume, length^3, or area, length^2.
+    """
     at, weights = np.polynomial.legendre.leggauss(4)
     s = (1 + at) / 2
     shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
@@ -108,6 +120,7 @@ def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 
     def place(t: np.ndarray) -> np.ndarray:
+        """Return points of the line at parameters t, shape (n, 2)."""
         k = np.minimum(t.astype(int), len(edges) - 1)
         s = t - k
         shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])

@@ -96,7 +96,13 @@ class Remesh(RunExtension):
                              f" above 1")
 
     def check(self, caller: str, scene: Any, targets: Sequence[Target]) -> None:
-        """Raise an InputError if the scene or a target cannot be transferred to another mesh."""
+        """Raise an InputError if the scene or a target cannot be transferred to another mesh.
+
+        Args:
+            caller: name of the caller, for messages.
+            scene: the `Scene`.
+            targets: targets of the run.
+        """
         _check(caller, scene, targets)
 
     def attach(self, path: Any) -> None:
@@ -105,6 +111,7 @@ class Remesh(RunExtension):
 
 
 def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
+    """Raise an InputError if the scene or a target cannot be transferred to another mesh."""
     why = ""
     if scene.mesh.comm.size > 1:
         why = "several ranks (gmsh makes a mesh on one): run without mpirun"
@@ -228,6 +235,7 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, S
 
 
 def _ratios(record: Record, state: State) -> tuple[float, float]:
+    """Return the extreme volume ratios in a state."""
     with record.problem.state_context(state) as problem:
         return problem.admissible.volume_ratios()
 

@@ -13,7 +13,7 @@ from .instability import CriticalPoint
 
 
 def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
-    """Return a stress-free mesh with an imperfection: its nodes are moved along a mode. Collective.
+    """Return a stress-free mesh whose nodes are moved along a mode; collective.
 
     Args:
         mesh: the perfect mesh.
@@ -32,11 +32,11 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
     >>> bent = fx.with_imperfection(column, loss, 0.01)
     """
-    instance("imperfect: mesh", mesh, Mesh, "a mesh")
-    mode, amplitude = instance("imperfect: mode", mode, CriticalPoint, "a loss that Path.stability found"), finite(
-        "imperfect: amplitude", amplitude)
+    instance("with_imperfection: mesh", mesh, Mesh, "a mesh")
+    mode = instance("with_imperfection: mode", mode, CriticalPoint, "a CriticalPoint that Path.stability found")
+    amplitude = finite("with_imperfection: amplitude", amplitude)
     if mode.number or mode.flipped:
-        raise InputError(f"imperfect: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
+        raise InputError(f"with_imperfection: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
                          " plane: no mesh of the section can have it; give a mode of n = 0")
     grid = gathered(mesh)
     of_mode, of_mesh = (np.round(points / (1e-7 * np.ptp(grid.points))).astype(np.int64) for points in (
@@ -45,6 +45,7 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     found = [numbers.get(tuple(key), -1) for key in of_mesh.tolist()]
     if min(found) < 0:
         R, Z = grid.points[int(np.argmin(found))]
-        raise InputError(f"imperfect: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of another mesh")
+        raise InputError(f"with_imperfection: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of"
+                         " another mesh")
     moved = grid.points + amplitude * mode.amplitudes[found][:, : grid.points.shape[1]]
-    return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "imperfect: the moved mesh")
+    return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "with_imperfection: the moved mesh")

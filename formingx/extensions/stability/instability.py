@@ -112,6 +112,9 @@ class CriticalPoint:
             file: path of the PNG file.
             scale: largest amplitude of the mode over the size of the body.
 
+        Returns:
+            The picture.
+
         Raises:
             InputError: neither a screen nor Xvfb is available, or the mesh is no sheet.
         """
@@ -149,7 +152,14 @@ class Stability:
         return next(iter(self.bifurcations), None)
 
     def first_of(self, number: float) -> CriticalPoint | None:
-        """Return the first bifurcation with a wave number, or None."""
+        """Return the first bifurcation with a wave number, or None.
+
+        Args:
+            number: wave number.
+
+        Returns:
+            The critical point, or None.
+        """
         return next((loss for loss in self.bifurcations if loss.number == number), None)
 
     def __str__(self) -> str:
@@ -168,6 +178,7 @@ class Stability:
 
 
 def _shown(loss: CriticalPoint) -> str:
+    """Return a critical point as a line of text."""
     states = loss.path.states
     what = "limit point" if loss.limit_point else "lost" if loss.gained else "regained"
     R, Z = loss.at
@@ -178,20 +189,39 @@ def _shown(loss: CriticalPoint) -> str:
 
 
 class Watch:
-    """Stability examination of the states of one path; created once."""
+    """Stability examination of the states of one path; created once.
+
+    Args:
+        path: the `Path`.
+    """
 
     def __init__(self, path: Any):
         self._path, self._modes = path, {}                              # type: ignore[var-annotated]
 
     def of(self, segment: Any) -> Modes:
-        """Return the modes of a segment's problem."""
+        """Return the modes of a segment's problem.
+
+        Args:
+            segment: part of the path on one mesh.
+
+        Returns:
+            The modes.
+        """
         key = id(segment.problem)
         if key not in self._modes:
             self._modes[key] = Modes(segment.curve)
         return self._modes[key]
 
     def look(self, modes: Iterable[float], states: Any) -> Stability:
-        """Examine states of the path, see `Path.stability`."""
+        """Examine states of the path; see `Path.stability`.
+
+        Args:
+            modes: wave numbers.
+            states: see `Path.stability`.
+
+        Returns:
+            The stability of the states.
+        """
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
@@ -199,6 +229,7 @@ class Watch:
         known: dict[tuple[int, Kind], int] = {}
 
         def count_at(state: State, kind: Kind) -> int:
+            """Return the number of unstable modes in a state, computed once."""
             key = id(state), kind
             if key not in known:
                 known[key] = self.of(self._path.segment(state)).count(state, kind)
@@ -245,6 +276,7 @@ class Watch:
         return bool(alike > 0.5)
 
     def _loss(self, segment: Any, found: Located, fold: bool) -> CriticalPoint:
+        """Return a located critical point with its mode on the nodes of all ranks."""
         comm, nodes = segment.problem.comm, self.of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)
@@ -326,6 +358,13 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
     """Return the wave numbers of `Path.stability` as a list without duplicates.
 
+    Args:
+        scene: the `Scene`.
+        modes: the user's argument.
+
+    Returns:
+        Wave numbers.
+
     Raises:
         InputError: wave numbers that are not allowed.
     """
@@ -347,7 +386,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 
 
 def _chosen(path: Any, states: Any) -> list[State]:
-    """Return the states to examine: evenly spaced ones with both ends of the path, or the given ones."""
+    """Return the states to examine: evenly spaced ones with both ends of the path, or the given states."""
     regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")

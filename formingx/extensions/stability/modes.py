@@ -29,6 +29,7 @@ class Lanczos:
         accurate: relative error of an eigenvalue at which the iteration ends.
         exhausted: norm of the remainder of a new vector, over the largest eigenvalue of the inverse, that is round-off.
             Then all modes are found.
+        steps: maximum number of steps, each a solve with the stored LU factors.
     """
 
     steps: int = 80
@@ -133,11 +134,20 @@ class Modes:
         self._in, self._out = self.variation.matrix.createVecs()
 
     def count(self, state: State, kind: Kind) -> int:
-        """Return the number of unstable modes with a wave number and symmetry."""
+        """Return the number of unstable modes with a wave number and symmetry.
+
+        Args:
+            state: the state.
+            kind: wave number and symmetry.
+
+        Returns:
+            Number of unstable modes.
+        """
         with self.problem.state_context(state):
             return self._count(kind)
 
     def _count(self, kind: Kind) -> int:
+        """Return the number of unstable modes at the state last set."""
         self.variation.fill(*kind)
         if not self._solver.factorise():
             raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
@@ -146,8 +156,17 @@ class Modes:
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
         """Locate the zero of the eigenvalue number `index` (in ascending order) between two states.
 
-        Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode.
-        The mode is tracked by its shape, because eigenvalues of other modes cross it.
+        Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode. The
+        mode is tracked by its shape, because eigenvalues of other modes cross it.
+
+        Args:
+            a: state before the zero.
+            b: state behind it.
+            kind: wave number and symmetry.
+            index: number of the eigenvalue.
+
+        Returns:
+            The critical point.
         """
         looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
         (low, high), how = looks, self._how
@@ -183,6 +202,7 @@ class Modes:
         return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
     def _look(self, fraction: float, state: State, kind: Kind, index: int) -> _Look:
+        """Return the number of unstable modes and the modes nearest to zero in a state."""
         with self.problem.state_context(state):
             count = self._count(kind)
             return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
@@ -261,9 +281,11 @@ class Modes:
         return self._out.array_r.copy()
 
     def _inner(self, x: Array, y: Array) -> float:
+        """Return the inner product of two modes with the lumped mass, all ranks."""
         return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
 
     def _normal(self, x: Array) -> Array:
+        """Return a mode normalised to unit inner product."""
         return x / np.sqrt(self._inner(x, x))
 
     def _clean(self, x: Array, others: list[Array]) -> Array:

@@ -41,7 +41,7 @@ _AT_REST = 1e-6
 
 
 class _ModedBody(LoadedBody):
-    """Body data for `Load.mode_work`."""
+    """Body with a circumferential mode, for `Load.mode_work`."""
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
         super().__init__(forms)
@@ -93,6 +93,9 @@ class SecondVariation:
         Args:
             number: circumferential wave number; in plane strain the wave number along the depth.
             flipped: name of the symmetry plane under which the modes are antisymmetric, or None.
+
+        Returns:
+            `matrix` with new values.
         """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._turned.value = number, m
@@ -114,7 +117,14 @@ class SecondVariation:
         return self.matrix
 
     def mass(self, x: np.ndarray) -> np.ndarray:
-        """Return the lumped mass times a mode, locally owned entries."""
+        """Return the lumped mass times a mode, locally owned entries.
+
+        Args:
+            x: mode, locally owned entries, shape (n,).
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
         U, W, V = self._unknowns.T
         m, out = self._turned.value, np.zeros_like(x)
         round_axis = self._lumped * (x[V] - m * x[U])
@@ -123,12 +133,26 @@ class SecondVariation:
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """Return (U, W, V) of a mode at `nodes`, shape (m, 3)."""
+        """Return the amplitudes (U, W, V) of a mode at `nodes`.
+
+        Args:
+            x: mode, locally owned entries, shape (n,).
+
+        Returns:
+            Amplitudes, shape (m, 3).
+        """
         U, W, V = self._unknowns[~self._bubble].T
         return np.column_stack([x[U], x[W], x[V] - self._turned.value * x[U]])
 
     def plane(self, x: np.ndarray) -> np.ndarray:
-        """Return U, W and pressures of a mode as locally owned unknowns, shape of the problem's x."""
+        """Return U, W and pressures of a mode as unknowns of the problem.
+
+        Args:
+            x: mode, locally owned entries, shape (n,).
+
+        Returns:
+            Locally owned entries of the problem's x.
+        """
         found = np.zeros(self.problem.x.getLocalSize())
         found[: self.problem.n_owned] = x[self._to_mode[: self.problem.n_owned]]
         return found
@@ -146,6 +170,7 @@ class SecondVariation:
         return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
 
     def _moves_freely(self, mode: np.ndarray) -> bool:
+        """Return True if a rigid motion causes no force."""
         x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
         x.array_w[:] = mode
         self.matrix.mult(x, y)
@@ -172,6 +197,7 @@ class SecondVariation:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
     def _sum(self, values: np.ndarray) -> float:
+        """Return the sum over all ranks."""
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
@@ -180,14 +206,17 @@ class SecondVariation:
         h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
 
         def displacement(mode: Any) -> Any:
+            """Return the displacement amplitudes (U, W, V) of a mode (UFL, length)."""
             U, W, V = (ufl.split(mode)[0][i] for i in range(3))
             return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._turned * U])
 
         def gradient(mode: Any) -> Any:
+            """Return the change H of F by a mode (UFL)."""
             return kinematics.mode_gradient(displacement(mode), forms.X, self._number)
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
+            """Return F changed within or across its blocks (UFL)."""
             return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])

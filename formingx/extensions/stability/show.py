@@ -14,6 +14,11 @@ def draw(loss: Any, file: Any, scale: float) -> None:
     """Draw the deformed body with a mode, see `CriticalPoint.view3d`.
 
     The colour is the amplitude: blue towards the axis (or downwards, where that is larger), red away from it.
+
+    Args:
+        loss: the `CriticalPoint`.
+        file: path of the PNG file.
+        scale: largest amplitude of the mode over the size of the body.
     """
     file = files.named("Loss.view3d", file, ".png")
     scale = positive("Loss.view3d: scale", scale)
@@ -40,6 +45,7 @@ def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _draw(loss: Any, lines: list, file: Any, scale: float) -> None:
+    """Draw surface and section to a file."""
     pyvista = figures.pyvista()
     axisymmetric = loss.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])

@@ -79,11 +79,25 @@ class TopLoad:
         return self.stability.first
 
     def of(self, number: float) -> CriticalPoint | None:
-        """Return the first buckling point with a number of waves, or None; `buckling` returns its force and travel."""
+        """Return the first buckling point with a number of waves; `buckling` returns its force and travel.
+
+        Args:
+            number: number of waves.
+
+        Returns:
+            The critical point, or None.
+        """
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
-        """Return (force, travel) of the first buckling with a number of waves, or None."""
+        """Return force and travel of the first buckling point with a number of waves.
+
+        Args:
+            number: number of waves.
+
+        Returns:
+            (force, travel), or None.
+        """
         loss = self.of(number)
         return None if loss is None else (loss.state.measures["support_force"], -loss.control)
 

@@ -9,7 +9,16 @@ from ...results.show import page as pages
 
 
 def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str) -> Any:
-    """Draw every run as a dot, and the mean at each level of a variable as a line; return the figure."""
+    """Draw every run as a dot, and the mean at each level of a variable as a line.
+
+    Args:
+        runs: the runs.
+        effects: result of `Study.effects`.
+        measure: name of the measure.
+
+    Returns:
+        The matplotlib figure.
+    """
     drawing, axes = figure(len(effects), width=3.8, height=3.4)
     for ax, (variable, levels) in zip([axes] if len(effects) == 1 else axes, effects.items()):
         ax.plot([run.values[variable] for run in runs], [run.measures[measure] for run in runs], ".", color="0.75")
@@ -19,7 +28,17 @@ def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measur
 
 
 def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
-    """Draw two measures of all runs as dots, with the Pareto front as a line; return the figure."""
+    """Draw two measures of all runs as dots, with the Pareto front as a line.
+
+    Args:
+        runs: the runs.
+        front: runs of the Pareto front, in order.
+        a: name of the first measure.
+        b: name of the second measure.
+
+    Returns:
+        The matplotlib figure.
+    """
     drawing, axes = figure()
     axes.plot([run.measures[a] for run in runs], [run.measures[b] for run in runs], ".", color="0.75")
     axes.plot([run.measures[a] for run in front], [run.measures[b] for run in front], "o-", color="C3")
@@ -28,7 +47,15 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
 
 
 def page(study: Any, title: str) -> str:
-    """Return the HTML page of `Study.report`."""
+    """Return the HTML page of `Study.report`.
+
+    Args:
+        study: the `Study`.
+        title: heading of the page.
+
+    Returns:
+        HTML text.
+    """
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{pages.lines(str(study))}</p>"]
     if study.goal and study.good:
         best = study.best

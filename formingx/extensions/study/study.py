@@ -17,7 +17,6 @@ The results are tables, main effects, and the best run.
 
 from __future__ import annotations
 
-import itertools
 import json
 import logging
 import math
@@ -37,10 +36,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, count, finite, known, place, several
+from ...errors import InputError, count, known, place
 from ...results.files import replace
 from ...results.files.sheet import Sheet
 from . import effects
+from .variables import design
 
 Measure = Callable[[Any], float] | str
 
@@ -147,7 +147,11 @@ class Study(Sheet):
         """Return the runs that no other run beats in both measures, sorted by the first.
 
         Args:
-            a, b: names of the measures; each is optimised to its goal, without a goal to the largest value.
+            a: name of the first measure; optimised to its goal, without a goal to the largest value.
+            b: name of the second measure, likewise.
+
+        Returns:
+            The runs.
         """
         signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
         points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
@@ -156,10 +160,16 @@ class Study(Sheet):
         return sorted(front, key=lambda run: run.measures[a])
 
     def effects(self, measure: str) -> dict[str, dict[float, float]]:
-        """Return the main effects on a measure: {variable: {level: mean over the runs at this level}}.
+        """Return the main effects on a measure.
 
         After failures an additive model is fitted to the other runs by least squares. This keeps a level's mean
         independent of the failed combinations.
+
+        Args:
+            measure: name of the measure.
+
+        Returns:
+            {variable: {level: mean over the runs at this level}}.
         """
         self._known(measure)
         values = np.array([run.measures[measure] for run in self.good])
@@ -173,11 +183,26 @@ class Study(Sheet):
                 for (name, of), part, own in zip(levels.items(), parts, usual)}
 
     def plot_effects(self, measure: str) -> Any:
-        """Draw the main effects on a measure, and every run; return the matplotlib figure."""
+        """Draw the main effects on a measure, and every run.
+
+        Args:
+            measure: name of the measure.
+
+        Returns:
+            The matplotlib figure.
+        """
         return effects.main_effects(self.good, self.effects(measure), measure)
 
     def plot_pareto(self, a: str, b: str) -> Any:
-        """Draw two measures of all runs, with the Pareto front; return the matplotlib figure."""
+        """Draw two measures of all runs, with the Pareto front.
+
+        Args:
+            a: name of the first measure.
+            b: name of the second measure.
+
+        Returns:
+            The matplotlib figure.
+        """
         return effects.pareto(self.good, self.pareto(a, b), a, b)
 
     def report(self, file: Any, title: str = "Study") -> None:
@@ -345,25 +370,6 @@ def _pool(executor: futures.Executor | None, workers: int) -> Any:
         return nullcontext(executor)
     from multiprocessing import get_context  # costs time, which others do not spend
     return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-
-
-def design(variables: Any) -> list[dict[str, float]]:
-    """Return the sets of values of a study, {name: value} for each run; see `study`.
-
-    Raises:
-        InputError: variables or values that are not allowed.
-    """
-    if isinstance(variables, Mapping):
-        levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
-                  for name, values in variables.items()}
-        found = [dict(zip(levels, row)) for row in itertools.product(*levels.values())]
-    else:
-        found = [{str(k): finite(f"study: {k}", v) for k, v in dict(case).items()}
-                 for case in several("study: variables", variables, "{name: value}")]
-    if not found or not found[0] or any(set(case) != set(found[0]) for case in found):
-        raise InputError("study: variables: must be {name: values}, with at least one value each, or a list of"
-                         " {name: value} with the same names")
-    return found
 
 
 def _measures(build: Any, measure: Any) -> dict[str, Measure]:

@@ -1,0 +1,32 @@
+"""Sets of values of the variables of a study."""
+
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+from ...errors import InputError, finite, several
+
+
+def design(variables: Any) -> list[dict[str, float]]:
+    """Return the sets of values of a study; see `study`.
+
+    Args:
+        variables: see `study`.
+
+    Returns:
+        {name: value} for each run.
+
+    Raises:
+        InputError: variables or values that are not allowed.
+    """
+    if isinstance(variables, Mapping):
+        levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
+                  for name, values in variables.items()}
+        found = [dict(zip(levels, row)) for row in itertools.product(*levels.values())]
+    else:
+        found = [{str(k): finite(f"study: {k}", v) for k, v in dict(case).items()}
+                 for case in several("study: variables", variables, "{name: value}")]
+    if not found or not found[0] or any(set(case) != set(found[0]) for case in found):
+        raise InputError("study: variables: must be {name: values}, with at least one value each, or a list of"
+                         " {name: value} with the same names")
+    return found
