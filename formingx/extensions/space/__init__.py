@@ -12,7 +12,7 @@ from .surface import Surface
 
 
 class _OfFile(SolidTool):
-    """A tool from a file, of which a checkpoint holds only the name."""
+    """Tool from a file, of which a checkpoint stores only the name."""
 
     def __init__(self, name: str):
         self.name = name
@@ -22,6 +22,7 @@ class _OfFile(SolidTool):
 
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
+    """Return the tool of a checkpoint."""
     if "profile" not in shape:
         return _OfFile(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])

@@ -1,7 +1,7 @@
-"""The bodies of a closed surface of triangles: connected triangles, and groups of bodies that do not overlap.
+"""Bodies of a closed surface of triangles: connected triangles, and groups of bodies that do not overlap.
 
-Overlapping bodies have faces inside each other, to which a distance is meaningless. The distance of their union is the
-largest of their distances (positive inside), exact outside. So bodies that may overlap are in different groups.
+The distance to faces inside another body is meaningless. The distance of a union of bodies is the largest of their
+distances (positive inside), exact outside. Bodies that may overlap therefore belong to different groups.
 """
 
 from __future__ import annotations
@@ -13,10 +13,18 @@ from ...io.stl import volume
 
 
 def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Return the groups of triangles: bodies whose boxes do not overlap, each with the hollows in it.
+    """Divide a closed surface into groups of bodies whose boxes do not overlap.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        caller: name of the caller, for messages.
+
+    Returns:
+        Triangle numbers of each group; a body includes its hollows.
 
     Raises:
-        InputError: a body is inside out: a hollow that is in no other body.
+        InputError: a body is inside out: a hollow that lies in no other body.
     """
     bodies = [triangles[part] for part in _parts(points, triangles)]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
@@ -42,8 +50,7 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
 
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
-    """Numbers of the triangles of each body: triangles connected by edges; around an edge the triangles of one
-    wedge."""
+    """Return the triangle numbers of each body: triangles connected by edges; at an edge, those of one wedge."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n = len(triangles)
@@ -61,10 +68,11 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
-    """Pairs of an edge's triangles, shape (m, 3), between which the solid lies; `directed`: the edge as each has it.
+    """Return pairs of triangles at an edge, shape (m, 3), between which the solid lies.
 
-    About the edge, from edge[0] to edge[1], the solid begins at a triangle that has it backward and ends at the next
-    one that has it forward. Where two wedges meet in a face, the one that ends there comes first.
+    About the edge, from edge[0] to edge[1], the solid begins at a triangle with the edge backward and ends at the next
+    triangle with the edge forward. Where two wedges meet in a face, the wedge that ends there comes first. `directed`:
+    the edge as each triangle has it.
     """
     forward = directed[:, 0] == edge[0]
     along = points[edge[1]] - points[edge[0]]

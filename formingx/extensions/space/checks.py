@@ -15,7 +15,14 @@ _SHARE = 1e-3              # of the sheet's area in compression
 
 @register("end")
 def compressed(path: Any) -> Iterator[Finding]:
-    """Yield a finding if a membrane is in compression without a relaxed energy; collective."""
+    """Find a membrane in compression without a relaxed energy; collective.
+
+    Args:
+        path: the path.
+
+    Yields:
+        A finding if there is compression.
+    """
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
         return
@@ -30,7 +37,14 @@ def compressed(path: Any) -> Iterator[Finding]:
 
 @register("start")
 def too_large(body: Any) -> Iterator[Finding]:
-    """Yield findings on tools from files that are many times as wide as the sheet: a file has no unit of length."""
+    """Find tools from files that are many times as wide as the sheet: a file has no unit of length.
+
+    Args:
+        body: the examined body.
+
+    Yields:
+        A finding for each such tool.
+    """
     scene = body.scene
     for contact in scene.contacts:
         if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.direction is None:

@@ -68,21 +68,51 @@ class LaggedFriction(LaggedStick):
         self._ahead: tuple[Touch, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
+        """Return the law of some of the points.
+
+        Args:
+            points: numbers of the points, or a slice.
+
+        Returns:
+            The law.
+        """
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Return a mask of touching points in tension, shape (n,): they are outside the tool."""
+        """Return the mask of points in contact that are in tension, that is outside the tool.
+
+        Args:
+            x: positions, shape (n, 3), length.
+            old: history variables.
+
+        Returns:
+            Mask, shape (n,).
+        """
         return self.held(old) & (self.distance(x) < -SMALL_GAP * self.theta)
 
     def start(self, x: np.ndarray) -> Touch:
         return super().start(x)._replace(slip=np.zeros_like(x))
 
     def pressure(self, touch: Touch) -> np.ndarray:
-        """Return the pressure N at the state of a `Touch`, shape (n,), stress."""
+        """Return the contact pressure of a state.
+
+        Args:
+            touch: history variables.
+
+        Returns:
+            Pressure N, shape (n,), stress.
+        """
         return np.asarray(self.k * np.maximum(touch.distance, 0.0))
 
     def pressure_ahead(self, old: Touch) -> np.ndarray:
-        """Return the pressure N_0 that limits friction in the step ahead, shape (n,), stress."""
+        """Return the pressure that limits friction in the next step.
+
+        Args:
+            old: history variables.
+
+        Returns:
+            Pressure N_0, shape (n,), stress.
+        """
         if self._ahead is None or self._ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.arrival - old.position
             depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, change) if change.any() else now
@@ -90,16 +120,33 @@ class LaggedFriction(LaggedStick):
         return self._ahead[1]
 
     def at_pressure(self, old: Touch, pressure: np.ndarray) -> np.ndarray:
-        """Return `Touch.arrival`, shape (n, 3), for which `pressure_ahead` returns a pressure, shape (n,), stress."""
+        """Return positions of gap closure for which `pressure_ahead` returns a given pressure.
+
+        Args:
+            old: history variables.
+            pressure: the pressure, shape (n,), stress.
+
+        Returns:
+            `Touch.arrival`, shape (n, 3), length.
+        """
         change = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + change[:, None] * self.tool.near(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`; linearised at the predicted positions.
+        """Compute the tractions, linearised at the predicted positions; see `ContactLaw`.
 
-        A point that turns back against the `sense` of the last iteration sticks for one iteration: else Newton's method
-        would oscillate over the narrow range of elastic slip.
+        A point that reverses against the `sense` of the last iteration sticks for one iteration. Otherwise Newton's
+        method would oscillate over the narrow range of elastic slip.
+
+        Args:
+            x: positions, shape (n, 3), length.
+            old: history variables.
+            sense: angle of sliding in the previous iteration, shape (n,), or None.
+            expected: positions predicted by the previous iteration, or None.
+
+        Returns:
+            Tractions.
         """
         assert old is not None
         at, zero = x if expected is None else expected.position, np.zeros(len(x))
@@ -117,6 +164,7 @@ class LaggedFriction(LaggedStick):
         stiff = self.mu * self.pressure_ahead(old)[rows] / np.where(slides, size, self.elastic_slip)
 
         def stiffness() -> np.ndarray:
+            """Return the stiffness, shape (n, 3, 3), stress/length."""
             bends = outer(n, np.einsum("nij,nj->ni", near.hessian, moved)) + along[:, None, None] * near.hessian
             dg = np.eye(3) - outer(n, n) - bends
             dg -= outer(way, np.einsum("ni,nij->nj", way, dg))
@@ -126,6 +174,7 @@ class LaggedFriction(LaggedStick):
             return found
 
         def touch() -> Touch:
+            """Return the new history variables."""
             slip = np.zeros_like(x)
             slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
             depth = self.distance(x)
@@ -143,7 +192,15 @@ class LaggedFriction(LaggedStick):
         return found
 
     def near(self, x: np.ndarray, old: Touch) -> tuple[np.ndarray, Near]:
-        """Return the numbers of the points that touch, shape (m,), and their geometry relative to the tool."""
+        """Return the points in contact and their geometry relative to the tool.
+
+        Args:
+            x: positions, shape (n, 3), length.
+            old: history variables.
+
+        Returns:
+            Numbers of the m points in contact, shape (m,), and their geometry.
+        """
         rows = np.flatnonzero(self.held(old))
         return rows, self._near(x[rows])
 

@@ -40,7 +40,7 @@ class LaggedStick(ContactLaw):
     Args:
         tool: tool with a signed distance.
         k: penalty, stress/length.
-        theta: distance from which on a point counts as touching, length.
+        theta: distance above which a point counts as closed, length.
         separates: True if points in tension separate, see `pulling`.
     """
 
@@ -52,14 +52,37 @@ class LaggedStick(ContactLaw):
         self._found: list[tuple[np.ndarray, np.ndarray]] = []           # distances asked for last, and where
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
+        """Return the law of some of the points.
+
+        Args:
+            points: numbers of the points, or a slice.
+
+        Returns:
+            The law.
+        """
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
     def held(self, old: Touch) -> np.ndarray:
-        """Return a mask of the sticking points, shape (n,)."""
+        """Return the mask of the sticking points.
+
+        Args:
+            old: history variables.
+
+        Returns:
+            Mask, shape (n,).
+        """
         return old.distance > -self.theta
 
     def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
-        """Return a mask of sticking points in tension if they may separate, shape (n,): they are outside the tool."""
+        """Return the mask of sticking points that are in tension, that is outside the tool, and may separate.
+
+        Args:
+            x: positions, shape (n, 3), length.
+            old: history variables.
+
+        Returns:
+            Mask, shape (n,).
+        """
         away = np.linalg.norm(x - old.position, axis=1)
         most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
         return self.separates & self.held(old) & (-self.distance(x) > most)
@@ -68,7 +91,14 @@ class LaggedStick(ContactLaw):
         return np.zeros(len(x), dtype=bool) if old is None else self.held(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`; results of the last few states are kept."""
+        """Return the signed distances; results of the last few states are kept.
+
+        Args:
+            x: positions, shape (n, 3), length.
+
+        Returns:
+            Distances, positive inside the tool, shape (n,), length.
+        """
         for at, found in self._found:
             if np.array_equal(at, x):
                 return found
@@ -78,14 +108,31 @@ class LaggedStick(ContactLaw):
         return found
 
     def start(self, x: np.ndarray) -> Touch:
-        """See `ContactLaw`; the points that touch at the start stick from the start."""
+        """Return the initial history variables; points inside the tool at the start stick there.
+
+        Args:
+            x: positions, shape (n, 3), length.
+
+        Returns:
+            The history variables.
+        """
         d = self.distance(x)
         held = d > -self.theta
         return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """See `ContactLaw`; `normal` is 1 at sticking points, as no normals are computed."""
+        """Compute the tractions of the sticking points; their `normal` is 1, as no normals are computed.
+
+        Args:
+            x: positions, shape (n, 3), length.
+            old: history variables.
+            sense: not used.
+            expected: not used.
+
+        Returns:
+            Tractions.
+        """
         assert old is not None
         held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
         force[held] = self.k * (x[held] - old.position[held])

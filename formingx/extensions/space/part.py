@@ -1,4 +1,4 @@
-"""A formed part in three dimensions in numbers, and how far it fills a tool."""
+"""Formed part in three dimensions as numbers, and its filling of a tool."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from .wall import WallInSpace
 
 @dataclass(frozen=True, repr=False)
 class PartInSpace(PartNumbers):
-    """A whole part, also where a half or a quarter is modelled.
+    """Whole part, also where a half or a quarter is modelled.
 
     Attributes:
-        volume: length^3.
+        volume: volume, length^3.
         area: deformed area of the surface, length^2.
         draw_ratio: deformed over reference area.
         mean_wall: volume/area, length.
-        min_wall: minimum of the wall, length.
-        min_wall_at: (x, y, z) of this minimum, length.
-        min_wall_reference: its (X, Y) on the flat sheet, length.
+        min_wall: minimum wall, length.
+        min_wall_at: deformed position (x, y, z) of the minimum wall, length.
+        min_wall_reference: its position (X, Y) on the flat sheet, length.
         uniformity: minimum over mean wall.
         variation: standard deviation of the wall over the surface, over its mean.
         weight: grams if a density in g/cm3 was given; else None.
         scrap: volume beyond the trim over the volume of the sheet.
-        wrinkled: share of the area in the reference configuration that is in compression.
-        basis: what volume, area and weight are given for, as text; "" of a part that was modelled as a whole.
-        units: of the labels.
+        wrinkled: part of the reference area that is in compression.
+        basis: basis of volume, area and weight as text; "" for a part that was modelled as a whole.
+        units: units of the labels.
     """
 
     volume: float
@@ -62,9 +62,21 @@ class PartInSpace(PartNumbers):
 
 def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units,
          planes: MirrorPlanes) -> PartInSpace:
-    """See `Path.part`; trim: the z of the plane beyond which, seen from the flat sheet, the part lies.
+    """Return the part of a state as numbers; see `Path.part`.
 
-    planes: of symmetry, that cut the body.
+    Args:
+        wall: wall of the state.
+        density: density in g/cm3, or None.
+        trim: z of the plane beyond which, seen from the flat sheet, the part lies; or None.
+        heights: not available in three dimensions.
+        units: units of the labels.
+        planes: mirror planes of the body.
+
+    Returns:
+        The part.
+
+    Raises:
+        InputError: an argument that is not allowed.
     """
     if len(tuple(heights)):
         raise InputError("part: heights: in space use path.wall().section(point, normal)")
@@ -90,7 +102,7 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
 
 
 def _beyond(d: np.ndarray) -> np.ndarray:
-    """Return the part of each triangle's area, shape (m,), where a linear field, d at its corners, (m, 3), is > 0."""
+    """Return the part of each triangle's area, shape (m,), where a linear field with corner values d is positive."""
     alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
     a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -104,10 +116,10 @@ class FillingInSpace(Sheet):
 
     Attributes:
         control: name and values of the first column of the run, shape (n,).
-        touching: share of the reference area of the sheet in contact, or nearer to the tool than a tenth of its
-            thickness, shape (n,).
+        touching: part of the reference area that is in contact, or nearer to the tool than a tenth of the thickness,
+            shape (n,).
         gap: largest distance of the sheet from the tool, shape (n,), length.
-        comm: communicator of the run.
+        comm: MPI communicator of the run.
     """
 
     control: tuple[str, np.ndarray]
@@ -121,7 +133,15 @@ class FillingInSpace(Sheet):
 
 
 def filling(path: Any, contact: Any) -> FillingInSpace:
-    """See `Path.filling`."""
+    """Return the filling of a tool; see `Path.filling`.
+
+    Args:
+        path: the path.
+        contact: the `FaceContact`.
+
+    Returns:
+        The filling.
+    """
     rows, comm = [], path.problem.comm
     for state in path.states:
         with path.problem.state_context(state) as problem:

@@ -1,15 +1,19 @@
-"""Pressure on a sheet in three dimensions where it slides on a tool: along the normal of the tool.
+r"""Pressure on a sheet in three dimensions that slides on a tool, along the normal of the tool.
 
 The triangles of a sheet are chords of a fillet. Pressure normal to a chord of length l has a tangential part at its
-ends where chords of different lengths meet: on a fillet of radius R it adds p l^2/(4 R) to the tension, an error of
-second order that may exceed the tension itself. The surface that the chords stand for is the tool, which is known. So
-of the force f of the pressure on a node that touches, (n . f) n acts, n being the normal of the tool there. The
-tangential part fades as the contact pressure grows, so that the force does not jump when a node touches.
+ends where chords of different lengths meet. On a fillet of radius R it adds p l^2/(4 R) to the tension, an error of
+second order that may exceed the tension itself. The chords approximate the tool, whose normal n is known. Of the force
+f of the pressure on a node in contact only
 
-The contact pressure is that of the last accepted state, 0 at nodes that have touched since. So a state in which nodes
-have just touched depends on the step that led to it (`Path.at`, `intermediate`): in a trough, walls change by up to
-3 %. Once the contact pressure is a third of the pressure, the state is that of any other steps. The contact pressure
-of the state itself would make states unique, but then Newton's method does not converge on coarse fillets.
+.. math:: (n \cdot f) \, n
+
+acts. The tangential part fades as the contact pressure grows, so the force is continuous at gap closure.
+
+The contact pressure is taken from the last accepted state, and is 0 at nodes whose gap closed since then. A state in
+which nodes have just closed therefore depends on the step that led to it (`Path.at`, `intermediate`): in a trough,
+walls change by up to 3 %. Once the contact pressure is a third of the pressure, the state does not depend on the steps.
+The contact pressure of the state itself would make states unique, but Newton's method would not converge on coarse
+fillets.
 """
 
 from __future__ import annotations
@@ -24,9 +28,10 @@ _FULL = 1 / 3              # contact over applied pressure from which on all of 
 
 
 class PressureOnTools:
-    """Virtual work that takes the tangential part away from the pressure at the nodes that slide on tools.
+    """Virtual work that removes the tangential part of the pressure at the nodes that slide on tools.
 
-    The normal in the forms, n + H (u - u_0), has its exact derivative by the displacement u at u_0, the present one.
+    The normal in the forms, n + H (u - u_0), has its exact derivative with respect to the displacement u at the present
+    displacement u_0.
 
     Args:
         surface: the `Surface`.
@@ -37,7 +42,15 @@ class PressureOnTools:
         self._touches, self._at, self._normal, *self._hessian = (fem.Function(surface.space) for _ in range(6))
 
     def work(self, value: Any, area: Any) -> Any:
-        """Return the virtual work (UFL) of a pressure, by the vector of the deformed area per reference area."""
+        """Return the virtual work of the removed part of a pressure.
+
+        Args:
+            value: the pressure (UFL scalar, stress).
+            area: deformed area vector per reference area (UFL, shape (3,)).
+
+        Returns:
+            Virtual work (UFL, rank 1).
+        """
         surface, v = self._surface, self._surface.test_displacement()
         touches, at, normal, *hessian = (ufl.split(f)[0] for f in (
             self._touches, self._at, self._normal, *self._hessian))
@@ -49,7 +62,7 @@ class PressureOnTools:
             metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
 
     def refresh(self) -> None:
-        """Update the points in contact and the tools' normals to the present displacement; collective."""
+        """Update the points in contact and the normals of the tools to the present displacement; collective."""
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
         functions = (self._touches, self._normal, *self._hessian)

@@ -14,11 +14,22 @@ from .sheet import Sheet
 from .solid_tool import Swept
 
 _LARGER = 9.0
-"""Ratio of the sizes of sheet and tool that indicates another unit of length. (The sheet may be a quarter.)"""
+"""Ratio of the sizes of sheet and tool that indicates another unit of length; the sheet may be a quarter."""
 
 
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
-    """{layer: its thickness, a function of arrays (x, y)}, above 0 at all nodes; collective."""
+    """Return the thicknesses of the layers as functions; collective.
+
+    Args:
+        scene: the `Scene`.
+        given: a length, a function of arrays (x, y), or {layer: either}.
+
+    Returns:
+        {layer: function of arrays (x, y)}, positive at all nodes.
+
+    Raises:
+        InputError: a missing layer, or a thickness that is not positive.
+    """
     mesh = scene.mesh
     if not isinstance(mesh, Sheet):
         raise InputError("Scene: mesh: one in space must come from fx.mesh.sheet")
@@ -46,7 +57,7 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
 
 
 class _Constant:
-    """A thickness that is the same everywhere."""
+    """Constant thickness."""
 
     def __init__(self, value: float):
         self.value = value
@@ -56,6 +67,7 @@ class _Constant:
 
 
 def _check(name: str, function: Callable, X: np.ndarray) -> None:
+    """Raise an InputError unless a thickness is positive at all nodes."""
     found = values(f"Scene: thickness of {name!r}", function, {"x": X[:, 0], "y": X[:, 1]})
     if len(found) and found.min() <= 0:
         k = int(np.argmin(found))
@@ -64,7 +76,15 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """Raise an InputError for combinations that are not proven in three dimensions."""
+    """Raise an InputError for combinations that are not proven in three dimensions.
+
+    Args:
+        scene: the `Scene`.
+        heat: the `Cooling`, or None.
+
+    Raises:
+        InputError: such a combination.
+    """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
                          f" available yet")
@@ -82,7 +102,15 @@ def refuse(scene: Any, heat: Any) -> None:
 
 
 def check_contact(scene: Any, contact: Any) -> None:
-    """Raise an InputError unless the sheet starts outside the tool, in the same unit of length; collective."""
+    """Check that the sheet starts outside the tool, in the same unit of length; collective.
+
+    Args:
+        scene: the `Scene`.
+        contact: the `Contact`.
+
+    Raises:
+        InputError: the sheet starts inside the tool, or the sizes indicate different units.
+    """
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
         raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")

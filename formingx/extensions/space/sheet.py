@@ -23,14 +23,14 @@ _PARTS = ("whole", "half", "quarter")
 
 @dataclass(frozen=True)
 class Sheet(Mesh):
-    """A sheet in three dimensions: plane triangles in the reference configuration, coordinates (x, y, z). Its layers
-    are all over it.
+    """Sheet in three dimensions: plane triangles in the reference configuration, coordinates (x, y, z).
 
-    Beside the boundaries that its outline names there are its faces, "bottom" and "top" (towards +z): as a boundary
-    each has all edges. A membrane has one surface only; on which face a pressure acts says which way it pushes.
+    Each layer covers the whole sheet. Besides the boundaries of its outline a sheet has the faces "bottom" and "top"
+    (towards +z); as boundaries both consist of all edges. A membrane has one surface only, so the face on which a
+    pressure acts determines its direction.
 
     Attributes:
-        of_size: the same sheet of triangles of another size (or function of x and y).
+        of_size: function that returns the same sheet with triangles of another size (or function of x and y).
     """
 
     of_size: Callable[[Any], Sheet] | None = None
@@ -50,7 +50,14 @@ class Sheet(Mesh):
 
 
 class Edge(NamedTuple):
-    """One piece of an outline: its ends (x, y), the centre of an arc or None, the name of its boundary."""
+    """Piece of an outline.
+
+    Attributes:
+        start: its start (x, y), length.
+        end: its end (x, y), length.
+        centre: centre of an arc (x, y), length, or None for a straight piece.
+        name: name of its boundary.
+    """
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -59,11 +66,19 @@ class Edge(NamedTuple):
 
 
 def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "whole") -> list[Edge]:
-    """Return the outline of a rectangle about (0, 0), for `sheet`.
+    """Return the outline of a rectangle centred at (0, 0), for `sheet`.
 
     Args:
-        width, height: along x and y, of the whole, length; corner: radius of its corners.
-        part: "whole"; "half": where x > 0; "quarter": where y > 0 too. Where it is cut it is called "x0" and "y0".
+        width: width of the whole along x, length.
+        height: height of the whole along y, length.
+        corner: radius of its corners, length.
+        part: "whole"; "half" with x > 0; "quarter" with x > 0 and y > 0. The cuts are named "x0" and "y0".
+
+    Returns:
+        The pieces of the outline.
+
+    Raises:
+        InputError: a size that is not allowed, or an unknown part.
 
     >>> [edge.name for edge in fx.mesh.rectangle(200.0, 100.0, part="quarter")]
     ['rim', 'rim', 'x0', 'y0']
@@ -77,6 +92,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
     def to(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
+        """Add a piece from the last point."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -102,7 +118,14 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
 
 
 def circle(radius: float, *, part: str = "whole") -> list[Edge]:
-    """Return the outline of a circle about (0, 0), for `sheet`; see `rectangle`.
+    """Return the outline of a circle centred at (0, 0), for `sheet`; see `rectangle`.
+
+    Args:
+        radius: radius, length.
+        part: "whole", "half" or "quarter".
+
+    Returns:
+        The pieces of the outline.
 
     >>> fx.mesh.circle(100.0, part="quarter")[0].name
     'rim'
@@ -112,19 +135,23 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
           layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
-    """Return a flat sheet within an outline, of triangles of a size, by gmsh.
+    """Return a flat sheet of triangles within an outline, by gmsh.
 
     Args:
         outline: `rectangle(...)`, `circle(...)`, or the corners (x, y) of a polygon, length.
-        size: of the triangles' edges, length; or a function of (x, y).
-        names: of the polygon's edges, from the first corner on; default "rim".
-        layers: their names; `Scene(thickness=...)` says how thick they are.
-        reflected: names of straight boundaries, at each of which the mesh and its mirror image are joined. So the mesh
-            of a quarter with ["y0"] becomes a symmetric mesh of the half.
+        size: length of the edges of triangles, or a function of (x, y).
+        names: names of the edges of a polygon, from the first corner on; default "rim".
+        layers: names of the layers; `Scene(thickness=...)` gives their thickness.
+        reflected: names of straight boundaries at which the mesh and its mirror image are joined. The mesh of a quarter
+            with ["y0"] becomes a symmetric mesh of the half.
+        comm: MPI communicator.
+
+    Returns:
+        The sheet.
 
     Raises:
-        InputError: an outline that is none or crosses itself, a size that is not above 0, more than 500,000 triangles.
-            Also a reflected boundary that is not straight, or that the sheet crosses.
+        InputError: an outline that intersects itself, a size that is not positive, or more than 500,000 triangles. Also
+            a reflected boundary that is not straight, or that the sheet crosses.
 
     >>> quarter = fx.mesh.rectangle(300, 200, corner=20, part="quarter")
     >>> print(fx.mesh.sheet(quarter, size=40))
@@ -169,10 +196,10 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
 
 def _chords(edges: list[Edge]) -> np.ndarray:
-    """Corners of the outline, arcs as chords, shape (n, 2).
+    """Return the corners of the outline, arcs as chords, shape (n, 2).
 
     Raises:
-        InputError: it crosses or touches itself (gmsh may work on that for ever).
+        InputError: the outline crosses or touches itself; gmsh might not end.
     """
     points = []
     for edge in edges:
@@ -191,7 +218,7 @@ def _chords(edges: list[Edge]) -> np.ndarray:
 
 
 class _Size:
-    """Size that a user asks for, as a function for gmsh, which swallows errors: the first is kept in `refused`."""
+    """User's size as a function for gmsh, which ignores errors: the first error is kept in `refused`."""
 
     def __init__(self, size: Any):
         self._size = size
@@ -208,6 +235,7 @@ class _Size:
             raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
 
     def kept(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
+        """Return the size at a point for gmsh."""
         try:
             return self(x, y)
         except InputError as error:
@@ -215,7 +243,7 @@ class _Size:
             return 1e22
 
     def over(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Areas that make up the outline with corners x, and the sizes there, shape (m,) each."""
+        """Return areas that cover the outline with corners x, and the sizes there, shape (m,) each."""
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
         if self.everywhere:

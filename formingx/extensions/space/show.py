@@ -30,18 +30,23 @@ _LARGEST_TOOL = 20_000
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
-    """Draw the part of a state, whole where it was modelled in part, coloured by its wall, as PNG (rank 0 draws).
+    """Draw the whole part of a state, coloured by its wall, as PNG (rank 0 draws).
 
-    grid: size of the squares that were printed on the flat sheet, length; None: not drawn.
+    Args:
+        path: the path.
+        state: the state.
+        file: path of the PNG file.
+        grid: size of the squares of a grid printed on the flat sheet, length, or None.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb to draw on.
+        InputError: neither a screen nor Xvfb is available.
     """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     lines = wall.printed(grid) if grid else []
     images = path.scene.symmetry.images(3)
 
     def draw():
+        """Draw the picture."""
         pyvista = figures.pyvista()
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
@@ -61,9 +66,16 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
 
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(points, shape (n, 3), triangles that look outward, (m, 3), wall ratio at the points) of the whole part.
+    """Return the surface of the whole part with its wall.
 
-    The wall is put half to each side of the surface, along the normals at the nodes.
+    Half of the wall lies on each side of the mid-surface, along the normals at the nodes.
+
+    Args:
+        path: the path.
+        state: the state.
+
+    Returns:
+        Points, shape (n, 3), length; triangles that look outward, shape (m, 3); wall ratios at the points, shape (n,).
     """
     wall, planes = wall_of(path, state), path.scene.symmetry
     on = [np.abs(wall.rest[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
@@ -93,14 +105,20 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def shell_model(path: Any, file: Any, state: Any = None) -> None:
-    """Write the part as shells with a thickness each, as an input file (.inp) for Abaqus or CalculiX (rank 0 writes).
+    """Write the part as shells with their thickness, as an input file (.inp) for Abaqus or CalculiX (rank 0 writes).
 
-    It is the body as modelled: a half or a quarter, to be held at its planes of symmetry there.
-    Each triangle is an S3 with its wall as the section's thickness; the material must be given there.
+    The modelled part is written: a half or a quarter must be constrained at its planes of symmetry. Each triangle is an
+    S3 with its wall as section thickness; the material must be added.
+
+    Args:
+        path: the path.
+        file: path of the file.
+        state: the state; default the last.
     """
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
 
     def write(stream):
+        """Write the file."""
         stream.write("** formed part: shells with the wall of each element\n*NODE\n")
         stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.now, 1))
         stream.write("*ELEMENT, TYPE=S3, ELSET=PART\n")
@@ -111,7 +129,20 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-    """See `Path.report`: the process in three dimensions, pictures, the part in numbers, stages, inputs, warnings."""
+    """Write the report of a run in three dimensions; see `Path.report`.
+
+    Args:
+        path: the path.
+        file: path of the file.
+        title: heading of the page.
+        failure: failure of the run, or None.
+        units: units of the labels.
+        density: density in g/cm3, or None.
+        trim: see `Path.part`.
+
+    Returns:
+        Path of the file.
+    """
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
     planes, record = path.scene.symmetry, of_path(path)
@@ -149,6 +180,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
 
     def make() -> None:
+        """Write the page."""
         text = page.page(title or "Report of a run", body, scripts(drawn))
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
@@ -156,7 +188,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """Return the triangles of the sheet, drawn state by drawn state, and the tools, as `report.js` takes them."""
+    """Return the triangles of the sheet in each drawn state, and the tools, for `report.js`."""
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}

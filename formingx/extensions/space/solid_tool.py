@@ -25,8 +25,8 @@ _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
-    """A tool in three dimensions: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by its
-    `shift`)."""
+    """Rigid tool in three dimensions: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by `shift`).
+    """
 
     components = 3
     sized = True
@@ -34,7 +34,11 @@ class SolidTool:
     shift: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
-        """Distance of points x, shape (n, 3), to the surface, positive inside the tool, shape (n,), length."""
+        """Return the signed distance of points from the surface, positive inside the tool.
+
+        Returns:
+            Distances, shape (n,), length.
+        """
         return self._distance(as_points("signed_distance: x", x, 3) - self.shift)
 
     @property
@@ -44,12 +48,20 @@ class SolidTool:
         return np.array([points.min(0), points.max(0)])
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points, shape (n, 3), length, and triangles, shape (m, 3), of the surface, for drawing."""
+        """Return the surface as triangles, for drawing.
+
+        Returns:
+            Points, shape (n, 3), length, and triangles, shape (m, 3).
+        """
         points, triangles = self._surface()
         return points + self.shift, triangles
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        """Return the tool, moved."""
+        """Return the tool displaced by (x, y, z), length.
+
+        Returns:
+            The tool.
+        """
         import copy
         found = copy.copy(self)
         found.shift = tuple(a + b for a, b in zip(self.shift, triple("moved", (x, y, z))))
@@ -62,6 +74,9 @@ class SolidTool:
             contact: its friction and regularisation.
             k: penalty, stress/length, shape () or (n,).
             thickness: of the sheet, length.
+
+        Returns:
+            The law.
         """
         theta = contact.ramp * thickness
         if contact.sticks:
@@ -69,9 +84,11 @@ class SolidTool:
         return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
+        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
         raise NotImplementedError
 
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return points and triangles of the unmoved tool."""
         raise NotImplementedError
 
 
@@ -90,7 +107,10 @@ class Swept(SolidTool):
         self.sized = len(profile.pieces) > 1
 
     def near(self, x: np.ndarray) -> Near:
-        """Return the distance of points x, shape (n, 3), with its first and second derivatives, exactly.
+        """Return the distance of positions x, shape (n, 3), with its first and second derivatives, exactly.
+
+        Returns:
+            The geometry relative to the tool.
 
         >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).near([[0.0, 0.0, -8.0]])
         >>> found.distance.tolist(), found.normal.tolist()
@@ -108,6 +128,7 @@ class Swept(SolidTool):
         return Near(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
+        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
         return self.profile.signed_distance(np.column_stack([self._across(x)[0], x[:, 2]]))
 
     def _across(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -129,16 +150,24 @@ class Swept(SolidTool):
 
     @property
     def _size(self) -> float:
+        """Size of the profile, length."""
         return float(np.ptp(self.profile.bounds, axis=0).max()) if self.sized else 1.0
 
     def _surface(self):
+        """Return points and triangles of the unmoved tool."""
         return self._swept(self.profile.outline())
 
     def to_stl(self, file: Any, wall: float) -> None:
-        """Write it as a closed solid, binary STL: a mould `wall` thick below its lowest point. Not of an extruded one.
+        """Write the tool as a closed solid, binary STL: a mould with a wall below its lowest point.
+
+        An extruded tool cannot be written.
+
+        Args:
+            file: path of the file.
+            wall: thickness of the mould below its lowest point, length.
 
         Raises:
-            InputError: the profile is not open, from r above 0 to r = 0.
+            InputError: the profile is not open, from r > 0 to r = 0.
         """
         outline, wall = self.profile.outline(), positive("to_stl: wall", wall)
         if self.kind == "extruded" or outline[-1, 0] != 0 or outline[0, 0] <= 0:
@@ -180,12 +209,17 @@ class Swept(SolidTool):
 
 
 class Triangulated(SolidTool):
-    """A closed surface of triangles that look outward; the distance is VTK's, exact, the sign by its normals.
+    """Closed surface of triangles that look outward; the distance is VTK's exact one, its sign from the normals.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        name: name of its file.
 
     Attributes:
         name: name of its file.
         triangles: number of triangles.
-        volume: volume of its bodies, length^3 (a volume that two bodies share counts twice).
+        volume: volume of its bodies, length^3; a volume that two bodies share counts twice.
         middle: mean of its points, shape (3,), length.
     """
 
@@ -197,6 +231,7 @@ class Triangulated(SolidTool):
         self.middle = points.mean(0)
 
     def _distance(self, x):
+        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
         from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkDoubleArray
         if not self._implicit:
@@ -211,13 +246,20 @@ class Triangulated(SolidTool):
         return found
 
     def _surface(self):
+        """Return points and triangles of the unmoved tool."""
         return self._points, self._triangles
 
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
-        """Compute undercuts and draft of a mould along a direction: {"undercut_area", "least_draft"} (area; degrees).
+        """Compute undercuts and draft of a mould along a direction.
 
-        Of the faces that look into the hull of the tool, and lie in no other of its bodies: the area of faces
-        that look against the direction, and the smallest angle of the others to it (90: a floor).
+        Faces that look into the hull of the tool, and lie in no other of its bodies, are examined.
+
+        Args:
+            along: the direction, shape (3,).
+
+        Returns:
+            {"undercut_area": area of faces that look against the direction, length^2, "least_draft": smallest angle of
+            the others to it, degrees (90 for a floor)}.
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)
@@ -238,7 +280,10 @@ class Triangulated(SolidTool):
 
 
 def revolved(profile: Tool) -> Swept:
-    """Return a profile turned about the axis x = y = 0.
+    """Return the tool of revolution of a profile about the axis x = y = 0.
+
+    Returns:
+        The tool.
 
     >>> ball = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=0.0))
     >>> ball.bounds.round(6).tolist()
@@ -248,7 +293,10 @@ def revolved(profile: Tool) -> Swept:
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
-    """Return a profile (r, z) drawn along y, r being x; or along x, r being y.
+    """Return the tool of a profile (r, z) extruded along y, with r = x, or along x, with r = y.
+
+    Returns:
+        The tool.
 
     >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
     [-1.0]
@@ -259,16 +307,24 @@ def extruded(profile: Tool, along: str = "y") -> Swept:
 
 def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet: float = 0.0, lip: float = 0.0,
         draft: float = 0.0, mouth: float = 0.0, plug: bool = False) -> Swept:
-    """Return a mould that is a box with rounded corners, open upwards, about x = y = 0; or the plug that fits it.
+    """Return a box-shaped mould with rounded corners, open upwards, centred at x = y = 0; or the plug that fits it.
 
     Args:
-        half: half widths along x and y at the mouth (of a plug: at its upper end), length.
-        depth: from the mouth down to the floor; mouth: its z.
-        corner: radius in plan at the mouth; with draft the radius at the floor is smaller, and must not be below
-            `fillet`.
-        fillet, lip: radii between wall and floor, and wall and flange (of a plug none).
+        half: half widths along x and y at the mouth (for a plug: at its upper end), length.
+        depth: depth from the mouth to the floor, length.
+        corner: radius in plan at the mouth, length; with draft the radius at the floor is smaller, and must not be
+            below `fillet`.
+        fillet: radius between wall and floor, length.
+        lip: radius between wall and flange, length; not for a plug.
         draft: angle between wall and z axis, degrees.
-        plug: the solid is inside, and goes up from there.
+        mouth: z of the mouth, length.
+        plug: True for the plug, which extends upwards.
+
+    Returns:
+        The tool.
+
+    Raises:
+        InputError: sizes that do not fit each other.
 
     >>> tray = fx.tools.box(half=(60.0, 40.0), depth=20.0, corner=15.0, fillet=5.0)
     >>> tray.signed_distance([[0.0, 0.0, -18.0]]).tolist()
@@ -291,11 +347,15 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
 
 
 def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False) -> Triangulated:
-    """Return a tool from an STL file, binary or text: one or more closed surfaces.
+    """Return a tool from an STL file, binary or text, with one or more closed surfaces.
 
     Args:
-        scale: the sheet's unit of length over the file's is 1/scale: 25.4 for inches and a sheet in mm.
-        inverted: its triangles look inward.
+        file: path of the file.
+        scale: file's unit of length over the sheet's: 25.4 for a file in inches and a sheet in mm.
+        inverted: True if the triangles look inward.
+
+    Returns:
+        The tool.
 
     Raises:
         InputError: the file cannot be read, or is no closed surface whose triangles look outward; the message says
@@ -319,7 +379,11 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate."""
+    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate.
+
+    Returns:
+        Points and triangles.
+    """
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
     triangles = same.ravel()[triangles]
@@ -328,7 +392,7 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Points and triangles of an STL file."""
+    """Return points and triangles of an STL file."""
     try:
         with open(name, "rb") as stream:
             data = stream.read()
@@ -352,7 +416,7 @@ def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """Raise an InputError unless each edge has two triangles that go along it opposite ways."""
+    """Raise an InputError unless each edge belongs to two triangles with opposite directions."""
     ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     sense = np.zeros(len(edges))
@@ -370,7 +434,7 @@ def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> Non
 
 
 def _implicit(points: np.ndarray, triangles: np.ndarray) -> Any:
-    """VTK's distance to the surface, negative inside."""
+    """Return VTK's distance from the surface, negative inside."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData

@@ -1,15 +1,22 @@
-"""A scene in three dimensions as a membrane: triangles of a flat sheet that deform in three dimensions, its
-thickness as data.
+r"""Scene in three dimensions as a membrane: triangles of a flat sheet that deform in space, with the thickness as data.
 
-With the columns f1, f2 of the deformed sheet's gradient and J = |f1 x f2|, F = [[|f1|, f1.f2/|f1|, 0],
-[0, J/|f1|, 0], [0, 0, 1/J]] is, up to a rotation, the deformation gradient of the material, whose volume is kept
-exactly. It has the block structure of a section, so every material takes it. Displacements are linear in each triangle
-(P2 gains nothing on a polygonal rim, and lumps no area to vertices). A flat membrane without stretch has no stiffness
-normal to itself; a very small one, of the gradient of the displacement, keeps the tangent regular there.
+With the columns f1 and f2 of the deformation gradient of the sheet, the deformation gradient of the incompressible
+material is, up to a rotation,
 
-In compression a membrane wrinkles. With `Membrane(wrinkles=c)` its energy is c W + (1 - c) W_r, W_r the relaxed energy
-of tension-field theory (Pipkin, IMA J. Appl. Math. 36 (1986) 85): the energy at the stretch l2 = l1^(-1/2) of simple
-tension where l2 is below that, and none where l1 is below 1.
+.. math::
+    F = \begin{pmatrix} |f_1| & f_1 \cdot f_2 / |f_1| & 0 \\ 0 & J / |f_1| & 0 \\ 0 & 0 & 1 / J \end{pmatrix},
+    \qquad J = |f_1 \times f_2|
+
+It has the block structure of a section, so every material accepts it. Displacements are linear in each triangle: P2
+gains nothing on a polygonal rim, and lumps no area to vertices. A flat unstretched membrane has no stiffness normal to
+itself. A very small stiffness of the displacement gradient keeps the tangent regular there.
+
+In compression a membrane wrinkles. With `Membrane(wrinkles=c)` its energy is
+
+.. math:: c W + (1 - c) W_r
+
+with the relaxed energy W_r of tension-field theory (Pipkin, IMA J. Appl. Math. 36 (1986) 85). Where l2 is below the
+stretch l1^(-1/2) of simple tension, W_r is the energy at that stretch; where l1 < 1 it is 0.
 """
 
 from __future__ import annotations
@@ -28,22 +35,29 @@ from ...physics.loads import Pressure
 from .pressure_on_tools import PressureOnTools
 
 _REGULAR = 1e-7
-"""Stiffness of the gradient of the displacement, over the shear modulus."""
+"""Stiffness of the displacement gradient over the shear modulus."""
 
 
 class Surface(Formulation):
-    """The forms of a sheet in three dimensions; the only field is its displacement.
+    """Forms of a sheet in three dimensions; the only field is its displacement.
 
     Attributes:
-        thicknesses: {layer: its thickness in the reference configuration (`Function`, length)}.
+        thicknesses: {layer: reference thickness (`Function`, length)}.
     """
 
     slack_at_rest = True
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return (normal in the reference configuration, the whole surface): "top" looks along +z, "bottom" along
-        -z."""
+        """Return the reference normal of a face and the measure of the surface.
+
+        Args:
+            name: "top", towards +z, or "bottom", towards -z.
+            quadrature_degree: not used.
+
+        Returns:
+            Normal (UFL, shape (3,)) and measure.
+        """
         return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
 
     def refresh(self) -> None:
@@ -83,7 +97,11 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return a check that always holds, as a surface cannot be inside out: J > 0."""
+        """Return a check that always holds, since a surface has J > 0.
+
+        Returns:
+            The check.
+        """
         return _Always()
 
     def set_stiff(self) -> None:
@@ -91,7 +109,14 @@ class Surface(Formulation):
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
-        """Linear form whose vector is, at the first component of a node, the area that belongs to it, length^2."""
+        """Return the linear form of the tributary areas of the nodes.
+
+        Args:
+            deformed: True for deformed areas.
+
+        Returns:
+            Linear form (UFL, rank 1); its entry at the first component of a node is the tributary area, length^2.
+        """
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
@@ -145,7 +170,14 @@ class _Always:
 
 
 def relaxed(F: Any) -> Any:
-    """Return the deformation gradient, in principal axes where it wrinkles, whose energy is the relaxed one of F."""
+    """Return the deformation gradient whose energy is the relaxed one, in principal axes where the membrane wrinkles.
+
+    Args:
+        F: deformation gradient of `Surface` (UFL, shape (3, 3)).
+
+    Returns:
+        Deformation gradient (UFL, shape (3, 3)).
+    """
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
     squared = ((C11 - C22) / 2) ** 2 + C12**2
@@ -157,11 +189,19 @@ def relaxed(F: Any) -> Any:
     l2 = 1 / ufl.sqrt(l1)
 
     def either(a: Any, b: Any) -> Any:
+        """Return a where the membrane is taut, else b."""
         return ufl.conditional(taut, a, b)
     return ufl.as_tensor([[either(F[0, 0], l1), either(F[0, 1], 0), 0], [0, either(F[1, 1], l2), 0],
                           [0, 0, either(F[2, 2], l2)]])
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return a mask of compression, shape (n,), of a membrane with principal stretches, the larger first, (n, 2)."""
+    """Return the mask of compression of a membrane.
+
+    Args:
+        stretches: principal stretches, the larger first, shape (n, 2).
+
+    Returns:
+        Mask, shape (n,).
+    """
     return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)

@@ -1,5 +1,4 @@
-"""The wall of a part in three dimensions, triangle by triangle: where it is thin, along a cut; where a printed grid
-reaches."""
+"""Wall of a part in three dimensions for each triangle, along a cut, and the deformation of a printed grid."""
 
 from __future__ import annotations
 
@@ -19,13 +18,14 @@ from .surface import wrinkled
 
 @dataclass(frozen=True, repr=False)
 class WallInSpace(Sheet):
-    """The wall of m triangles in one state; all ranks hold all of it.
+    """Wall of m triangles in one state, the same on all ranks.
 
     Attributes:
-        rest, now: reference and deformed positions of the n nodes, shape (n, 3), length.
+        rest: reference positions of the n nodes, shape (n, 3), length.
+        now: deformed positions of the nodes, shape (n, 3), length.
         triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
-        layers: {name: thickness in the reference configuration, in the middle of each triangle, shape (m,)}.
-        comm: of the run.
+        layers: {name: reference thickness in the middle of each triangle, shape (m,)}.
+        comm: MPI communicator of the run.
     """
 
     rest: np.ndarray
