@@ -5,7 +5,7 @@ import pytest
 
 import formingx as fx
 from formingx.contact.increment import Increment
-from formingx.physics.contact import Law
+from formingx.physics.penalty import Law
 from formingx.physics.contact_law import NormalLaw, Touch
 from formingx.problem.problem import Problem
 

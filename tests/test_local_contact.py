@@ -11,7 +11,7 @@ from scipy import optimize
 import formingx as fx
 from formingx import tools
 from formingx.contact.increment import Increment
-from formingx.physics.contact import Law
+from formingx.physics.penalty import Law
 from formingx.solve import local_contact
 
 THETA, K = 1e-3, 1e4

@@ -291,7 +291,11 @@ class Formulation(BodyModel):
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
 
     def path_forms(self) -> list[Any]:
-        """Return the forms that each path uses, some of them None."""
+        """Return the forms that each path uses.
+
+        Returns:
+            List of forms; some are None.
+        """
         return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row()]
 
     def integral(self, form: Any) -> float:
@@ -357,10 +361,13 @@ class Formulation(BodyModel):
         return self.volume / self.integral(self.area(boundary))
 
     def area(self, boundary: str) -> Any:
-        """Return the scalar form of the area of a boundary in the reference configuration.
+        """Return the scalar form of the reference area of a boundary.
 
         Args:
             boundary: name of the boundary.
+
+        Returns:
+            The form (UFL, rank 0).
         """
         return self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1]
 

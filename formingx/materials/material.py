@@ -85,12 +85,12 @@ class Material(Energies):
 
     @property
     def base(self) -> Material:
-        """The material without solidification."""
+        """Material without solidification."""
         return self
 
     @property
     def equilibrium(self) -> Material | None:
-        """The material that is left when all has relaxed, or None."""
+        """Material that describes the relaxed state, or None."""
         return self
 
     @property
@@ -191,7 +191,14 @@ class Material(Energies):
         return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the sudden stretch of a test beyond which the force falls; infinity if it does not."""
+        """Return the sudden stretch of a test beyond which the force decreases.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+
+        Returns:
+            The stretch; infinity if there is none.
+        """
         return math.inf
 
     def check_stability(self, stretches: Any) -> Stability:

@@ -90,6 +90,12 @@ def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
 def of_columns(mesh: Mesh) -> Columns:
     """Return the columns of a mesh.
 
+    Args:
+        mesh: the mesh.
+
+    Returns:
+        The columns.
+
     Raises:
         InputError: the mesh has no columns, or its nodes were moved.
     """

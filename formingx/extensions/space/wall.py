@@ -93,14 +93,30 @@ class WallInSpace(Sheet):
                 **(each if len(each) > 1 else {})}
 
     def at(self, x: float, y: float) -> float:
-        """Return the wall at the node that was nearest to a place of the flat sheet, length."""
+        """Return the wall at the node nearest to a position of the flat sheet.
+
+        Args:
+            x: reference position, length.
+            y: reference position, length.
+
+        Returns:
+            Wall, length.
+        """
         away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
     def around(self, point: tuple[float, float, float], radius: float) -> float:
-        """Mean wall ratio of the triangles whose middle is now within a radius of a point; else of the nearest one.
+        """Return the mean wall ratio around a point of the part.
 
-        Weighted by their areas in the reference configuration.
+        The mean is weighted with the reference areas of the triangles whose middle lies within the radius. If there is
+        none, the nearest triangle counts.
+
+        Args:
+            point: deformed position (x, y, z), length.
+            radius: radius, length.
+
+        Returns:
+            Deformed over reference thickness.
         """
         away = np.linalg.norm(self.middle - triple("around: point", point), axis=1)
         near = away <= positive("around: radius", radius)
@@ -109,9 +125,16 @@ class WallInSpace(Sheet):
         return float(np.average(self.ratio[near], weights=self.area_at_rest[near]))
 
     def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
-        """Return the wall along a plane cut: {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, from end to end.
+        """Return the wall along a plane cut, from end to end.
 
         Where the cut has several pieces, their arc lengths follow one another.
+
+        Args:
+            point: a point of the plane (x, y, z), length.
+            normal: normal of the plane, shape (3,).
+
+        Returns:
+            {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, length.
 
         Raises:
             InputError: the plane does not meet the part.
@@ -148,9 +171,15 @@ class WallInSpace(Sheet):
         return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
 
     def printed(self, size: float) -> list[np.ndarray]:
-        """Return the deformed lines of a square grid printed on the flat sheet: shape (k, 3) each, length.
+        """Return the deformed lines of a square grid printed on the flat sheet.
 
-        Lines x = i size and y = j size; nodes between where they cross edges of triangles.
+        The lines are x = i size and y = j size, with nodes where they cross edges of triangles.
+
+        Args:
+            size: size of the squares, length.
+
+        Returns:
+            Lines, shape (k, 3) each, length.
         """
         size, found = positive("printed: size", size), []
         edges = np.unique(np.sort(np.concatenate([self.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))]), 1),
@@ -170,8 +199,14 @@ class WallInSpace(Sheet):
         return found
 
     def to_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Average values of triangles, shape (m,), to nodes, (n,): means over the triangles around, by their areas
-        in the reference configuration."""
+        """Average values of triangles to nodes, weighted with the reference areas of the adjacent triangles.
+
+        Args:
+            values: values of the triangles, shape (m,).
+
+        Returns:
+            Values at the nodes, shape (n,).
+        """
         total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
         np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
         np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))
@@ -179,7 +214,15 @@ class WallInSpace(Sheet):
 
 
 def wall_of(path: Any, state: Any) -> WallInSpace:
-    """Return the wall in a state, nodes and triangles in an order that does not depend on ranks; collective."""
+    """Return the wall in a state, in an order of nodes and triangles that does not depend on ranks; collective.
+
+    Args:
+        path: the path.
+        state: the state.
+
+    Returns:
+        The wall.
+    """
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
     own = own_cells(domain)
