@@ -242,7 +242,9 @@ class Formulation(BodyModel):
         return []
 
     def set_stiff(self) -> None:
-        """Set `w` near the reference configuration to fields with a regular tangent, for the first direction of a path.
+        """Set `w` to fields with a regular tangent, near the reference configuration.
+
+        A path computes its first direction there if the body in the reference configuration has no stiffness.
         """
         self.w.x.array[:] = 0
 

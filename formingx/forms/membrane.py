@@ -155,7 +155,7 @@ class MidSurface(Formulation):
         return MidSurfaceProbe(problem, points)
 
     def set_stiff(self) -> None:
-        """Apply a small stretch in all directions, for the first direction of a path."""
+        """Set a small stretch in all directions: its tension makes the tangent regular, see `Formulation.set_stiff`."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:

@@ -92,7 +92,7 @@ class StepError:
         return self._weight * once, self._weight * lasting
 
     def _at_time(self, time: float) -> None:
-        """Move the clock so that the process time has a value."""
+        """Set the clock so that the process time equals `time`."""
         self._forms.clock += time - self._problem.time
 
     def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:

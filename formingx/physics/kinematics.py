@@ -224,13 +224,14 @@ class PlaneStrain(Kinematics):
         return _rows(ufl.grad(mode), [-number * mode[0], -number * mode[1], number * mode[2]])
 
     def rigid_modes(self, number):
-        """Return the rigid motions of a mode that is constant along the depth.
+        """Return the rigid motions as modes; only modes that are constant along the depth have any.
 
         Args:
             number: wave number along the depth.
 
         Returns:
-            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3); none for a wave.
+            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3); empty unless
+            `number` is 0.
         """
         plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
         return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]

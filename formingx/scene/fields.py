@@ -153,6 +153,6 @@ def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> Non
 
 
 def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """Return the first point that is not fine as text."""
+    """Return the first point whose entry in the mask `fine` is False, as text."""
     first, second = points[np.argmin(fine)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

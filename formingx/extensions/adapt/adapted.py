@@ -112,7 +112,10 @@ def of_columns(mesh: Mesh) -> Columns:
 
 
 def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return the ends of columns scaled by `factors`, shape (n,); inf gives the length of the longest."""
+    """Return the ends of new columns whose lengths are scaled by `factors`, shape (n,).
+
+    A factor of inf stands for the length of the longest column.
+    """
     old = columns.ends
     at = np.append((old[:-1, None] + np.diff(old)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), old[-1])
     faces = columns.place(at)[[0, -1]]

@@ -91,7 +91,10 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the rotation along each column, with half of the kinks at its ends, radians, shape (n,)."""
+    """Return the rotation of the sheet along each column, radians, shape (n,).
+
+    Half of a kink between two columns counts in each.
+    """
     way = np.zeros(edges.shape[-1])                          # directions at both ends, averaged over both faces
     for numbers, back in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)

@@ -44,6 +44,8 @@ class Difference:
 class Comparison:
     """Result of `compare`; its text is a report.
 
+    "Ours" is the run, "theirs" the curve of the other program.
+
     Attributes:
         columns: compared columns, by our names.
         ours, theirs: both sides as ordered points, shape (n, columns), in our units.
@@ -70,7 +72,7 @@ class Comparison:
 
     @property
     def beyond(self) -> int:
-        """Number of their points beyond the ends of our curve, which are left out."""
+        """Number of points of the other program beyond the ends of the run's curve, which are left out."""
         return len(self.theirs) - len(self.pairs[0])
 
     def __str__(self) -> str:
@@ -286,7 +288,10 @@ class Smooth:
 
 
 def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the minimum sum of squared distances up to point i with partner sample j, shape (points, samples)."""
+    """Return the smallest sums of squared distances by which points can be paired with samples of a curve in order.
+
+    Entry (i, j), shape (points, samples): points 0 to i, with sample j as the partner of point i.
+    """
     cost = np.stack([((line - p) ** 2).sum(1) for p in points])
     for i in range(1, len(points)):
         cost[i] += np.minimum.accumulate(cost[i - 1])

@@ -126,10 +126,10 @@ class PerturbedRun:
                 F[numbers] = 0.0                                 # a node between two tools counts once
 
     def constraint(self, equation: Any) -> float:
-        """Return the residual of an equation at its state.
+        """Return the residual of an equation in the present state of the perturbed run.
 
         Args:
-            equation: the equation, see `Bound.equation`.
+            equation: function of (x, control, gradient), see `Bound.equation`.
 
         Returns:
             The residual.

@@ -124,13 +124,13 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
-    """Return the confidence band of a quantity; see `DesignRun.band`.
+    """Return a quantity of a run with its confidence band; see `DesignRun.band`.
 
     Args:
-        run: the run.
-        given: standard deviations of the parameters.
-        measure: the quantity.
-        confidence: confidence level.
+        run: the `DesignRun`.
+        given: standard deviations of the parameters, see `covariance_of`.
+        measure: name of the quantity, see `DesignRun.derivative`.
+        confidence: confidence level of the band, between 0 and 1.
 
     Returns:
         The band.

@@ -91,7 +91,7 @@ def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
 
 
 def _counted(points: list[tuple[str, list[float]]]) -> list[int]:
-    """Return a number for each point, higher by one where the test changes or time begins again."""
+    """Return the number of the test of each point; a test ends where its name changes or the time starts again."""
     found, n = [], 0
     for (mode, row), (before, last) in zip(points, [points[0], *points]):
         n += mode != before or len(row) == 3 and row[2] < last[2]

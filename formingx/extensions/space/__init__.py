@@ -22,7 +22,7 @@ class _OfFile(SolidTool):
 
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
-    """Return the tool of a checkpoint."""
+    """Return the tool that a checkpoint describes."""
     if "profile" not in shape:
         return _OfFile(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])

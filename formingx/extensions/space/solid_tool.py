@@ -43,7 +43,7 @@ class SolidTool:
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest coordinates of the surface as drawn, shape (2, 3), length."""
+        """Lowest and highest coordinates of the triangles of `surface`, shape (2, 3), length."""
         points = self.surface()[0]
         return np.array([points.min(0), points.max(0)])
 

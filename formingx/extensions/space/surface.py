@@ -105,7 +105,7 @@ class Surface(Formulation):
         return _Always()
 
     def set_stiff(self) -> None:
-        """Set the displacement to a small stretch in all directions."""
+        """Set a small stretch in all directions: its tension makes the tangent regular, see `Formulation.set_stiff`."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
