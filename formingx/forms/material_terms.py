@@ -137,7 +137,7 @@ class MaterialTerms:
             The same expression.
 
         Raises:
-            InputError: the fields live on another mesh, as those of a membrane.
+            InputError: the fields live on another mesh, such as the mid-surface of a membrane.
         """
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"

@@ -119,7 +119,7 @@ class ContactLaw:
         has_friction: True if tractions depend on the slip.
         remembers: True if tractions depend on the history variables (`Touch`).
         pulls: True if the body may pull at the tool; `energy` is then the energy of the bond (`Path.work`).
-        predictable: True if the law has `friction` and `depth`, as `formingx.physics.contact.Law`; several gaps may
+        predictable: True if the law has `friction` and `depth`, as `formingx.physics.penalty.Law`; several gaps may
             then close in one step.
     """
 

@@ -53,7 +53,8 @@ class Comparison:
         pairs: indices of the compared points of `theirs`, and their partners on our curve, shape (k, columns).
         differences: {column: `Difference`}.
         limit_points: (ours, theirs), each a list of {column: value}. They are located by the run, else on the parabola
-            through the three points at which the control turns (pressure or travel, else the first column).
+            through the three points at which the control turns. The control is pressure or travel, else the first
+            column.
         resolution: change of each side's curve, relative to the ranges, if every second point is left out. A difference
             below a tenth of it may come from interpolation. A `Path` also knows its tangents: its curve is more
             accurate.
@@ -153,7 +154,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
         theirs: the same choice. The header of a CSV file names the columns and may state units, as "pressure [psi]".
         columns: {our name: their name}, or names on both sides; at least two. Default: the controlled quantity and the
             next column of ours that theirs also has.
-        units: {our name: factor} to our units, or {our name: our unit} if their header states theirs ("m", "cm", "mm",
+        units: {our name: factor} to our units, or {our name: our unit} if their header states theirs. Known units are
+            ("m", "cm", "mm",
             "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3", ...).
         along: our name of the independent variable, or "arc length"; default as above.
 

@@ -30,9 +30,9 @@ class MeasuredWall:
 
     Args:
         wall: thickness, shape (m,), length.
-        length: arc length along the middle line of the part, from the axis, shape (m,), length; or
-        points: (r, z) on the section, shape (m, 2), length; or
-        reference_length: positions on the flat sheet (for example of a printed grid), shape (m,), length.
+        length: arc length along the middle line of the part, from the axis, shape (m,), length. Alternatively points:
+            (r, z) on the section, shape (m, 2), length. Or reference_length: positions on the flat sheet (for example
+            of a printed grid), shape (m,), length.
 
     Raises:
         InputError: not exactly one kind of position, a wall that is not positive, or shapes that do not agree.

@@ -20,8 +20,8 @@ class Search:
         spare: relative reduction of the target of a prescribed volume, so that round-off does not exceed it.
         kept: relative deviation of the volume or the minimum wall above which it is reported.
         reached: relative deviation of the wall below which the wanted wall is reached.
-        less: a bound or the volume is reported as the reason for the end of a search if removing it would reduce the
-            deviation below this part.
+        less: a bound or the volume is reported as the reason for the end of a search by this criterion. Without it the
+            deviation would decrease below this part.
         damped: Levenberg damping over the largest singular value of the sensitivities. Smaller effects are ignored.
         damped_measured: Levenberg damping for the fit to a measured wall, which contains scatter.
         worth: the search ends after two runs that each lower the sum of squares by less than this part.

@@ -2,7 +2,7 @@ r"""Perturbed runs: copies of a run with one parameter slightly changed, solved 
 
 Each perturbed run has a problem of its own, built from the scene of the user's function. It therefore includes every
 effect of a parameter (nodes, constants, tools, friction, targets, temperatures). At a state of the base run with dF/dx
-= K, a perturbed run solves its own equilibrium F' = 0 and its own constraint c' = 0 by modified Newton iterations:
+= K, a perturbed run solves its own equilibrium F' = 0 and constraint c' = 0 by modified Newton iterations:
 
 .. math::
     K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'

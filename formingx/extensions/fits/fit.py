@@ -43,8 +43,8 @@ class Fit(NamedTuple):
         deviations: {test: root mean square of the misfit over the measured stress}; stresses below 2 % of the test's
             largest count as these 2 %.
         errors: {constant: its standard error}, see `uncertainty`.
-        undetermined: names of the constants that the tests leave open: with a noise of 1 % of the stress, or with the
-            misfit if that is more, the standard error is above half of the constant.
+        undetermined: names of the constants whose standard error exceeds half of their value. The error is computed for
+            a noise of 1 % of the stress, or for the misfit if that is larger.
         covariance: of the constants, shape (p, p), in the order of `constants`.
         points: number of measured stresses.
         data: the tests, as `fit` takes them.
@@ -108,24 +108,24 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
     """Fit the constants of a material to tests by least squares of the nominal stress.
 
     From several first guesses the best result counts. The constants stay admissible, and no step leaves a material's
-    limit (Gent, Arruda-Boyce). A misfit counts relative to the measured stress: of Treloar's rubber an absolute misfit
-    weighs the last points of the uniaxial test alone, and its constants miss the limit pressure of his sheet by 12 to
-    31 %, those of a relative misfit by 1 to 16 % (`demos/measured_treloar.py`).
+    limit (Gent, Arruda-Boyce). A misfit counts relative to the measured stress. For Treloar's rubber an absolute misfit
+    weighs the last points of the uniaxial test alone. Its constants miss the limit pressure of his sheet by 12 to 31 %,
+    constants of a relative misfit by 1 to 16 % (`demos/measured_treloar.py`).
 
     Args:
         material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess: a
             `Hyperelastic` must be given so. A `KBKZ` with a damping is given so too: the damping is fitted, and its
             spectrum stays (see `fit_spectrum`).
-        data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar)
-            and "equibiaxial", and "biaxial": (stretch 1, stretch 2, nominal stress 1, nominal stress 2), with stresses
-            that were not measured not a number. Force over reference area, in any unit: the constants get the same.
+        data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar) and
+            "equibiaxial". For "biaxial" it is (stretch 1, stretch 2, nominal stress 1, nominal stress 2); a stress that
+            was not measured is nan. Force over reference area, in any unit: the constants get the same.
             For a material that relaxes: a list of `TimedTest`.
             Or the name of a CSV file (see `csv_files.records`) with the columns test, stretch, stress (nominal), in any
-            order if the first line names them (units in brackets are checked, not converted), else in this order; for a
-            material that relaxes a column with the time, in which each test begins where the time falls (rows as of
-            `TimedTest`, a stress that was not measured left empty).
-        terms: number of terms if `material` is the class `Ogden`, default 3; number of branches if it is one that
-            relaxes (its equilibrium is then neo-Hookean), default as many as the data determine.
+            order if the first line names them, else in this order. Units in brackets are checked, not converted. A file
+            for a relaxing material has a column with the time; each test begins where the time decreases. Its rows are
+            as in `TimedTest`; a stress that was not measured is left empty.
+        terms: number of terms if `material` is the class `Ogden`, default 3. For a relaxing class it is the number of
+            branches, default as many as the data determine; the equilibrium is then neo-Hookean.
         relative: True: misfits over the measured stress, or over 2 % of the test's largest if that is more. False:
             misfits in stress, every point with the same weight.
         weights: {test: weight} of the squared misfits of its points, or for tests in time one number each; default 1.

@@ -1,8 +1,8 @@
 """Constants of a material that relaxes from tests in time: relaxation, constant rates, any history.
 
-The stress of a branch is mu times a function of tau alone, which is computed once for a row of tau. A spectrum of
-moduli, none negative, that fits best (Lawson and Hanson 1974) gives the first guess of a least squares in all
-constants, the logarithms of mu and tau among them: every result is admissible.
+The stress of a branch is mu times a function of tau alone, which is computed once for a row of tau. The best fit of a
+spectrum with nonnegative moduli (Lawson and Hanson 1974) is the initial guess. A least-squares fit of all constants
+follows, with the logarithms of mu and tau as variables, so every result is admissible.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class TimedTest(NamedTuple):
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times, shape (n,), not decreasing. A stretch that changes between equal times is applied at once, and so
-            is the first stretch, at the first time; a constant stretch with a first time above 0 is applied at time 0.
+        times: times, shape (n,), not decreasing. The first stretch is applied suddenly at the first time; two stretches
+            at the same time are a jump. A constant stretch with a positive first time is applied at time 0.
         stretches: shape (n,).
         stress: nominal, shape (n,); not a number where it was not measured.
         between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).

@@ -32,8 +32,8 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
         List of (test, columns), columns of shape (2 or 3, n).
 
     Raises:
-        InputError: a file that cannot be read, has no rows, a header without these columns or with another unit, or a
-            row that is not of this form.
+        InputError: a file that cannot be read or has no rows, a header without these columns or with another unit, or a
+            malformed row.
     """
     caller = f"fit: data: {file}"
     try:

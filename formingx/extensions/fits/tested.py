@@ -27,8 +27,9 @@ _STRAIGHT = 1e-8
 class MeasuredRange:
     """Tests that the constants of a material come from.
 
-    A deformation counts as tested if its logarithmic principal strains, in falling order, lie in the convex hull
-    of the tested strains, or within 10 % of their size from it. Between two tested modes it counts as tested.
+    A deformation is compared by its logarithmic principal strains in descending order. It counts as tested if they lie
+    in the convex hull of the tested strains, or within 10 % of their size from it. Between two tested modes it counts
+    as tested.
 
     Attributes:
         ranges: {test: (lowest, highest stretch)}; the test is "uniaxial", "pure_shear", "equibiaxial" or "biaxial".

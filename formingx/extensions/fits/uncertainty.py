@@ -35,8 +35,9 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
     .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}
 
-    J holds the derivatives of the scaled stresses by the constants at the optimum, and s^2 is the sum of the squared
-    scaled misfits over the number of points less constants (Seber and Wild 1989, chapter 5). A standard error is nan if
+    J contains the derivatives of the scaled stresses by the constants at the optimum. s^2 is the sum of the squared
+    scaled misfits over the number of points minus constants (Seber and Wild 1989, chapter 5). A standard error is nan
+    if
     there are no more points than constants. It is infinite if a doubled constant changes no stress visibly.
 
     Args:

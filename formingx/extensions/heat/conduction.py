@@ -6,8 +6,8 @@ Per reference volume, with F and J of a displacement and the heat flux q into th
     \rho c \frac{dT}{dt} = \mathrm{Div}(k J F^{-1} F^{-T} \mathrm{Grad}\, T) + J s, \qquad
     k J F^{-1} F^{-T} \mathrm{Grad}\, T \cdot N = q |J F^{-T} N|
 
-The forms of a body without displacement do not contain F. All forms are divided by the heat capacity of the whole body,
-so the entries of M add up to 1 and R is in degrees per time.
+The forms of a body without displacement do not contain F. All forms are divided by the heat capacity of the whole body.
+The entries of M therefore add up to 1, and R is in degrees per time.
 """
 
 from collections.abc import Mapping, Sequence

@@ -69,8 +69,8 @@ class Cooling:
         unit: unit of all temperatures, "C" or "K".
         tools: {name of a contact of the scene: (conductance, tool)}, see `ToolHeat`.
         tolerance: largest estimated error of one time step of the heat equation, degrees.
-        work_to_heat: heat per dissipated work of the materials, in the units of both: 1 in SI, 1e-3 for MPa, mm and W;
-            less if part of the work is stored. None: no heating by work. The work of friction on tools is never
+        work_to_heat: heat per dissipated work of the materials, in the units of both: 1 in SI, 1e-3 for MPa, mm and W.
+            It is less if part of the work is stored. None: no heating by work. The work of friction on tools is never
             included.
 
     >>> air = fx.Convection("top", h=2e-5, air=20.0)

@@ -73,7 +73,7 @@ class CoolingHistory:
         self._touches = self._tool_contacts(self._body)
         self._n = len(self._body.points)
         self._first = scene.temperature.T.x.array[: self._n]
-        self._seen: Any = None                              # by the field, and by what depends on it
+        self._seen: Any = None                              # temperature seen by the field and its coefficients
         low, high = cooling.extremes(scene)
         self._field.limits = low, np.inf if cooling.work_to_heat else high
         self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
@@ -276,7 +276,7 @@ class CoolingHistory:
         comm, before = self._problem.comm, memory.before
         to_body = Carrier(comm, mapping(source._body.points), self._body.points).fitted
         touched = zip(source._body.tool_contacts, memory.lines, strict=True) if self._body.tool_contacts else ()
-        lines = [Carrier(comm, mapping(other.points), touch.points).fitted(kept)  # what is released touches nothing
+        lines = [Carrier(comm, mapping(other.points), touch.points).fitted(kept)  # a released body has no tools
                  for touch, (other, kept) in zip(self._body.tool_contacts, touched, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return HeatState(memory.time, to_body(memory.temperature), lines, memory.step, power,

@@ -1,8 +1,9 @@
 """Mesh for heat: elements below faces that exchange heat are cut into thin layers.
 
 By a time t heat penetrates to a depth sqrt(a t), with the diffusivity a, and elements there must be smaller. The
-thickness of a layer at a depth y below such a face is a given part of max(that depth at the first time of interest,
-y/3), so later and deeper profiles are resolved too. Shared edges are cut for both neighbours. Triangles are cut into
+thickness of a layer at a depth y is a given part of y/3 or, if larger, of the penetration depth at the first time of
+interest. Later and deeper profiles are therefore resolved too. Shared edges are cut for both neighbours. Triangles are
+cut into
 rows between the cuts of their edges, in the shape of the original element.
 """
 

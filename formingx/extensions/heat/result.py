@@ -307,8 +307,7 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _at(self, time: float | None) -> list[np.ndarray]:
-        """Return the state at a time: that of a step, or Hermite's cubic with slopes of parabolas through three steps.
-        """
+        """Return the state at a time, between steps by Hermite's cubic with slopes of parabolas through three steps."""
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]

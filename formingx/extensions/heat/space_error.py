@@ -1,7 +1,7 @@
 r"""Estimate of the discretisation error of a temperature, by its change in a space of one degree more.
 
-The residual of the temperature and of its time derivative, tested by cubics, drives a correction e over the time t that
-the run has taken:
+The residual of the temperature and of its time derivative, tested by cubics, drives a correction e over the time t of
+the run:
 
 .. math:: (M + t K) e = t \left(R(T) - M \frac{dT}{dt}\right)
 

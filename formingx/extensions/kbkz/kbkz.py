@@ -3,8 +3,8 @@ r"""Factorised K-BKZ equation: a fading memory of all past states, with damping.
 .. math:: \tau(t) = \int_{-\infty}^{t} m(t - t') \, h(I_1, I_2) \, B(t, t') \, dt', \qquad
           m(s) = \sum_k \frac{G_k}{\tau_k} e^{-s/\tau_k},
 
-with the Kirchhoff stress tau up to a pressure, the Finger tensor B(t, t') of the deformation from t' to t, I1 = tr B
-and I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner
+tau is the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t. I1 = tr B and
+I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner
 (1976) and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
 In a scene its stress is computed at each quadrature point from the past states there (`past_states`).
 """
@@ -37,8 +37,8 @@ _STRAIN = 0.25
 class KBKZ(Relaxing):
     """The factorised K-BKZ equation, for a body that is undeformed before the run.
 
-    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k); after a step of strain the stress is G(t) h
-    times the stress of a neo-Hookean body of unit modulus, so that time and strain separate. The state alone does not
+    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k). After a step of strain, time and strain separate: the
+    stress is G(t) h times the stress of a neo-Hookean body of unit modulus. The state alone does not
     determine the stored energy of a damped material, so runs with it have no columns of energies.
 
     Args:

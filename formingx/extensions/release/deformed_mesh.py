@@ -38,8 +38,8 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
         The mesh, with the names of layers and boundaries and with second-order geometry.
 
     Raises:
-        InputError: a membrane, a sheet in three dimensions, or deformed elements that are no mesh (inside out, or one
-            over another); new elements of several layers, on several ranks, or round a hole.
+        InputError: a membrane, a sheet in three dimensions, or deformed elements that are inverted or overlap. Also new
+            elements of several layers, on several ranks, or around a hole.
     """
     path.section_only("deformed_mesh", "use to_stl, or shell_model")
     state = state or path.last

@@ -50,8 +50,8 @@ class Preformed(NamedTuple):
     Attributes:
         x: present positions of corners, midpoints and centres, shape (m, 7, 2), length.
         rest: their reference positions, shape (m, 7, 2), length.
-        b: deformation at the start of that mesh, at corners and midpoints, shape (m, 6, 6): rr, rz, zz, hoop entry of
-            b, cos and sin of the rotation.
+        b: deformation at the start of that mesh, at corners and midpoints, shape (m, 6, 6). Entries are rr, rz, zz and
+            hoop entry of b, cos and sin of the rotation.
         pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
         held: additional volume stiffness of each point (`Model.volume_stiffness`), dimensionless.
         before: the problem of the old mesh, and its last state.

@@ -50,7 +50,8 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
 
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
-    """Return the triangle numbers of each body: triangles connected by edges; at an edge, those of one wedge."""
+    """Return the triangle numbers of each body: triangles connected by edges; at an edge, the triangles of one wedge.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n = len(triangles)
@@ -70,7 +71,7 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
     """Return pairs of triangles at an edge, shape (m, 3), between which the solid lies.
 
-    About the edge, from edge[0] to edge[1], the solid begins at a triangle with the edge backward and ends at the next
+    Around the edge, from edge[0] to edge[1], the solid begins at a triangle with the edge backward. It ends at the next
     triangle with the edge forward. Where two wedges meet in a face, the wedge that ends there comes first. `directed`:
     the edge as each triangle has it.
     """

@@ -5,11 +5,12 @@ Which points touch is lagged as in `lagged_stick`. The traction of a point that 
 
 .. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,
 
-d being its signed distance to the tool, n = grad d, and g the elastic slip (Wriggers, Computational Contact Mechanics,
-2006, chapter 5.2): the slip at the last accepted state plus the motion since then, in the present tangent plane, no
-longer than g_s (return mapping). N_0 is fixed while Newton's method runs, which then converges: first the pressure at
-the last accepted state, changed as the tangent of the path predicts, then the pressure of the state that was found
-with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched since the last state: steps are
+where d is its signed distance to the tool, n = grad d, and g the elastic slip (Wriggers, Computational Contact
+Mechanics, 2006, chapter 5.2). The slip is its value at the last accepted state plus the motion since then in the
+present tangent plane, limited to g_s (return mapping). N_0 is constant during Newton iterations, which therefore
+converge. It is first the pressure at the last accepted state, extrapolated along the tangent of the path. Then it is
+the pressure of the state found with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched
+since the last state: steps are
 short enough for the pressure to change little in each (`StepLimits.lag`).
 
 In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end points in tension

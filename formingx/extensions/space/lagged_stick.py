@@ -1,13 +1,13 @@
 """Contact in three dimensions, lagged by a step: a point that crossed a tool sticks there from the next step on.
 
-A point whose straight way between two accepted states leads into the tool is held by an isotropic penalty, in the
-steps after, at the place where that way crossed the surface (as the user's guide of Polyflow describes of its contact).
+A point whose straight path between two accepted states leads into the tool sticks in the following steps. An isotropic
+penalty constrains it to the position where the path crossed the surface (compare the user's guide of Polyflow).
 Within a step nothing changes: the law is linear, and Newton's method meets no kink, no normal and no curvature, nor
-asks the tool. The price is an error of first order in how far points move in the step in which they arrive: with 1 % of
-the points to a step, walls are within 0.1 % of those of exact stick. The tool must give its signed distance alone.
+asks the tool. The error is of first order in the motion of points in the step of their gap closure. With 1 % of the
+points per step, walls are within 0.1 % of the walls of exact stick. The tool must give its signed distance alone.
 
 Points in contact stick until a stage leaves the tool out. With `separates=True`, points in tension separate at the end
-of each step, at constant control, until none is left; a body that snaps off reaches equilibrium by a jump. Tests prove
+of each step, at constant control, until none is left. A body that snaps off reaches equilibrium by a jump. Tests prove
 this for elastic sheets. Relaxing sheets are refused: slack under the plug, their points separate and touch again in
 each step, and the run makes no progress.
 """

@@ -1,4 +1,4 @@
-r"""Scene in three dimensions as a membrane: triangles of a flat sheet that deform in space, with the thickness as data.
+r"""Scene in three dimensions as a membrane: triangles of a flat sheet that deform, with the thickness as data.
 
 With the columns f1 and f2 of the deformation gradient of the sheet, the deformation gradient of the incompressible
 material is, up to a rotation,

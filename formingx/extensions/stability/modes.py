@@ -1,8 +1,7 @@
 """Unstable modes of a state: their number (inertia), their shapes (inverse iteration), and their critical points.
 
-The second variation K of a mixed formulation, with pressures and Lagrange multipliers, is a saddle-point matrix. In
-K = L D L^T it has one negative pivot for each of them, and one more for each unstable mode (Sylvester's law of
-inertia).
+The second variation K of a mixed formulation, with pressures and Lagrange multipliers, is a saddle-point matrix. K = L
+D L^T has one negative pivot for each of them, and one more for each unstable mode (Sylvester's law of inertia).
 """
 
 from __future__ import annotations
