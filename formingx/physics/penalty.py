@@ -107,7 +107,7 @@ class Law(NormalLaw):
 
     @property
     def sticks(self) -> np.ndarray | bool:
-        """See `ContactLaw.sticks`."""
+        """True, or the mask of shape (n,), for points that never slide."""
         return self.mu >= STICKS
 
     @property

@@ -106,7 +106,11 @@ class Remesh(RunExtension):
         _check(caller, scene, targets)
 
     def attach(self, path: Any) -> None:
-        """Let a path continue with as many meshes as needed (`formingx.run_hooks.RunExtension`)."""
+        """Set up the remeshing of a path (`formingx.run_hooks.RunExtension`).
+
+        Args:
+            path: the path.
+        """
         path.record.hooks.renew = functools.partial(_follow, path, self, path.record.curve.newton.tolerances)
 
 

@@ -32,7 +32,7 @@ SMALL_GAP = 1e-3
 
 
 class LaggedStick(ContactLaw):
-    """The `ContactLaw` of this module.
+    """Contact law of this module.
 
     For a sticking point, `Touch.position` is the sticking position, and `distance` is 0. For a free point they are its
     position at the last accepted state and its distance, below -theta.

@@ -313,13 +313,21 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
 
 
 class InstabilityCondition(RunExtension):
-    """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`."""
+    """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`.
+
+    Args:
+        modes: wave numbers.
+    """
 
     def __init__(self, modes: Any):
         self.modes = modes
 
     def attach(self, path: Any) -> None:
-        """Examine the last state whenever a step of the path is complete."""
+        """Examine the last state whenever a step of the path is complete.
+
+        Args:
+            path: the `Path`.
+        """
         watch, numbers = Watch(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[Kind, int] = {}
 
