@@ -26,7 +26,7 @@ def pressed(friction, travel, **options):
 def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
     """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
     from formingx.extensions.remeshing import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("none"), until=fx.travel(0.6), intermediate=[fx.travel(0.5)], progress=False,
                     remesh=fx.Remesh(size=0.3))
     state, = (s for s in path.states if s.kind == "remesh")
@@ -53,7 +53,7 @@ def test_stages_go_on_where_they_were(monkeypatch):
         travel = state.measures["travel"]
         return (state.kind == "target", travel > 0.4, state.stage == "back" and travel < 0.45, False)[
             state.setting["mesh"]]
-    monkeypatch.setattr(remeshing, "_worn", worn)
+    monkeypatch.setattr(remeshing, "_needs_remeshing", worn)
     scene = block("none")
     plate = scene.contacts[0]
     stages = [fx.Stage("press", control=plate, until=fx.travel(0.3), duration=0.5),
@@ -257,7 +257,7 @@ def axial_stress(path, state):
 def twice(monkeypatch, **after):
     """The mesh is made again once in each of these stages, after these times."""
     from formingx.extensions.remeshing import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
+    monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
                         and state.setting["mesh"] == list(after).index(state.stage))
 
 
@@ -301,7 +301,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
 def test_supports_hold_from_where_they_are(monkeypatch):
     """One that is driven goes on; a hinge holds the mean of its face."""
     from formingx.extensions.remeshing import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.kind == "target")
 
     def both(scene, targets, size):
         options = {"until": targets[1], "intermediate": targets[:1], "progress": False}
@@ -405,7 +405,7 @@ def test_a_deformation_is_carried_to_other_elements():
 def remeshed_at(monkeypatch, travel, n):
     """The path of a stuck block of n x n elements, remeshed once in between by as large ones, and its state then."""
     from formingx.extensions.remeshing import remeshing
-    monkeypatch.setattr(remeshing, "_worn", lambda record, state, remesh: state.kind == "target")
+    monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.kind == "target")
     path = fx.trace(block("stick", elements=(n, n)), until=fx.travel(travel + 0.01), intermediate=[fx.travel(travel)],
                     progress=False, remesh=fx.Remesh(size=1.3 / n, corner=1.3 / n))
     state, = (s for s in path.states if s.kind == "remesh")

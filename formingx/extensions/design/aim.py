@@ -158,16 +158,16 @@ class WallTarget:
     def _stop(self, run: DesignRun) -> str:
         """Return the bounds or the prescribed volume that prevent the wanted wall, predicted by the derivatives."""
         try:
-            left, by = self.residual(run)
+            left, sensitivity = self.residual(run)
         except InputError as error:
             return f"No further step is known: {error}"
         p = run.parameters
         low, high = (p.low - run.vector) / p.size - 1e-12, (p.high - run.vector) / p.size + 1e-12
         m = len(self.wanted) if self.wanted is not None else len(left)
         far = np.full(len(p.size), np.inf)
-        now, step = _deviation(left, by * p.size, m, low, high)
-        free = _deviation(left[:m], by[:m] * p.size, m, low, high)[0] if self.held is not None else now
-        unbounded = _deviation(left, by * p.size, m, -far, far)[0]
+        now, step = _deviation(left, sensitivity * p.size, m, low, high)
+        free = _deviation(left[:m], sensitivity[:m] * p.size, m, low, high)[0] if self.held is not None else now
+        unbounded = _deviation(left, sensitivity * p.size, m, -far, far)[0]
         met = np.minimum(step - low, high - step) <= 1e-6 * (high - low)
         names = ", ".join(name for name, at_bound in zip(p.names, met) if at_bound)
         stops = []

@@ -104,9 +104,9 @@ class Answer:
         Returns:
             The names.
         """
-        by = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
+        jacobian = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
-        return [name for name, d in zip(self.before.parameters.names, abs(by).max(0) / mean) if d < _SCATTER]
+        return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < _SCATTER]
 
     def attainable(self) -> float:
         """Return the lowest unevenness that the parameters can reach within their bounds, for any volume.
@@ -117,9 +117,9 @@ class Answer:
             Standard deviation of the wall over its mean.
         """
         from scipy.optimize import lsq_linear
-        p, v, (wall, by) = self.best.parameters, self.best.vector, self.best.derivative("wall")
-        wall, by, mean = wall[self.inside], by[self.inside] * p.size, wall[self.inside].mean()
-        found = lsq_linear((by - np.outer(wall / mean, by.mean(0))) / mean, 1 - wall / mean,
+        p, v, (wall, jacobian) = self.best.parameters, self.best.vector, self.best.derivative("wall")
+        wall, jacobian, mean = wall[self.inside], jacobian[self.inside] * p.size, wall[self.inside].mean()
+        found = lsq_linear((jacobian - np.outer(wall / mean, jacobian.mean(0))) / mean, 1 - wall / mean,
                            bounds=((p.low - v) / p.size - 1e-12, (p.high - v) / p.size + 1e-12))
         return float(np.sqrt(2 * found.cost / len(wall)))
 

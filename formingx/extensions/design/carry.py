@@ -111,17 +111,17 @@ class _StateTransfer:
         for entry in self.neighbours:
             problem, p = entry.problem, entry.plans[setting.stage]
             now = problem.setting
-            standing = entry.x is not None
-            amplitudes = [0.0] * len(now.base) if not standing else [
+            started = entry.x is not None
+            amplitudes = [0.0] * len(now.base) if not started else [
                 *now.amplitudes(entry.control)[:-1], problem.time_at(entry.control)]
-            x = entry.x if standing else np.zeros(problem.x.getLocalSize())
-            if standing:
+            x = entry.x if started else np.zeros(problem.x.getLocalSize())
+            if started:
                 for number in set(now.inactive) - set(setting.inactive):
                     problem.bring_in(number, x, entry.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
-                time = now.base[-1] + now.rate[-1] * entry.control if standing else 0.0
+                time = now.base[-1] + now.rate[-1] * entry.control if started else 0.0
                 then = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
                 base, rate = straight(amplitudes, problem.scales, p.tables, time, then)
                 entry.then, control = then, 0.0

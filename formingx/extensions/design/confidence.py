@@ -106,8 +106,9 @@ def confidence(run: Any, measured: Any) -> Confidence:
     Raises:
         InputError: the wall has no more points than there are parameters.
     """
-    wall, by = run.derivative(measured.of_path)
-    J, left, size = by / measured.wall[:, None] * run.parameters.size, wall / measured.wall - 1, run.parameters.size
+    wall, jacobian = run.derivative(measured.of_path)
+    left, size = wall / measured.wall - 1, run.parameters.size
+    J = jacobian / measured.wall[:, None] * run.parameters.size
     m, n = J.shape
     if m <= n:
         raise InputError(f"confidence: {m} measured walls for {n} parameters: their scatter is not known; measure more"

@@ -148,19 +148,20 @@ class Design:
         why = f"runs = {most} were used up"
         while len(taken) + len(notes) < most:
             try:
-                left, by = aim.residual(best)
+                left, jacobian = aim.residual(best)
             except InputError as error:
                 if best is first:
                     raise
                 why = str(error)
                 break
-            if not np.any(np.abs(by * size) > 1e-9):
+            if not np.any(np.abs(jacobian * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            damping = aim.damped * np.linalg.norm(by * size, 2) * np.eye(len(size))  # keeps parameters without effect
-            step = lsq_linear(np.vstack([by * size, damping]), np.append(-left, 0 * size), tol=1e-12,
+            # keeps parameters without effect
+            damping = aim.damped * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
+            step = lsq_linear(np.vstack([jacobian * size, damping]), np.append(-left, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
-            gain = np.sqrt(np.mean((by @ step) ** 2))
-            better = 1 - np.sum((left + by @ step) ** 2) / np.sum(left**2)
+            gain = np.sqrt(np.mean((jacobian @ step) ** 2))
+            better = 1 - np.sum((left + jacobian @ step) ** 2) / np.sum(left**2)
             if gain < good or better < SEARCH.worth:
                 why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
                     f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
@@ -223,7 +224,7 @@ class Design:
             return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
         while len(taken) + len(notes) < most:
             try:
-                wall, by = best.derivative("wall")
+                wall, jacobian = best.derivative("wall")
             except InputError as error:
                 if best is first:
                     raise
@@ -232,7 +233,7 @@ class Design:
             grows = best.derivative("volume")[1][0] / first.volume
             n = len(size)
             # a slack variable for the missing wall makes the program feasible
-            rows = np.column_stack([-by[inside] * size, -np.full(inside.sum(), unit)])
+            rows = np.column_stack([-jacobian[inside] * size, -np.full(inside.sum(), unit)])
             room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
                     for a, b, v, s in zip(low, high, best.vector, size)]
             found = linprog(np.append(grows * size, 10.0), A_ub=rows, b_ub=wall[inside] - least,
@@ -246,7 +247,7 @@ class Design:
                 new = self._run(np.clip(best.vector + step, low, high))
                 taken.append(new)
                 if cost(new) < cost(best):
-                    predicted, best, reach = wall + by @ step, new, min(2 * reach, 1.0)
+                    predicted, best, reach = wall + jacobian @ step, new, min(2 * reach, 1.0)
                     continue
             except (InputError, ConvergenceError) as error:
                 notes.append(str(error).splitlines()[0])

@@ -199,10 +199,10 @@ def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
     if not deviations:
         return []
     covariance = covariance_of("report", run.parameters, deviations)
-    wall, by = run.derivative("wall")
+    wall, jacobian = run.derivative("wall")
     thin = int(np.argmin(wall))
-    rows = [(units.label("wall", "mean wall"), wall.mean(), by.mean(0)),
-            (units.label("wall", "minimum wall"), wall[thin], by[thin])]
+    rows = [(units.label("wall", "mean wall"), wall.mean(), jacobian.mean(0)),
+            (units.label("wall", "minimum wall"), wall[thin], jacobian[thin])]
     names = [name for name in run.path.columns if name.endswith(("force", "pressure"))]
     for name in ("volume", *names):
         value, slope = run.derivative(name)

@@ -196,10 +196,10 @@ class DesignRun:
         Raises:
             InputError: as `derivative`.
         """
-        value, by = self.derivative(measure)
+        value, jacobian = self.derivative(measure)
         places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
-        return Effects(name, self.parameters.names, self.parameters.size, places, value, by)
+        return Effects(name, self.parameters.names, self.parameters.size, places, value, jacobian)
 
     def spread(self, deviations: Any, measure: Any = "wall") -> np.ndarray:
         """Return the standard deviation of a quantity, to first order.

@@ -145,17 +145,17 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
     return Band(effects.measure, effects.coordinates, effects.value, deviation, confidence)
 
 
-def deviations(by: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def deviations(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """Return the standard deviations of m values, to first order.
 
     Args:
-        by: derivatives of the values by the n parameters, shape (m, n).
+        jacobian: derivatives of the values by the n parameters, shape (m, n).
         covariance: covariance of the parameters, shape (n, n).
 
     Returns:
         Standard deviations, shape (m,).
     """
-    return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", by, covariance, by), 0.0))
+    return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", jacobian, covariance, jacobian), 0.0))
 
 
 def _unknown(caller: str, name: Any, parameters: Parameters) -> InputError:

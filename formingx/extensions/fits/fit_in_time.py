@@ -110,10 +110,10 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
     else:
         best = _refined(data, _first(material), 1)
         for n in range(2, 11):                  # a branch more while the misfit falls and the data determine all
-            more = _refined(data, _first(material), n)
-            if more[1] > 0.8 * best[1] or data.uncertainty(more[0]).undetermined:
+            larger = _refined(data, _first(material), n)
+            if larger[1] > 0.8 * best[1] or data.uncertainty(larger[0]).undetermined:
                 break
-            best = more
+            best = larger
     found = best[0]
     return found, dict(found.parameters), data.tests, data.uncertainty(found)
 

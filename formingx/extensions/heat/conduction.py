@@ -184,10 +184,10 @@ class Conduction(HeatVectors):
             self._factorise(c, answers, afresh=iteration % 4 == 3)        # a tangent serves the next ones too
             correction = self._solve(left)
             change += correction
-            size, off = self._largest(change), self._largest(correction)
-            if off <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
+            size, last = self._largest(change), self._largest(correction)
+            if last <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
                 return self._finish(T, change, known, c, answers)
-            if not np.isfinite(off):
+            if not np.isfinite(last):
                 break
         raise ConvergenceError("heat: Newton's method did not converge in a step")
 

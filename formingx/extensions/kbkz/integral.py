@@ -158,8 +158,8 @@ class Integral:
         by_I2 = np.stack([C[3] * past[:, 1] + C[1] * past[:, 3], C[3] * past[:, 0] + C[0] * past[:, 3],
                           -2 * (C[3] * past[:, 2] + C[2] * past[:, 3]),
                           C[1] * past[:, 0] + C[0] * past[:, 1] - 2 * C[2] * past[:, 2]], axis=1)
-        by = (W * h1)[:, None] * _COUNT * inverse + (W * h2)[:, None] * by_I2
-        return S, np.einsum("kin,kjn->ijn", inverse, by), T
+        slopes = (W * h1)[:, None] * _COUNT * inverse + (W * h2)[:, None] * by_I2
+        return S, np.einsum("kin,kjn->ijn", inverse, slopes), T
 
     def potential(self, C: Any, held: dict[str, Any], time_step: Any) -> Any:
         """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dC.

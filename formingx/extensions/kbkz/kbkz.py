@@ -76,7 +76,7 @@ class KBKZ(Relaxing):
     stores_energy = False
 
     @classmethod
-    def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **more: Any) -> KBKZ:
+    def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **others: Any) -> KBKZ:
         r"""Return a material from viscosities and relaxation times.
 
         .. math:: G_k = \eta_k / \tau_k
@@ -84,13 +84,13 @@ class KBKZ(Relaxing):
         Args:
             spectrum: list of (viscosity, relaxation time), stress times time and time.
             args: further arguments of the class.
-            more: further arguments of the class.
+            others: further keyword arguments of the class.
 
         Returns:
             The material.
         """
         return cls([(positive("KBKZ: eta", eta) / positive("KBKZ: lambda", time), time) for eta, time in spectrum],
-                   *args, **more)
+                   *args, **others)
 
     @property
     def symmetric(self) -> bool:  # type: ignore[override]  # read only here
@@ -239,8 +239,8 @@ class KBKZ(Relaxing):
         """
         known(f"{self}: rupture_stretch: mode", mode, MODES)
         l = np.geomspace(1, 100, 4000)
-        bears = self._modulus(0.0) * self._strained(mode, l) + self._relaxed_stress(mode, l) * l
-        falls = np.flatnonzero(bears[1:] < bears[:-1])
+        stresses = self._modulus(0.0) * self._strained(mode, l) + self._relaxed_stress(mode, l) * l
+        falls = np.flatnonzero(stresses[1:] < stresses[:-1])
         return float(l[falls[0]]) if len(falls) else np.inf
 
     def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
@@ -274,9 +274,9 @@ class KBKZ(Relaxing):
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
 
     def __str__(self) -> str:
-        more = f", equilibrium={self.equilibrium}" if self._equilibrium is not None else ""
-        more += f", shift={self.parameters['aT']!r}" if "aT" in self.parameters else ""
-        return f"KBKZ({self.spectrum!r}, damping={self.damping}{more}" + ", irreversible=True" * (
+        others = f", equilibrium={self.equilibrium}" if self._equilibrium is not None else ""
+        others += f", shift={self.parameters['aT']!r}" if "aT" in self.parameters else ""
+        return f"KBKZ({self.spectrum!r}, damping={self.damping}{others}" + ", irreversible=True" * (
             self.integral.irreversible) + ")"
 
     __repr__ = __str__

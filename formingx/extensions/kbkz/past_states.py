@@ -187,11 +187,11 @@ class PastStates:
         felt = felt.reshape(len(states), -1)
         length = felt[2:] - felt[:-2]
         share = np.where(length > 0, (felt[1:-1] - felt[:-2]) / np.where(length > 0, length, 1), 0.0)[:, None]
-        off = W[1:-1, None] * (g[1:-1] - (1 - share) * g[:-2] - share * g[2:])
-        off, total = (deviator_squared(entries(C), entries(np.moveaxis(S, -2, 0)))
-                      for S in (off, np.sum(W[:, None] * g, axis=0)))
+        deviation = W[1:-1, None] * (g[1:-1] - (1 - share) * g[:-2] - share * g[2:])
+        deviation, total = (deviator_squared(entries(C), entries(np.moveaxis(S, -2, 0)))
+                      for S in (deviation, np.sum(W[:, None] * g, axis=0)))
         comm = self._forms.comm
-        squares = comm.allreduce(np.array([*np.sum(off, axis=1), np.sum(total)]), MPI.SUM)
+        squares = comm.allreduce(np.array([*np.sum(deviation, axis=1), np.sum(total)]), MPI.SUM)
         jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(felt, axis=0) <= 0, axis=1)]).astype(int),
                               MPI.SUM)                                      # a state that begins or ends one is needed
         small = squares[:-1] < _NOTHING**2 * squares[-1]

@@ -109,6 +109,6 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     with problem.state_context(state):
         edges = outline.edges()
     of, order = {name: outline.mask(name) for name in mesh.boundaries}, outline.ordered("Path.deformed_mesh: size")
-    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    names = [frozenset(name for name, on_boundary in of.items() if on_boundary[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
     return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)

@@ -99,7 +99,7 @@ class ContactState(NamedTuple):
         return self.pairs[k], share[np.arange(len(x)), k]
 
 
-def take_over(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
+def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
     """Transfer the pressure and friction per present area of the old face to a new one.
 
     The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.

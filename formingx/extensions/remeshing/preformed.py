@@ -243,8 +243,8 @@ def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tupl
     """Return V with V^2 = b in the plane, cos and sin of a rotation, and det V, from entries of `Preformed.b`."""
     area = sqrt(rr * zz - rz * rz)
     trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
-    off = rz / trace
-    return [[(rr + area) / trace, off], [off, (zz + area) / trace]], along / length, turned / length, area
+    shear = rz / trace
+    return [[(rr + area) / trace, shear], [shear, (zz + area) / trace]], along / length, turned / length, area
 
 
 def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:

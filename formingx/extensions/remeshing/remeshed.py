@@ -46,9 +46,9 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
         part = edges[np.arange(first, last) % len(edges)]
         points, between = _along(part, corners, size, corner)
-        here = names[first % len(edges)]
-        ends += [outside(points[:1], here | names[first - 1]), outside(points[1:-1], here)]
-        middles.append(outside(between, here))
+        boundaries_of = names[first % len(edges)]
+        ends += [outside(points[:1], boundaries_of | names[first - 1]), outside(points[1:-1], boundaries_of)]
+        middles.append(outside(between, boundaries_of))
         named += [names[first % len(edges)]] * len(between)
     ring, middle = np.concatenate(ends), np.concatenate(middles)
     n = len(ring)

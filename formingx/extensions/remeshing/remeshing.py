@@ -30,7 +30,7 @@ from ...solve.path_following import Run
 from ...solve.record import Record, Segment
 from ...solve.state import State
 from ...solve.stepping import StepControl
-from .contact_transfer import ContactState, take_over
+from .contact_transfer import ContactState, transfer_contact
 from .earlier_meshes import scene_on
 from .preformed import Preformed
 from .remeshed import enclosed, remeshed
@@ -61,7 +61,7 @@ _POCKET = 0.25
 _OWN = "step", "counts", "until", "column"
 """Entries that `Record.complete_step` writes itself."""
 
-_WORN = "the mesh is worn"
+_POOR_MESH = "the mesh is worn"
 """Reason for the end of a run that needs a new mesh."""
 
 
@@ -161,11 +161,11 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
     """
     record = path.record
     record.hooks.on_state.append(lambda state: _look(record, state, remesh))
-    worn = bool(record.states) and _worn(record, record.last, remesh)
+    poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
     failed: list[State] = []
-    while not (worn and done()):
+    while not (poor and done()):
         record.problem.limit.one_by_one()                    # check the mesh at each gap closure
-        if worn:
+        if poor:
             try:
                 _take_up(path, remesh, tolerances)
                 failed = []
@@ -183,9 +183,9 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
             if len(record.segments[-1].states) < _FEWEST or low > 1 - _CHANGED and high < 1 + _CHANGED:
                 raise                                        # the mesh is not the cause
             log.info("a new mesh, as no state was found: %s", error)
-            record.ended = _WORN
-        worn = record.ended == _WORN
-        if not worn:
+            record.ended = _POOR_MESH
+        poor = record.ended == _POOR_MESH
+        if not poor:
             return
     record.ended = ""
 
@@ -253,11 +253,11 @@ def _look(record: Record, state: State, remesh: Remesh) -> None:
             if name and before.get(name):
                 state.jump[what] = state.measures[name] / before[name] - 1
         log.info("a new mesh: %s", state.jump)
-    elif _worn(record, state, remesh):
-        record.ended = _WORN
+    elif _needs_remeshing(record, state, remesh):
+        record.ended = _POOR_MESH
 
 
-def _worn(record: Record, state: State, remesh: Remesh) -> bool:
+def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
     """Return True if the mesh of a state needs renewal."""
     if state.kind in ("start", "remesh"):
         return False
@@ -277,7 +277,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         contacts = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
     touched = [(c.contact.on, w.position[w.touches] + travel) for c, w, travel in contacts]
     order = outline.ordered("remesh")
-    names = [frozenset(name for name, there in of.items() if there[k]) for k in order]
+    names = [frozenset(name for name, on_boundary in of.items() if on_boundary[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
     on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
@@ -297,7 +297,7 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
         problem.clock = state.time
     carry(old, state, problem, x, control, moved=True)
     for new, (_, before, _) in zip(problem.contacts, contacts, strict=True):
-        take_over(new, before, x[: problem.n_owned], control)
+        transfer_contact(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
     x = x if setting.fading else _balanced(problem, curve, x, control)      # else fade the residual, too
     start = curve.resume(x, control)
@@ -345,8 +345,8 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
     on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
     for a, b in zip(on, np.roll(on, -1)):
         between, along = (a + np.arange(1, (b - a) % n)) % n, nodes[b] - nodes[a]
-        by, length = nodes[between] - nodes[a], np.linalg.norm(along)
-        if length > 0 and np.abs(by[:, 0] * along[1] - by[:, 1] * along[0]).max(initial=0.0) < depth * length:
+        offsets, length = nodes[between] - nodes[a], np.linalg.norm(along)
+        if length > 0 and np.abs(offsets[:, 0] * along[1] - offsets[:, 1] * along[0]).max(initial=0.0) < depth * length:
             nodes[between] = nodes[a] + np.linspace(0, 1, len(between) + 2)[1:-1, None] * along
     return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
 

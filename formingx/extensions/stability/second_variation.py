@@ -101,9 +101,9 @@ class SecondVariation:
         self._number.value, self._turned.value = number, m
         self._held = self._find_held(number, flipped)
         own = self._held[self._held < self._own]
-        off, rows = problem.setting.inactive, []
+        not_active, rows = problem.setting.inactive, []
         for number_of_item, row, u in self._means:
-            rows.append((row - m * u) * (number_of_item not in off))
+            rows.append((row - m * u) * (number_of_item not in not_active))
             rows[-1][own] = 0
         self._matrix.constrain([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
         self._rows = rows
@@ -187,9 +187,9 @@ class SecondVariation:
         rows = []
         while rest:
             mode = rest.pop(0)
-            here = int(np.argmax(abs(mode))) if len(mode) else 0
-            parts = self.comm.allgather((float(abs(mode).max(initial=0.0)), first + here,
-                                         [float(entry[here]) if len(mode) else 0.0 for entry in [mode, *rest]]))
+            largest = int(np.argmax(abs(mode))) if len(mode) else 0
+            parts = self.comm.allgather((float(abs(mode).max(initial=0.0)), first + largest,
+                                         [float(entry[largest]) if len(mode) else 0.0 for entry in [mode, *rest]]))
             _, row, (most, *others) = max(parts, key=lambda part: part[0])
             rows.append(row)
             rest = [entry - other / most * mode for entry, other in zip(rest, others, strict=True)]
