@@ -16,7 +16,7 @@ from .carry import Carrier, fitted_shapes, shapes_of
 from .history import Start
 
 
-class Memory(NamedTuple):
+class InternalVariables(NamedTuple):
     """History variables of a material.
 
     Attributes:
@@ -46,7 +46,7 @@ class MaterialHistory:
         flat = [ufl.as_ufl(updated[name])[i] if i else ufl.as_ufl(updated[name])
                 for name, f in terms.internal.items() for i in np.ndindex(f.ufl_shape)]
         self._updated = _compat.compile_expression(ufl.as_vector(flat), terms.places)
-        self._now: Memory | None = None  # the last values put or got, if they are still valid
+        self._now: InternalVariables | None = None  # the last values put or got, if they are still valid
         self.start()
 
     def start(self) -> None:
@@ -76,7 +76,7 @@ class MaterialHistory:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
-    def get(self) -> Memory:
+    def get(self) -> InternalVariables:
         """Return the present internal variables.
 
         Returns:
@@ -84,10 +84,10 @@ class MaterialHistory:
         """
         if self._now is None:
             values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
-            self._now = _unchangeable(Memory(float(self._terms.start.value), values))
+            self._now = _unchangeable(InternalVariables(float(self._terms.start.value), values))
         return self._now
 
-    def put(self, memory: Memory) -> None:
+    def put(self, memory: InternalVariables) -> None:
         """Set the internal variables and the process time.
 
         Args:
@@ -101,7 +101,7 @@ class MaterialHistory:
         self._terms.start.value = memory.time
         self._now = memory
 
-    def save(self, memory: Memory) -> dict[str, Any]:
+    def save(self, memory: InternalVariables) -> dict[str, Any]:
         """Return internal variables as arrays, the same on all ranks; collective.
 
         Args:
@@ -116,7 +116,7 @@ class MaterialHistory:
         return {"time": memory.time, "cells": numbers[order],
                 "values": {name: gathered(comm, v)[order] for name, v in memory.values.items()}}
 
-    def load(self, data: dict[str, Any]) -> Memory:
+    def load(self, data: dict[str, Any]) -> InternalVariables:
         """Return the internal variables of this rank from the result of `save`.
 
         Args:
@@ -138,10 +138,10 @@ class MaterialHistory:
         if set(found) != set(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
                 or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
-        return Memory(float(data["time"]), {name: found[name][rows] for name in self._sizes})
+        return InternalVariables(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
-    def carry(self, source: MaterialHistory, memory: Memory, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
+    def carry(self, source: MaterialHistory, memory: InternalVariables, x: np.ndarray, control: float,
+              mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables of the same material on another mesh; collective.
 
         Args:
@@ -163,7 +163,7 @@ class MaterialHistory:
                 return carrier.fitted(values)
             return fitted_shapes(carrier, values, *(F if shapes[name] > 0 else [
                 np.linalg.inv(f).swapaxes(1, 2) for f in F]))
-        return _unchangeable(Memory(memory.time, {
+        return _unchangeable(InternalVariables(memory.time, {
             name: carried(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])
             for name, v in memory.values.items()}))
 
@@ -189,7 +189,7 @@ class MaterialHistory:
         self._array(name)[self._points(name, cells)] = values
 
 
-def _unchangeable(memory: Memory) -> Memory:
+def _unchangeable(memory: InternalVariables) -> InternalVariables:
     """Make the arrays of history variables read-only."""
     for array in memory.values.values():
         array.setflags(write=False)

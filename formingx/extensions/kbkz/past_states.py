@@ -37,7 +37,7 @@ class Past(NamedTuple):
     C: np.ndarray
 
 
-class Memory(NamedTuple):
+class StoredStates(NamedTuple):
     """History variables of a material with past states.
 
     Attributes:
@@ -80,14 +80,14 @@ class PastStates:
     def start(self) -> None:
         """Store the undeformed state as the only past state."""
         rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
-        self.put(Memory(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
+        self.put(StoredStates(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
         """Reset the motion of the last step, so it predicts nothing of the next one."""
         self._before = 0.0
         self._seen = None
 
-    def get(self) -> Memory:
+    def get(self) -> StoredStates:
         """Return the past states.
 
         Returns:
@@ -95,7 +95,7 @@ class PastStates:
         """
         return self._memory
 
-    def put(self, memory: Memory) -> None:
+    def put(self, memory: StoredStates) -> None:
         """Set the past states.
 
         Args:
@@ -143,10 +143,10 @@ class PastStates:
             chosen = [*range(len(states) - 2), len(states) - 1]             # between two jumps at one instant
         else:
             chosen = self._needed(states, C, least)
-        self.put(Memory(time, tuple(states[k] for k in chosen), least if least is None else least[chosen]))
+        self.put(StoredStates(time, tuple(states[k] for k in chosen), least if least is None else least[chosen]))
 
-    def carry(self, source: PastStates, memory: Memory, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory:
+    def carry(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
+              mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Interpolate the past states on another mesh; collective.
 
         Args:
@@ -166,7 +166,7 @@ class PastStates:
             return carrier.fitted(values.T).T
         states = tuple(Past(fitted(s.felt) if self._aT else s.felt, fitted_shapes(carrier, s.C.T, *F).T)
                        for s in memory.states)
-        return Memory(memory.time, states, None if memory.least is None else fitted(memory.least))
+        return StoredStates(memory.time, states, None if memory.least is None else fitted(memory.least))
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -232,7 +232,7 @@ class PastStates:
         square, point = min(self._forms.comm.allgather(mine))
         return float(np.sqrt(square)), np.array(point)
 
-    def save(self, memory: Memory) -> dict[str, Any]:
+    def save(self, memory: StoredStates) -> dict[str, Any]:
         """Return past states as plain data, the same on all ranks; collective.
 
         Args:
@@ -251,7 +251,7 @@ class PastStates:
         return {"time": memory.time, "cells": numbers[order], "states": states,
                 **({} if memory.least is None else {"least": of_all(memory.least)})}
 
-    def load(self, data: dict[str, Any]) -> Memory:
+    def load(self, data: dict[str, Any]) -> StoredStates:
         """Return the past states of this rank from the result of `save`.
 
         Args:
@@ -276,6 +276,6 @@ class PastStates:
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)
         states = tuple(Past(own(felt)[0] if self._aT else float(felt), own(C)) for felt, C in found)
         least = own(np.array(data["least"], float)) if "least" in data else None
-        return Memory(float(data["time"]), states, least)
+        return StoredStates(float(data["time"]), states, least)
 
 
