@@ -48,7 +48,8 @@ class Comparison:
 
     Attributes:
         columns: compared columns, by our names.
-        ours, theirs: both sides as ordered points, shape (n, columns), in our units.
+        ours: the run as ordered points, shape (n, columns).
+        theirs: the other curve as ordered points, shape (n, columns), in the units of the run.
         line: our curve as compared, shape (m, columns).
         pairs: indices of the compared points of `theirs`, and their partners on our curve, shape (k, columns).
         differences: {column: `Difference`}.

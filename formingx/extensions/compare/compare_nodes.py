@@ -28,8 +28,9 @@ class NodalComparison:
     Attributes:
         nodes: numbers of the n nodes, shape (n,).
         points: reference positions (R, Z), in three dimensions (X, Y), shape (n, 2), our unit of length.
-        ours, theirs: displacements (u_r, u_z), shape (n, 2), in three dimensions (u_x, u_y, u_z), shape (n, 3), our
-            unit of length.
+        ours: displacements (u_r, u_z) of the run, shape (n, 2), in three dimensions (u_x, u_y, u_z), shape (n, 3),
+            length.
+        theirs: displacements of the other program, in the same shape and unit.
         largest: our largest displacement, the scale of the differences.
     """
 

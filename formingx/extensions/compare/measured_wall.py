@@ -30,9 +30,9 @@ class MeasuredWall:
 
     Args:
         wall: thickness, shape (m,), length.
-        length: arc length along the middle line of the part, from the axis, shape (m,), length. Alternatively points:
-            (r, z) on the section, shape (m, 2), length. Or reference_length: positions on the flat sheet (for example
-            of a printed grid), shape (m,), length.
+        length: arc length along the middle line of the part, from the axis, shape (m,), length.
+        reference_length: instead, positions on the flat sheet (for example of a printed grid), shape (m,), length.
+        points: instead, positions (r, z) on the section, shape (m, 2), length.
 
     Raises:
         InputError: not exactly one kind of position, a wall that is not positive, or shapes that do not agree.
@@ -158,7 +158,8 @@ class WallComparison:
     Attributes:
         length: arc lengths of the m points on the computed part, shape (m,), length.
         reference_length: reference arc lengths, shape (m,), length.
-        measured, computed: walls, shape (m,), length.
+        measured: measured walls, shape (m,), length.
+        computed: computed walls, shape (m,), length.
         away: distance of the measured points from the computed middle line, or beyond its end, shape (m,), length.
     """
 

@@ -57,7 +57,8 @@ class Spline:
 
     Attributes:
         start: start values at the knots, shape (k,).
-        low, high: bounds of every value.
+        low: lower bound of every value.
+        high: upper bound of every value.
         smooth: True for a cubic spline, False for straight lines.
         profile: False if the parameter is a single number.
     """
@@ -77,7 +78,8 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     Args:
         knots: number of equidistant knots, at least 2; with `smooth` at least 4.
         start: a number, or one for each knot.
-        low, high: bounds of every knot.
+        low: lower bound of every knot.
+        high: upper bound of every knot.
         smooth: True for a cubic spline through the knots, False for straight lines.
 
     Returns:

@@ -30,7 +30,8 @@ class CriticalPoint:
         found: the located point, see `Located`.
         number: circumferential wave number n, cos(n theta); in plane strain the wave number along the depth, 1/length.
         flipped: name of the symmetry plane under which the mode is antisymmetric, or None.
-        left, right: the neighbouring states of the path.
+        left: state of the path before the point.
+        right: state of the path behind the point.
         state: the state at the critical point, with its output quantities `measures`.
         gained: False if the body is stable again behind this point.
         control: value of the controlled quantity (pressure, travel, time), the user's units.

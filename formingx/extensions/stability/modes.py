@@ -75,7 +75,8 @@ class Located(NamedTuple):
 
     Attributes:
         kind: wave number and symmetry of the mode.
-        left, right: states before and behind the point.
+        left: state before the point.
+        right: state behind the point.
         state: state at the point.
         fraction: position between left (0) and right (1).
         mode: amplitudes (U, W, V) at `nodes` of the second variation, locally owned entries.
