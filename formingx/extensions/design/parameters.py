@@ -76,7 +76,7 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     The function that builds the scene receives it as a function of a length from 0 to 1, see `Knots`.
 
     Args:
-        knots: number of equidistant knots, at least 2; with `smooth` at least 4.
+        knots: number of equidistant knots, 2 or more; with `smooth` 4 or more.
         start: a number, or one for each knot.
         low: lower bound of every knot.
         high: upper bound of every knot.

@@ -44,8 +44,8 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
     .. math:: G'(\omega) = \sum_k G_k \frac{\omega^2 \tau_k^2}{1 + \omega^2 \tau_k^2}, \quad
               G''(\omega) = \sum_k G_k \frac{\omega \tau_k}{1 + \omega^2 \tau_k^2}
 
-    The times are in geometric progression; the moduli, none negative, make the sum of the squared relative misfits
-    least (Lawson and Hanson 1974). Times whose modulus is zero are left out.
+    The times are in geometric progression. The nonnegative moduli minimise the sum of the squared relative misfits
+    (Lawson and Hanson 1974). Times with a zero modulus are left out.
 
     Args:
         frequencies: angular frequencies, 1/time, shape (n,).

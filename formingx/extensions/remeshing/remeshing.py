@@ -72,7 +72,7 @@ class Remesh(RunExtension):
     Args:
         size: edge length of the elements on the deformed body, length.
         corner: edge length where faces under tools meet and where contact ends, length; default a third of `size`.
-        volume_ratio: (least, largest) volume ratio J at the quadrature points of a good mesh, for an incompressible
+        volume_ratio: (smallest, largest) volume ratio J at the quadrature points of a good mesh, for an incompressible
             material.
 
     Raises:
