@@ -5,8 +5,8 @@ import pytest
 
 import formingx as fx
 from formingx.contact.increment import Increment
-from formingx.physics.penalty import Law
 from formingx.physics.contact_law import NormalLaw, Touch
+from formingx.physics.penalty import Law
 from formingx.problem.problem import Problem
 
 tools = fx.tools

@@ -257,7 +257,8 @@ def axial_stress(path, state):
 def twice(monkeypatch, **after):
     """The mesh is made again once in each of these stages, after these times."""
     from formingx.extensions.remeshing import remeshing
-    monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
+    monkeypatch.setattr(remeshing, "_needs_remeshing",
+                        lambda record, state, remesh: state.time > after.get(state.stage, 1e9)
                         and state.setting["mesh"] == list(after).index(state.stage))
 
 
