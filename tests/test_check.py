@@ -11,7 +11,9 @@ from scipy.optimize import brentq
 
 import formingx as fx
 from formingx.checks import parallel
+from formingx.checks.expected_stretch import expected_stretches
 from formingx.checks.scripts import check_script
+from formingx.checks.sizes import Body
 from formingx.materials.inflation import Inflated, first_peak
 from formingx.problem.problem import Problem
 
@@ -374,3 +376,12 @@ def test_ranks_that_save_no_time_are_noted():
     lines = run_script(FEW, ranks=2).splitlines()
     assert len(lines) == 4 and sum("0 no fault" in line for line in lines) == 2
     assert sum("1 note: ranks: 2 ranks for " in line for line in lines) == 2
+
+
+def test_expected_stretch_in_a_conical_mould():
+    """The root of the areal draw ratio: a floor of half the radius, and a wall at 45 degrees."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", fx.tools.cup(radius=10.0, depth=5.0, mouth=0.5, draft=45.0), "none")])
+    (_, stretch), = expected_stretches(Body(scene, [], [], fx.Units()))
+    assert stretch == pytest.approx(np.sqrt((5**2 + (5 + 10) * np.hypot(5, 5)) / 10**2), rel=1e-6)

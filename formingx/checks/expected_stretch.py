@@ -22,7 +22,7 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
             if (stretch := _of_cap(target, face.radius)) is not None:
                 yield str(target), stretch
         if face.tools:
-            points, ends = face.ways
+            points, ends = face.mould_points
             if np.all(np.isfinite(ends)) and len(ends) > 1:
                 yield repr(face.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
 
