@@ -63,7 +63,10 @@ def _shift(material: Any, temperature: float) -> float:
 
 
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
-    """Return the rows (quantity, value) of the card at one temperature."""
+    """Return rows (quantity, value) for the summary of a material at one temperature: moduli and limits of stretch.
+
+    shift: factor of the relaxation times at this temperature.
+    """
     def said(value: float, of: str = "") -> str:
         return f"{value:.4g} {of}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []

@@ -73,10 +73,10 @@ class Varying(ABC):
 
 
 class OfPosition(Varying):
-    """Constant that is a function f(R, Z) of the reference position, with arrays of shape (n,).
+    """Material constant that varies in space, as a function f(R, Z) of the reference coordinates.
 
     Args:
-        function: the function f.
+        function: f, of two arrays of shape (n,), length; it returns the constant at these n points, shape (n,).
     """
 
     def __init__(self, function: Callable):

@@ -35,7 +35,9 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Return the `Place` of a point; collective.
+    """Describe the place of a point in words of the mesh: its layer, its nearest boundary, the distance from there.
+
+    Collective.
 
     Args:
         mesh: the mesh.

@@ -97,13 +97,13 @@ def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndar
 
 
 def strains(values: np.ndarray) -> str:
-    """Return the question whether stretches were meant as strains, or "" if they cannot be.
+    """Return a hint for an error message: whether strains were given for stretches; "" if the values are no strains.
 
     Args:
-        values: stretches of a test.
+        values: given stretches of a test, shape (n,), dimensionless.
 
     Returns:
-        The text.
+        The hint.
     """
     if not np.all(np.isfinite(values)) or np.min(values) > 0 and np.max(values) > 1 or np.min(values) <= -1:
         return ""

@@ -59,7 +59,7 @@ def layers_needed(biot: float) -> int:
 
 
 def _share(biot: float) -> float:
-    """Return the error at a Biot number over the error at an infinite one."""
+    """Return the error of the temperature by coarse layers at a Biot number over the error at an infinite one."""
     return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
 
 

@@ -38,7 +38,7 @@ class HeatVectors:
     _mass_form: Any
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a number in a form that can be changed without recompiling the form.
+        """Return a number for use in forms; a new value does not compile the forms again.
 
         Args:
             value: initial value.
@@ -105,7 +105,7 @@ class HeatVectors:
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Return R(T) without contact, locally owned entries; leaves T in `T`."""
+        """Return the residual R(T) of heat conduction without contact, locally owned entries; set `self.T` to T."""
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power

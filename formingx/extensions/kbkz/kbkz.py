@@ -256,7 +256,7 @@ class KBKZ(Relaxing):
         return float(rested + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
 
     def _ages(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return the ages between which the integrand is smooth, rising from 0."""
+        """Return ascending elapsed times t - t', from 0, between which the memory integral's integrand is smooth."""
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANELS)) + 1)
         ages = [np.array([0, whole]), shortest / 2 * _PANELS ** np.arange(count), times[-1] - times]

@@ -84,7 +84,7 @@ class SolidTool:
         return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
+        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
         raise NotImplementedError
 
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +128,7 @@ class Swept(SolidTool):
         return Near(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
-        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
+        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
         return self.profile.signed_distance(np.column_stack([self._across(x)[0], x[:, 2]]))
 
     def _across(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -231,7 +231,7 @@ class Triangulated(SolidTool):
         self.middle = points.mean(0)
 
     def _distance(self, x):
-        """Return the signed distance of points of the unmoved tool, shape (n,), length."""
+        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
         from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkDoubleArray
         if not self._implicit:

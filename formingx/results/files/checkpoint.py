@@ -262,7 +262,7 @@ def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
-    """Return the locally owned unknowns from the result of `_by_cell`."""
+    """Return the locally owned unknowns, (n,), from the unknowns of each cell, (cells, unknowns per cell)."""
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]

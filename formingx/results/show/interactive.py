@@ -203,7 +203,10 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return curves of the final wall over height and over arc length, in total and of each layer."""
+    """Return two charts of the final wall thickness, over height and over arc length, whole and of each layer.
+
+    A chart is None if no record has a profile.
+    """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
     for record, name in zip(records, names):
