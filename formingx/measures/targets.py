@@ -1,4 +1,4 @@
-"""Targets of a run: pole height, stretch, volume, pressure, travel, time."""
+"""Targets of a run, such as a pole height, a stretch, a volume, a pressure, a travel or a time."""
 
 from typing import Any, NamedTuple
 
@@ -14,13 +14,13 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 
 
 class Amplitude(Bound):
-    """Amplitude of an item, given by its number in the scene; -1 for the process time, None for the control.
+    """Amplitude of an item of the scene, of the process time or of the control, as an output quantity.
 
-    For a load it is the active part of the amplitude, 0 while a stage makes the load inactive.
+    For a load that a stage deactivates or activates, it is the part of the amplitude that acts on the body.
 
     Args:
         problem: the `Problem`.
-        number: number of the item.
+        number: number of the item in the scene; -1 for the process time, None for the control.
     """
 
     def __init__(self, problem: Any, number: int | None):
@@ -31,16 +31,16 @@ class Amplitude(Bound):
 
     @property
     def of_load(self) -> bool:
-        """True for a load, such as a pressure."""
+        """True if the item is a load, such as a pressure."""
         return self._acts
 
     @property
     def moves(self) -> bool:
-        """True if the control changes the amplitude in the present stage."""
+        """True if the amplitude changes with the control in the present stage."""
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return the dimensionless amplitude at a control."""
+        """Return the dimensionless amplitude of the item at a value of the control; for number -1, the process time."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -49,14 +49,16 @@ class Amplitude(Bound):
         return (setting.acting if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
+        """Return the amplitude of the item at a value of the control, in the user's units; `x` has no influence."""
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
+        """Return the constraint "amplitude = target", linear in the control; `target` is in the user's units."""
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
-        if self._acts and setting.fading:                    # it leaves or comes in as the control goes from 0 to 1
+        if self._acts and setting.fading:                    # the load fades, or grows, as the control goes to 1
             slope = self._amplitude(1.0) - self._amplitude(0.0)
-        base = self._amplitude(0.0)                          # taken off first: of a short ramp in time no digit is lost
+        base = self._amplitude(0.0)                          # subtracted first: a short ramp in time loses no digits
 
         def c(x, control, gradient):
             gradient.set(0)
@@ -65,12 +67,12 @@ class Amplitude(Bound):
 
 
 class Target(NamedTuple):
-    """Target of a run.
+    """Target of a run: an output quantity and the value that it is to reach.
 
     Attributes:
         name: name of the output quantity.
         value: its target value, in the user's units.
-        bind: function that returns the `Bound` quantity of a problem.
+        bind: function that takes a `Problem` and returns the output quantity of this problem (`Bound`).
         signed: True if the quantity changes sign with the control.
     """
 
@@ -130,7 +132,9 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """Return the target that the change of the scene between two stages is complete (`StepData.fading`).
+    """Return the target that the change of the active items between two stages is complete (`StepData.fading`).
+
+    Meanwhile the control goes from 0 to 1, and the unbalanced forces fade to zero.
 
     Returns:
         The target.
@@ -139,7 +143,16 @@ def changed() -> Target:
 
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
-    """Return the target of a controlled quantity."""
+    """Return the target of a controlled quantity.
+
+    Args:
+        quantity: "pressure" or "travel".
+        value: the target value, in the user's units.
+        of: name of the item; None for the item that is controlled.
+
+    Returns:
+        The target. Its `bind` raises an InputError if the scene has no such item, or several of them.
+    """
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
         found = [i for i, t in enumerate(scene.items)
@@ -157,10 +170,12 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
 
 
 def pole_height(value: float) -> Target:
-    """Return the target that u_z of the mid-thickness point on the axis reaches a value.
+    """Return the target that the axial displacement u_z of the pole reaches a value.
+
+    The pole is the material point on the axis at mid-thickness in the reference configuration.
 
     Args:
-        value: the height, length.
+        value: the displacement, length.
 
     Returns:
         The target.
@@ -172,13 +187,15 @@ def pole_height(value: float) -> Target:
 
 
 def pole_stretch(value: float) -> Target:
-    r"""Return the target that the stretch at the pole reaches a value.
+    r"""Return the target that the in-plane stretch of the sheet at the pole, on the axis, reaches a value.
 
-    It is computed from the thickness h; in plane strain the sheet is stretched in one direction only:
+    The stretch is computed from the thickness h on the axis. In plane strain the sheet is stretched in one direction
+    only:
 
     .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
 
-    A run raises an InputError if a material of the scene cannot reach the stretch (Gent, Arruda-Boyce).
+    In a membrane it is 1 + du_r/dR. A run raises an InputError if a material of the scene cannot reach the stretch
+    (Gent, Arruda-Boyce).
 
     Args:
         value: the stretch, positive.
@@ -193,10 +210,10 @@ def pole_stretch(value: float) -> Target:
 
 
 def enclosed_volume(value: float) -> Target:
-    """Return the target that the volume swept by the loaded face reaches a value.
+    """Return the target that the volume swept by the face under the controlled pressure reaches a value.
 
     The volume lies between the reference and the deformed face; straight lines close it where an end of the face has
-    moved. Where a half or a quarter is modelled it belongs to the whole part (`Scene.symmetry_factor`).
+    moved. Where a half or a quarter is modelled, the value is the volume of the whole part (`Scene.symmetry_factor`).
 
     Args:
         value: the volume, length^3; in plane strain per unit depth, length^2.
@@ -254,26 +271,31 @@ def sag(value: float) -> Target:
 
 
 def bind_pole_height(problem: Any) -> Bound:
-    """Return the pole height of a problem as an output quantity.
+    """Return the axial displacement u_z of the pole of a problem as an output quantity.
+
+    The pole is the material point on the axis at mid-thickness in the reference configuration.
 
     Args:
         problem: the `Problem`.
 
     Returns:
-        The quantity.
+        The quantity, length.
     """
     low, high = _pole(problem)
     return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
 
 
 def bind_pole_stretch(problem: Any) -> Bound:
-    """Return the pole stretch of a problem as an output quantity.
+    """Return the in-plane stretch of the sheet on the axis, at the pole, as an output quantity.
+
+    In a solid the stretch follows from the thickness on the axis, by incompressibility. In a membrane it is 1 +
+    du_r/dR, on the mid-surface. On a remeshed body the thickness counts from the first mesh.
 
     Args:
         problem: the `Problem`.
 
     Returns:
-        The quantity.
+        The quantity, dimensionless.
     """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
@@ -283,19 +305,24 @@ def bind_pole_stretch(problem: Any) -> Bound:
 
 
 def bind_volume(problem: Any) -> Bound:
-    """Return the enclosed volume of a problem as an output quantity.
+    """Return the volume swept by the face under the controlled pressure as an output quantity.
+
+    It is the volume of the whole part, also where only a half or a quarter is modelled.
 
     Args:
         problem: the `Problem`.
 
     Returns:
-        The quantity.
+        The quantity, length^3; in plane strain per unit depth, length^2.
     """
     return OfWholePart(_volume(problem), problem.scene.symmetry_factor)
 
 
 def _volume(problem: Any) -> Bound:
-    """Return the volume swept by the modelled part as an output quantity."""
+    """Return the volume swept by the loaded face of the modelled part as an output quantity.
+
+    On a remeshed body it includes the volume that the face swept on the meshes before.
+    """
     so_far = 0.0
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
@@ -305,21 +332,22 @@ def _volume(problem: Any) -> Bound:
 
 
 def _unit_of_volume(forms: Any) -> float:
-    """Return length^3, or length^2 per unit depth, in the user's units."""
+    """Return the unit of the dimensionless volume: length^3, or in plane strain length^2 per unit depth, in the
+    user's units."""
     return forms.length**forms.scene.kinematics.dimension_of_volume
 
 
 def swept_volume(problem: Any) -> Any:
-    """Return the scalar form of the volume that the modelled part sweeps, over the unit of volume.
+    """Return the scalar form of the volume swept by the loaded face of the modelled part, over the unit of volume.
 
-    It is minus the integral of u . n da over the loaded face. The face moves from X to X + u. The area vector of
-    X + t u is of degree 2 in t (axisymmetric), so the two-point Gauss rule in t is exact.
+    The volume is minus the integral of u . n da over the face, which moves from X to X + u. The area vector of X + t u
+    is of degree 2 in t (axisymmetric), so the two-point Gauss rule in t is exact.
 
     Args:
         problem: the `Problem`.
 
     Returns:
-        The form (UFL, rank 0).
+        The form (UFL, rank 0), dimensionless.
 
     Raises:
         InputError: no controlled pressure with a face.
@@ -335,14 +363,27 @@ def swept_volume(problem: Any) -> Any:
 
 
 def _displacement(problem, points, factors):
-    """Return a weighted sum of displacements of points as an output quantity."""
+    """Return a weighted sum of the displacements of reference points as an output quantity.
+
+    Args:
+        problem: the `Problem`.
+        points: reference positions, shape (n, 2), length.
+        factors: weights of the displacement components, shape (n, components).
+
+    Returns:
+        The quantity, length.
+    """
     found = probe(problem, points)
     return Linear(problem, found.row(np.asarray(factors)) * problem.forms.length,
                    float(np.sum(factors * found.so_far)))
 
 
 def _pole(problem):
-    """Return Z of the bottom and of the top of the axis on the first mesh, length."""
+    """Return the axial coordinates Z of the bottom and of the top of the body on the axis, on the first mesh, length.
+
+    Raises:
+        InputError: the mesh has no boundary named "axis".
+    """
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"
@@ -352,14 +393,14 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    """Check whether a value equals a target to round-off.
+    """Check whether the value of an output quantity equals its target to round-off (1e-12, relative).
 
     Args:
         target: the target.
-        size: scale of the quantity, see `Bound`.
-        value: the value.
+        size: scale of the quantity, in the user's units (`Bound.size`).
+        value: value of the quantity, in the user's units.
 
     Returns:
-        True if it does.
+        True if the value equals the target.
     """
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

@@ -1,4 +1,4 @@
-"""Points between two states of a path at which another path branches off."""
+"""Branch points: pairs of neighbouring states of a path between which another path branches off."""
 
 from __future__ import annotations
 
@@ -14,15 +14,23 @@ log = logging.getLogger("formingx")
 
 ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not a limit point), and a real body may"
                 " follow it: path.stability([0]) finds where, and its mode")
-"""Warning, with the descriptions of two neighbouring states."""
+"""Format of a warning; its arguments are the descriptions of two neighbouring states."""
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return the neighbours between which the determinant of the tangent changes its sign without a limit point.
+    """Return the pairs of neighbouring states between which another path branches off.
 
-    The signs are stored in the states (`State.orientation`). States at fixed control carry none: two
-    factorisations for each stretch between limit points, which miss an even number of changes. With a history no other
-    path begins: none. Collective.
+    Between such states the determinant of the tangent changes its sign, and the control has no limit point. The sign at
+    a state is known from `State.orientation`. States solved for at fixed control have no orientation: two
+    factorisations for each piece between limit points then show whether the sign changed. They miss an even number of
+    changes. A problem with a history has no other path, and the list is empty. Collective.
+
+    Args:
+        curve: solver of the path.
+        states: the states of the path, in order.
+
+    Returns:
+        Pairs (state before the branch point, state after it).
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -32,7 +40,17 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
 
 
 def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Return the neighbours between which another path begins; `sign` is needed for states without orientation."""
+    """Return the pairs of neighbouring states between which another path branches off.
+
+    Args:
+        curve: solver of the path.
+        states: the states of the path, in order.
+        sign: function that returns the sign of the determinant of the tangent at a state, such as `determinant_sign`
+            makes. It is called only if no state has an orientation.
+
+    Returns:
+        Pairs (state before the branch point, state after it).
+    """
     if any(state.orientation for state in states):
         return _turns(curve, states)
     if curve.problem.has_history:
@@ -41,16 +59,22 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def warn_of_branches(record: Any, step: Sequence[State]) -> None:
-    """Warn where another path branches off within a step: the state that it began with and those that it added."""
+    """Log a warning for each branch point within a step.
+
+    Args:
+        record: record of the run (`Record`).
+        step: the state from which the step began, and the states that the step added.
+    """
     for before, behind in _turns(record.curve, step):
         log.warning(ANOTHER_PATH, record.describe(before), record.describe(behind))
 
 
 def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return neighbours whose orientations differ.
+    """Return the pairs of neighbouring states whose orientations differ: another path branches off between them.
 
-    Limit points are left out, since the sign there is round-off. So are pairs across a jump or the start of a stage.
-    Where a run turned back at a state, the orientation turns with it.
+    Limit points are left out, since the sign of the determinant there is round-off. So are pairs across a jump or
+    across the start of a stage. Where a run reversed its direction along the path, the orientation changes its sign
+    without a branch point.
     """
     found = []
     last: State | None = None
@@ -68,7 +92,15 @@ def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
 
 
 def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
-    """Return the sign of the determinant of the tangent at a state, 0 if it has no factors."""
+    """Return a function that gives the sign of the determinant of the tangent at a state.
+
+    Args:
+        curve: solver of the path.
+        solver: solver that factorises the tangent of the problem and computes its determinant.
+
+    Returns:
+        Function of a `State` with the value 1 or -1; 0 if the tangent could not be factorised.
+    """
     problem = curve.problem
 
     def sign(state: State) -> int:
@@ -79,7 +111,10 @@ def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], in
 
 
 def _changes(states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Neighbours between which the sign of the determinant changed though the control has no limit point there."""
+    """Return the pairs of neighbouring states between which the determinant changes its sign without a limit point.
+
+    `sign` returns the sign of the determinant at a state. Bisection finds one pair in each piece between limit points.
+    """
     pieces: list[list[State]] = [[]]
     for state in states:
         if state.kind == "limit point":

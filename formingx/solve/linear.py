@@ -1,4 +1,4 @@
-"""A direct solver for a matrix that is refilled and factorised many times."""
+"""Direct solver for a matrix whose entries change and that is factorised many times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: automatic choice; t
 
 
 def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
-    """Make `ksp` a single LU (LDL^T if symmetric) of the matrix by MUMPS."""
+    """Set a PETSc solver to one direct solution with the matrix by MUMPS: LU factors, or LDL^T if it is symmetric."""
     ksp.setOperators(matrix)
     ksp.setType("preonly")
     pc = ksp.getPC()
@@ -22,21 +22,35 @@ def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
 
 
 class DirectSolver:
-    """Factorise, then solve as often as needed."""
+    """Direct solver by MUMPS: factorise a matrix once, then solve for many right-hand sides.
+
+    Args:
+        matrix: the matrix; `factorise` uses its present entries.
+        symmetric: True for LDL^T factors, False for LU factors.
+        determinant: compute the determinant with each factorisation (`sign`).
+        inertia: count the negative pivots with each factorisation (`negative_pivots`).
+
+    Attributes:
+        count: number of factorisations so far.
+    """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False, inertia: bool = False):
         self._matrix, self._symmetric, self._determinant, self._inertia = matrix, symmetric, determinant, inertia
         self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
         self._scaled = False                                # there are factors, and a scaling with them
         self.count = 0                                      # factorisations
-        self._keeps = matrix.comm.size == 1                 # MUMPS can keep it
+        self._keeps = matrix.comm.size == 1                 # MUMPS can keep a scaling
         self._create()
 
     def factorise(self, rescale: bool = True) -> bool:
-        """Factorise the matrix as it is now; False if it is singular to working precision.
+        """Factorise the matrix with its present entries.
 
-        rescale: False keeps the scaling of rows and columns of the factorisation before, if there was one: to find
-        one takes MUMPS a fifth of the time. (On several ranks it cannot keep one.)
+        Args:
+            rescale: False keeps the scaling of rows and columns from the last factorisation, if there was one. A new
+                scaling takes MUMPS a fifth of the time. On several ranks MUMPS cannot keep a scaling.
+
+        Returns:
+            False if the matrix is singular to working precision.
         """
         self.count += 1
         keep = self._keeps and self._scaled and not rescale
@@ -57,33 +71,48 @@ class DirectSolver:
 
     @property
     def scaling(self) -> int:
-        """Scaling of the matrix by MUMPS in the last factorisation: ICNTL(8), -1 as the one before."""
+        """Scaling by MUMPS in the last factorisation: its ICNTL(8), -1 if the scaling of the factorisation before
+        was kept."""
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(33))
 
     def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
-        """out = matrix^-1 rhs."""
+        """Solve K x = rhs with the last factors of the matrix K; `out` receives x."""
         self._ksp.solve(rhs, out)
 
     def solve_all(self, rhs: Array) -> Array:
-        """matrix^-1 of columns, all at once, which takes a fraction of the time; locally owned rows, shape (n, m)."""
+        """Return the solutions for several right-hand sides, which together take a fraction of the time of single ones.
+
+        Args:
+            rhs: the right-hand sides as columns, locally owned rows, shape (n, m).
+
+        Returns:
+            The solutions as columns, locally owned rows, shape (n, m).
+        """
         given, found = self._dense(*rhs.shape)
         given.getDenseArray()[:] = rhs
         self._ksp.getPC().getFactorMatrix().matSolve(given, found)
         return found.getDenseArray().copy()
 
     def solve_transposed(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
-        """out = matrix^-T rhs."""
+        """Solve K^T x = rhs with the last factors of the matrix K; `out` receives x."""
         self._ksp.solveTranspose(rhs, out)
 
     def sign(self) -> int:
-        """Sign of the determinant of the last factorisation (with `determinant`), 1 or -1, the same on all ranks."""
+        """Return the sign of the determinant of the matrix last factorised, 1 or -1, the same on all ranks.
+
+        The solver must have been made with `determinant`.
+        """
         return int(np.sign(self._ksp.getPC().getFactorMatrix().getMumpsRinfog(12)))
 
     def negative_pivots(self) -> int:
-        """Return the number of negative pivots of D in L D L^T, all ranks (with `inertia`, of a symmetric matrix)."""
+        """Return the number of negative pivots of D in the last factors L D L^T, over all ranks.
+
+        The solver must have been made with `inertia`, for a symmetric matrix.
+        """
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(12))
 
     def _create(self) -> None:
+        """Create the PETSc solver, without factors."""
         self._ksp = PETSc.KSP().create(self._matrix.comm)
         configure(self._ksp, self._matrix, self._symmetric)
         if self._determinant:
@@ -92,7 +121,10 @@ class DirectSolver:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
-        """Return two matrices of n locally owned rows and m columns; those of the last call if they have m columns."""
+        """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
+
+        The matrices of the last call are used again if they have m columns.
+        """
         if not self._columns or self._columns[0].getSize()[1] != m:
             self._forget()
             for _ in range(2):
@@ -102,6 +134,7 @@ class DirectSolver:
         return self._columns
 
     def _forget(self) -> None:
+        """Destroy the dense matrices."""
         while self._columns:
             self._columns.pop().destroy()
 
@@ -112,9 +145,17 @@ class DirectSolver:
 
 
 def condition(matrix: PETSc.Mat, solver: DirectSolver) -> float:
-    """|A|_1 |A^-1|_1 of a factorised matrix, the second norm estimated (Hager 1984; Higham 1988): a lower bound.
+    """Return a lower bound of the condition number in the 1-norm, |A|_1 |A^-1|_1, of a factorised matrix.
 
-    (MUMPS' own analysis is not there for matrices on several ranks.)
+    The norm of the inverse is estimated (Hager 1984; Higham 1988). MUMPS' own error analysis is not available for
+    matrices on several ranks.
+
+    Args:
+        matrix: the matrix A.
+        solver: solver with the factors of A.
+
+    Returns:
+        The bound, dimensionless.
     """
     v, y, x = (matrix.createVecRight() for _ in range(3))
     first, last = x.getOwnershipRange()

@@ -1,4 +1,4 @@
-"""States predicted from those before: in time by Lagrange's polynomial, along a smooth path by a parabola."""
+"""Prediction of a state from earlier ones: in time by Lagrange's polynomial, along a smooth path by a parabola."""
 
 from __future__ import annotations
 
@@ -13,9 +13,16 @@ CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a
 
 
 def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """Return the last states, at most `most`, to extrapolate to a time: in order, from the last jump on.
+    """Return the last states that are suitable for an extrapolation to a later time, in order.
 
-    States closer in time than the part `close` of the step ahead are left out, since their errors would be magnified.
+    Args:
+        states: the accepted states, in order.
+        time: the later time.
+        most: largest number of states to return.
+        close: states closer in time than this part of the step to `time` are left out, since they would magnify errors.
+
+    Returns:
+        At most `most` states, none of them before the last jump.
     """
     found: list[State] = []
     for state in reversed(states):
@@ -27,10 +34,17 @@ def before(states: Sequence[State], time: float, most: int, close: float = 0.1) 
 
 
 def behind(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
-    """Return an earlier state that gives, with the last one and its tangent, a parabola for a step of a length;
-    None: none.
+    """Return an earlier state that gives, with the last state and its tangent, a parabola as predictor of a step.
 
-    It is one of the last few, at least half the step away, with no jump since.
+    It is one of the last few states, at least half the step away from the last one, and no jump lies between them.
+
+    Args:
+        states: the accepted states, in order.
+        length: arc length of the step.
+        distance: function that returns the arc length between two states.
+
+    Returns:
+        The earlier state, or None if no state is suitable.
     """
     for before, after in zip(states[-2:-6:-1], states[:-6:-1]):
         if after.kind == "jump":
@@ -41,7 +55,15 @@ def behind(states: Sequence[State], length: float, distance: Callable[[State, St
 
 
 def weights(states: Sequence[State], time: float) -> Array:
-    """Return the weight of each state, with growing times, in the value at a time; shape (states,)."""
+    """Return the weights of states in Lagrange's polynomial at a time.
+
+    Args:
+        states: states with increasing times.
+        time: the time at which the polynomial is evaluated.
+
+    Returns:
+        Weights, shape (states,), dimensionless.
+    """
     t = np.array([state.time for state in states])
     apart, ahead = t[:, None] - t, np.tile(time - t, (len(t), 1))
     np.fill_diagonal(apart, 1.0)

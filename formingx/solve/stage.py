@@ -1,4 +1,4 @@
-"""A stage of a process as the user declares it, and by the numbers of the items of a scene."""
+"""A stage of a process as the user declares it, and the same stage with items given by their numbers in the scene."""
 
 from __future__ import annotations
 
@@ -17,34 +17,35 @@ from .stepping import StepControl
 _OF_CONTROL = ("pressure", "travel")
 
 AT_LIMIT_POINT = (None, "continue", "snap_through", "stop")
-"""What a run may do where its control has a limit point."""
+"""Rules for a run whose control reaches a limit point; None: the default of `formingx.trace`."""
 
 
 class Stage:
     """One stage of a process: a control with its target, prescribed amplitudes, or only a change of the active items.
 
     Args:
-        name: of the stage, in the record.
+        name: name of the stage in the record of the run.
         control: the load, support or contact whose amplitude the stage varies, itself or its name.
         until: the target that ends the stage, met exactly, from either side, such as `travel(6.0)`. A travel counts
-            from the reference configuration. With `amplitudes` it is a `process_time`, or None: the end of the tables.
-            With a `duration` and no control it ends the wait early, such as `sag(30.0)`.
-        intermediate: more targets to meet exactly on the way; targets that are not met are left out.
+            from the reference configuration. With `amplitudes` it is a `process_time`, or None for the end of the
+            tables. With a `duration` and no control it ends the stage early, such as `sag(30.0)`.
+        intermediate: further targets to meet exactly during the stage; targets that are not met are left out.
         inactive: items that are absent during the stage, themselves or their names: an open support, a tool that is
-            away, a load that is off. A support constrains the body where it is when it returns. A load returns with its
-            value; its column is 0 while it is absent.
+            away, a load that is off. A support that becomes active again constrains the body at its present position. A
+            load returns with its value; its column is 0 while it is absent.
         amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
             units; the last value stays. A table that begins later than the stage is reached in a straight line from the
-            present value. With `control`, instead of an item, a function that makes targets, such as
-            `enclosed_volume`: then the control is adjusted so that this quantity follows the table. The table may be a
+            present value. With `control`, the key is not an item but a function that makes targets, such as
+            `enclosed_volume`. The control is then adjusted so that this quantity follows the table. The table may be a
             function of time; then `until` is the `process_time` of its end.
-        speed: of the control (its unit per time), greater than 0: process time passes while it moves.
-        duration: process time of the stage: on the way to a target of the control, or while nothing moves.
+        speed: rate of the control (its unit per time), greater than 0: process time passes while the control changes.
+        duration: process time that the stage takes: until the target of the control is met, or while nothing is
+            controlled.
         constant: with `control` and `duration`: a target, such as `force(2.0)`, that stays met, since the control is
             adjusted. Process time is 0 at first. It passes in stages with a table, a speed or a duration; others are
             instantaneous.
-        step: step control of this stage; default that of the run.
-        at_limit_point: see `formingx.trace`.
+        step: step control of this stage; default: the step control of the run.
+        at_limit_point: rule where the control has a limit point, one of `AT_LIMIT_POINT`, as in `formingx.trace`.
 
     Raises:
         InputError: no target, both `control` and `amplitudes`, a table that goes back in time, an argument not allowed.
@@ -84,22 +85,31 @@ class Stage:
 
     @property
     def timed(self) -> bool:
-        """True if time goes by."""
+        """True if process time passes during the stage."""
         return bool(self.tables or self.flow or self.speed or self.duration)
 
     @property
     def waits(self) -> bool:
-        """True if the stage ends when `until` is met while time passes and nothing is controlled."""
+        """True if the stage controls nothing, lets time pass and ends when the target `until` is met."""
         return self.until is not None and self.control is None and not self.tables
 
     @property
     def highest(self) -> Target | None:
-        """Target with the largest value, of a flow along a table."""
+        """Target with the largest value in the table that the controlled quantity follows; None if there is no such
+        table."""
         if self.flow is None or callable(self.flow[1]):
             return None
         return self.flow[0](float(np.max(self.flow[1][:, 1])))
 
     def _check(self, amplitudes: Any) -> None:
+        """Check that the arguments of the stage go together.
+
+        Args:
+            amplitudes: the argument `amplitudes` as the user gave it, or None.
+
+        Raises:
+            InputError: the arguments contradict each other, or one is missing.
+        """
         caller, until = self.who, self.until
         if self.constant is not None and (self.control is None
                                           or self.duration is None or until or amplitudes is not None):
@@ -129,8 +139,18 @@ class Stage:
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
-        """Return (function that makes targets, knots, shape (n, 2), or a function of time) of
-        a prescribed quantity."""
+        """Return the quantity that the control makes follow an amplitude, and this amplitude.
+
+        Args:
+            amplitudes: the argument `amplitudes` as the user gave it.
+
+        Returns:
+            (function that makes targets of the quantity, amplitude). The amplitude is a table (time, value), shape (n,
+            2), or a function of time.
+
+        Raises:
+            InputError: the argument is not of this form, or a function of time has no end.
+        """
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
                              f" [(time,"
@@ -149,7 +169,17 @@ class Stage:
         return measure, course
 
     def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
-        """[(item, knots, shape (n, 2))]."""
+        """Return the tables that the user gave as amplitudes.
+
+        Args:
+            amplitudes: {item: [(time, value), ...]}.
+
+        Returns:
+            [(item, knots (time, value), shape (n, 2))].
+
+        Raises:
+            InputError: the argument is not of this form, or its times do not increase.
+        """
         if not isinstance(amplitudes, Mapping) or not amplitudes:
             raise InputError(f"{self.who}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
         tables = []
@@ -171,13 +201,13 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """A stage with the items of the scene by their numbers.
+    """Stage with the items of the scene given by their numbers.
 
     Attributes:
         stage: the stage.
-        numbers: the controlled item and the items that move with it; empty without `Stage.control`.
-        tables: [(number, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
-        inactive: the inactive items.
+        numbers: numbers of the controlled item and of the items that move with it; empty without `Stage.control`.
+        tables: [(number of the item, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
+        inactive: numbers of the inactive items.
         names: all items of the scene, as text.
     """
 
@@ -189,21 +219,28 @@ class Plan(NamedTuple):
 
     @property
     def in_flow(self) -> bool:
-        """True if the controlled quantity makes a measure follow a course in time."""
+        """True if the control is adjusted so that another quantity follows an amplitude in time, or stays constant."""
         return bool(self.stage.flow or self.stage.constant)
 
     @property
     def by_time(self) -> bool:
-        """True if the time is the control: tables are followed, or nothing is driven while it goes by."""
+        """True if process time is the control: items follow tables, or nothing else is controlled while time passes."""
         return bool(self.tables or self.stage.duration and not self.numbers)
 
 
 def plan(scene: Scene, stage: Stage) -> Plan:
-    """Return a stage by the numbers of the items of its scene.
+    """Return a stage with the items of its scene given by their numbers.
+
+    Args:
+        scene: the scene.
+        stage: the stage.
+
+    Returns:
+        The plan of the stage.
 
     Raises:
-        InputError: it drives or leaves out something that is not there, leaves the body free to move, or has a
-            target that cannot be met.
+        InputError: the stage controls an item that cannot be controlled or is missing in the scene, makes a missing
+            item inactive, leaves the body free to move, or has a target that cannot be met.
     """
     caller = stage.who
     off = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})

@@ -1,4 +1,4 @@
-"""Converged states."""
+"""Converged states of a path."""
 
 from __future__ import annotations
 
@@ -11,27 +11,29 @@ from .equations import Array
 
 @dataclass(eq=False, repr=False)
 class State:
-    """One converged state. Two states are equal only if they are the same object.
+    """Converged state of a path. Two states are equal only if they are the same object.
 
     Attributes:
-        x: the unknowns, locally owned entries (dimensionless).
+        x: the unknowns, locally owned entries, shape (n,), dimensionless.
         control: the dimensionless control.
-        direction, slope: dx and dcontrol by arc length: the unit tangent of the path.
-        measures: {name: value} in the user's units.
-        history: the Newton iterations that led to it (`formingx.solve.newton.Iteration`).
-        kind: "start", "step", "target", "limit point" or "jump" (the body snapped to it).
-        jump: of a "jump": {"dissipated": energy that was lost (stress length^3), "moved": how far the body moved from
-            the state before, mean over its volume (length)}.
-        met: the target that it hits, or None.
-        memory: the history variables of the problem from here on (`Problem.histories`); before: those used to
-            solve for the state; empty if they are not known.
-        stage: name of the stage of a process; setting: the step data of the stage, as plain data (`StepData`).
+        direction: derivative of x with respect to arc length, locally owned entries, shape (n,).
+        slope: derivative of the control with respect to arc length; (direction, slope) is the unit tangent of the path.
+        measures: {name: value} of the output quantities, in the user's units.
+        history: the Newton iterations of the solution for this state (`formingx.solve.newton.Iteration`).
+        kind: "start", "step", "target", "limit point" or "jump" (the body snapped to this state).
+        jump: of a "jump": {"dissipated": energy lost in the snap-through (stress length^3), "moved": displacement from
+            the state before, mean over the volume of the body (length)}.
+        met: the target that the state meets exactly, or None.
+        memory: history variables of the problem after this state (`Problem.histories`).
+        before: history variables with which the state was solved for; empty if they are not known.
+        stage: name of the stage of a process.
+        setting: step data of the stage, as plain data (`StepData`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
         time: process time.
-        orientation: sign of the tangent's determinant times that of the slope: the same along a path, through limit
-            points too, until another path branches off; 0 if it is not known.
+        orientation: sign of the determinant of the tangent times the sign of the slope; 0 if it is not known. It is
+            constant along a path, through limit points too, and changes where another path branches off.
         verdict: reason for which no body can have this state, as text; "" for an admissible state. Only a run with
-            `allow_inadmissible=True` continues past such a state.
+            `allow_inadmissible=True` continues past an inadmissible state.
 
     >>> state = path.limit_points[0]
     >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)

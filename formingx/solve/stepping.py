@@ -1,4 +1,4 @@
-"""Length of the next step, and the accuracy of the last one in time."""
+"""Control of the step length, and the time integration error of a step."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .equations import Array, Equations
 from .state import State
 
 ACCURACY = {"draft": 1e-2, "standard": 2e-3, "fine": 3e-4}
-"""Error of stress and thickness that each promises."""
+"""Relative error of stress and thickness for each name of an accuracy."""
 
 SAME_TIME = 1e-12
 """Largest relative difference of times that count as equal."""
@@ -26,14 +26,15 @@ class StepControl:
 
     .. math:: s_{k+1} = s_k \min\left(\max\left(\frac{n_{target}}{n_k}, \frac{1}{2}\right), growth\right)
 
-    With an estimated error e over its tolerance in time, the factor is at most 0.9 e^(-1/3).
+    With a time integration error e, relative to its tolerance, the factor is at most 0.9 e^(-1/3).
 
     Attributes:
-        length: the next step (dimensionless arc length: mean displacement over the size of the body); at most
+        length: length of the next step (dimensionless arc length: mean displacement over the size of the body); at most
             `largest`.
-        target: iterations that a step should take.
-        growth: at most this factor from one step to the next, at least 1; failures halve.
-        smallest, largest: a run gives up below the one; no step is longer than the other.
+        target: Newton iterations that a step should take.
+        growth: largest factor of the length from one step to the next, at least 1. A failure halves the length.
+        smallest: step length below which a run gives up.
+        largest: largest step length.
 
     Raises:
         InputError: a value that is not greater than 0, a growth below 1, or `smallest` above `largest`.
@@ -63,20 +64,39 @@ class StepControl:
         self.length = min(self.length, self.largest)
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
-        """Adapt the length after a full step with this number of new tangents; error: in time, over the
-        tolerance."""
+        """Adapt the step length after a converged step of full length (Song 1993, eq. 4.21).
+
+        Args:
+            iterations: Newton iterations of the step with a new tangent.
+            error: time integration error of the step over its tolerance.
+        """
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)
 
     def failed(self) -> bool:
-        """Halve after a failure; False if the step is then too small to go on."""
+        """Halve the step length after a failed step.
+
+        Returns:
+            False if the length is then below `smallest`.
+        """
         self.length /= 2
         return self.length >= self.smallest
 
 
 def allowed(caller: str, accuracy: str | float) -> float:
-    """Return the error promised by a word or a number, or an InputError."""
+    """Return the relative error that an accuracy allows.
+
+    Args:
+        caller: name of the calling function, for messages.
+        accuracy: a key of `ACCURACY`, or the error itself, between 0 and 1.
+
+    Returns:
+        The relative error of stress and thickness.
+
+    Raises:
+        InputError: an accuracy that is neither.
+    """
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
             raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"
@@ -89,13 +109,13 @@ def allowed(caller: str, accuracy: str | float) -> float:
 
 
 class TimeError:
-    """Time integration error of steps, over its tolerance.
+    """Estimator of the time integration error of a step, relative to its tolerance.
 
     Args:
         problem: the equations.
-        accuracy: the promised error.
-        once: part of the promised error that is allowed at the end of a step, if later steps do not keep it.
-        adding_up: error that is allowed if later steps keep it, over the promised error to the power 3/2.
+        accuracy: the relative error of stress and thickness that the run may have.
+        once: tolerance of the error at the end of a step, over `accuracy`.
+        adding_up: tolerance of the part of the error that persists in later steps, over `accuracy` to the power 3/2.
     """
 
     def __init__(self, problem: Equations, accuracy: float, once: float = 0.5, adding_up: float = 0.5):
@@ -103,7 +123,18 @@ class TimeError:
         self._once, self._adding_up = once * accuracy, adding_up * accuracy**1.5
 
     def of(self, states: Sequence[State], x: Array, control: float) -> float:
-        """Error of the step from the last of some states to (x, control) over the tolerance; 0: no time goes by."""
+        """Return the time integration error of a step over its tolerance.
+
+        The larger ratio counts: of the error at the end of the step, and of its part that persists in later steps.
+
+        Args:
+            states: the accepted states; the step starts from the last one.
+            x: unknowns at the end of the step, locally owned entries, shape (n,).
+            control: control at the end of the step.
+
+        Returns:
+            The ratio; 0 if no time passes in the step.
+        """
         time = self._problem.time_at(control)
         past = predictor.before(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)
@@ -114,10 +145,14 @@ class TimeError:
 
 
 class Cutback(Exception):
-    """A step is too long; part: of its length, that will do. lasts: of the steps after it, too.
+    """Exception for a step that is too long: the step is repeated with a smaller length.
 
-    control: to hold at the end of the shorter step, in place of its length. Along the path a step in time may be far
-    from short in time where the body moves at once as a step begins.
+    Args:
+        why: the reason, as text.
+        part: admissible part of the length of the step.
+        lasts: True if later steps must be shorter, too.
+        control: control at the end of the repeated step, in place of its length, or None. Where the body moves at once
+            as a step begins, a short piece of the path may take a long time.
     """
 
     def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
