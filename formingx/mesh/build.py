@@ -19,7 +19,7 @@ from .divisions import (
     with_middles,
 )
 from .grid import Grid, to_mesh
-from .mesh import Columns, Mesh
+from .mesh import Columns, Mesh, Preset
 
 ACCURACY = {"draft": (20, 1), "standard": (40, 2), "fine": (80, 4)}
 """Elements of a disc (along the radius, usual number through each layer): see docs/accuracy.md."""
@@ -34,7 +34,6 @@ sheet creases.)"""
 _FILM_THICKNESS = 1 / 400
 """Thickness over length below which one element through each layer is enough. More elements increase the round-off;
 below 1/1e5 a run would not start."""
-
 
 
 def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accuracy: str = "standard",
@@ -52,7 +51,9 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             nodes too.
         accuracy: "draft", "standard" or "fine", for the number of elements. Sheets that bend near the rim get more
             elements through the thickness. Thick layers get more, too, so that no element is 1.5 times taller than
-            wide. Films thinner than 1/400 of the radius get one element through each layer.
+            wide. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
+            sheet, the `Scene` chooses other elements: short ones where the sheet comes to lie on a fillet of the tool,
+            and fewer through the thickness (docs/accuracy.md). A given `grading` or `concentrate` is kept.
         elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a list with an
             entry for each layer. An entry is a count, or relative sizes of elements from the bottom up, as in (60, [[1,
             2, 4], 2]). A single layer needs no outer list: (60, [1, 2, 4]). Each rectangle is divided into two
@@ -80,6 +81,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     known("disc: accuracy", accuracy, ACCURACY)
     layers = layer_thicknesses("disc", thickness, "sheet", "R")
+    chosen = elements is None and concentrate is None and grading == 1
     if elements is None:
         elements = _preset(accuracy, inner_radius, radius, layers)
     along, through = divisions("disc", "radius", elements, len(layers))
@@ -89,10 +91,13 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
               else inner_radius + (radius - inner_radius) * graded(along, grading))
 
-    def points(R: np.ndarray) -> np.ndarray:
-        Z = levels(layers, through, R)
-        return np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1)
-    return _mesh("disc", points, joints, list(sizes or ()), list(layers), through, sides, comm)
+    def body(ends: np.ndarray, through: list[np.ndarray]) -> Mesh:
+        def points(R: np.ndarray) -> np.ndarray:
+            Z = levels(layers, through, R)
+            return np.stack([np.broadcast_to(R, Z.shape), Z], axis=-1)
+        return _mesh("disc", points, ends, list(sizes or ()), list(layers), through, sides, comm)
+    made = body(joints, through)
+    return _with_preset(made, accuracy, layers, joints, through, body) if chosen else made
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
@@ -106,6 +111,14 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
     bending = _BENDING_ELEMENTS[accuracy] * thick / total if total >= _BENDING_THICKNESS else 0.0
     needed = np.ceil(np.maximum(bending, thick * along / _ASPECT_RATIO) - 1e-9)
     return along, np.maximum(usual, needed).astype(int).tolist()
+
+
+def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coordinates: np.ndarray,
+                 through: list[np.ndarray], body: Callable[[np.ndarray, list[np.ndarray]], Mesh]) -> Mesh:
+    """Return the mesh with its `Preset`; body: returns the mesh of other columns and other elements through layers."""
+    thickness = np.array([thickness_at(coordinates).max() for thickness_at in layers.values()])
+    return replace(mesh, preset=Preset(accuracy, thickness, tuple(len(ends) - 1 for ends in through), lambda ends, n:
+                                       body(ends, [np.linspace(0.0, 1.0, m + 1) for m in n])))
 
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
@@ -185,7 +198,8 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
 
 
 def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thickness], length: float,
-            elements: tuple = (60, 2), grading: float = 1.0, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
+            accuracy: str | None = None, elements: tuple | None = None, grading: float = 1.0,
+            comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     """Return the mesh of a tube that is closed by a half sphere at the bottom and open at the top.
 
     The half sphere has its centre in the origin. Boundaries: `axis` (R = 0), `inner`, `outer`, `neck` (Z = length). All
@@ -197,7 +211,9 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
             a function of Z, or a table {Z: thickness}, interpolated linearly. Z is the height on the inner face, from
             -inner_radius to `length`. The thickness is measured along the normal.
         length: length of the tube above the half sphere, length.
-        elements: (from the axis to the neck, through each layer), as in `disc`.
+        accuracy: "draft", "standard" or "fine": a `Scene` with a tool chooses the elements, as for a `disc`.
+        elements: (from the axis to the neck, through each layer), as in `disc`, in place of `accuracy`; default
+            (60, 2).
         grading: size of the element at the neck over the element at the axis.
         comm: MPI communicator.
 
@@ -212,7 +228,10 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     inner_radius, length = positive("parison: inner_radius", inner_radius), positive("parison: length", length)
     grading = checked_grading("parison", grading)
     layers = layer_thicknesses("parison", thickness, "wall", "Z")
-    along, through = divisions("parison", "meridian", elements, len(layers))
+    if accuracy is not None:
+        known("parison: accuracy", accuracy, ACCURACY)
+    chosen = accuracy is not None and elements is None and grading == 1
+    along, through = divisions("parison", "meridian", (60, 2) if elements is None else elements, len(layers))
     if along < 2:
         raise InputError(f"parison: elements along the meridian = {along}: must be at least 2, one in the bottom and"
                          f" one in the tube")
@@ -222,13 +241,22 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
 
-    def points(from_neck: np.ndarray) -> np.ndarray:
-        z = length * np.maximum(1 - from_neck / node, 0.0)
-        angle = np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0)
-        radius = inner_radius + levels(layers, through, z - inner_radius * np.sin(angle))
-        return np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
-    sides = ("neck", "axis", "inner", "outer")
-    return _mesh("parison", points, joints, [node], list(layers), through, sides, comm)
+    def inner(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the height in the tube, length, and the angle in the bottom, radians, shape (n,) each."""
+        return (length * np.maximum(1 - from_neck / node, 0.0),
+                np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0))
+
+    def body(ends: np.ndarray, through: list[np.ndarray]) -> Mesh:
+        def points(from_neck: np.ndarray) -> np.ndarray:
+            z, angle = inner(from_neck)
+            radius = inner_radius + levels(layers, through, z - inner_radius * np.sin(angle))
+            return np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
+        return _mesh("parison", points, ends, [node], list(layers), through, ("neck", "axis", "inner", "outer"), comm)
+    made = body(joints, through)
+    if accuracy is None or not chosen:
+        return made
+    z, angle = inner(joints)
+    return _with_preset(made, accuracy, layers, z - inner_radius * np.sin(angle), through, body)
 
 
 def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapping[str, float] | None = None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -34,6 +34,22 @@ class Columns(NamedTuple):
     make: Callable[[np.ndarray], Mesh]
 
 
+class Preset(NamedTuple):
+    """Accuracy that was asked of a sheet, and the sheet with other elements.
+
+    Attributes:
+        accuracy: "draft", "standard" or "fine".
+        thickness: largest thickness of each layer, shape (layers,), length.
+        through: number of elements through each layer.
+        make: returns the mesh with other ends of columns, and other numbers of elements through each layer.
+    """
+
+    accuracy: str
+    thickness: np.ndarray
+    through: tuple[int, ...]
+    make: Callable[[np.ndarray, Sequence[int]], Mesh]
+
+
 @dataclass(frozen=True)
 class Mesh:
     """Distributed mesh with named layers and boundaries.
@@ -60,6 +76,7 @@ class Mesh:
     boundaries: dict[str, tuple[int, ...]]
     comm: MPI.Comm
     columns: Columns | None = None
+    preset: Preset | None = None
 
     def __str__(self) -> str:
         """Return a summary of the mesh; sizes and numbers of edges only on one rank, because it is not collective."""
@@ -140,9 +157,13 @@ class Mesh:
         values[places] = first + np.searchsorted(old, values[places])
         new = {tag: first + k for k, tag in enumerate(old)}
         boundaries = {key: (*tags, *(new[tag] for tag in tags if tag in new)) for key, tags in self.boundaries.items()}
+        preset, part = self.preset, (name, of, within, along)
+        if preset is not None:
+            made = preset.make
+            preset = preset._replace(make=lambda ends, through: made(ends, through).with_part(*part))
         return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
-                       boundaries=boundaries | {name: tuple(new.values())},
-                       columns=self._columns_with((low, high), axis, tolerance, (name, of, within, along)))
+                       boundaries=boundaries | {name: tuple(new.values())}, preset=preset,
+                       columns=self._columns_with((low, high), axis, tolerance, part))
 
     def _columns_with(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
         """Return the columns of the mesh with fixed ends at the limits of a new part, or None."""

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from ..errors import InputError, count, known, several, together
 from ..materials.constants import Sample
 from ..materials.hyperelastic import Material
+from ..mesh.contact_columns import for_contacts
 from ..mesh.mesh import Mesh
 from ..mesh.nodes import span
 from ..physics.contact import Contact
@@ -112,6 +113,8 @@ class Scene:
         if not isinstance(self.kinematics, Kinematics) or (self.kinematics.components == 3) != in_space:
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
                              f" in space ThreeD()")
+        if preformed is None:
+            self.mesh = mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
         usual = 1 if in_space else 5
         self.quadrature_degree = count("Scene: quadrature_degree",
                                        usual if quadrature_degree is None else quadrature_degree)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import InputError, positive
 from ...mesh.mesh import Columns, Mesh
+from ...mesh.sizes import ends_of_columns, moved_nodes, number_of_columns
 from .column_factors import column_factors
 from .sizes import GROWTH, wanted_sizes
 
@@ -102,12 +103,10 @@ def of_columns(mesh: Mesh) -> Columns:
     columns = mesh.columns
     if columns is None:
         raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in space, by sheet")
-    nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
-    moved = max(np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
-                for k, name in enumerate(columns.faces))
-    if moved > 1e-9 * np.ptp(nodes, axis=0).max():
-        raise InputError(f"adapted: nodes of the mesh were moved by {moved:.3g} since it was made: make it at its"
-                         f" place")
+    moved = moved_nodes(mesh)
+    if moved > 1e-9:
+        raise InputError(f"adapted: nodes of the mesh were moved by {moved:.3g} of its size since it was made: make it"
+                         f" at its place")
     return columns
 
 
@@ -125,14 +124,8 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     requested = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
     away = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
     size = (requested + GROWTH * away).min(1)
-    number = np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
-    if number[-1] > _MOST:
-        raise InputError(f"adapted: share and error ask for {number[-1]:.3g} elements along the sheet, at most {_MOST}"
+    number = number_of_columns(s, size)[-1]
+    if number > _MOST:
+        raise InputError(f"adapted: share and error ask for {number:.3g} elements along the sheet, at most {_MOST}"
                          f" are allowed: make share or error larger")
-    pieces = np.union1d(columns.fixed, old[[0, -1]])
-    marks = np.interp(pieces, at, number)
-    ends = [pieces[:1]]
-    for a, b, last in zip(marks, marks[1:], pieces[1:]):
-        n = max(int(np.ceil(b - a - 1e-6)), 1)
-        ends += [np.interp(a + (b - a) * np.arange(1, n) / n, number, at), np.array([last])]
-    return np.concatenate(ends)
+    return ends_of_columns(at, s, size, np.union1d(columns.fixed, old[[0, -1]]))

@@ -1,0 +1,116 @@
+"""Elements of a sheet that tools touch, for `accuracy=` of `disc` and `parison`.
+
+The wall of a formed sheet is least accurate where the sheet lies on a fillet of a tool. The columns of elements there
+are short; elsewhere few are enough. `fillets_in_sheet` estimates which part of the sheet comes to lie on a fillet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .fillets import FilletInSheet, fillets_in_sheet
+from .mesh import Mesh, Preset
+from .sizes import ends_of_columns, length_along, moved_nodes
+
+
+class Fineness(NamedTuple):
+    """Sizes of the elements of one accuracy.
+
+    Attributes:
+        along: number of columns along the sheet, if it were free of fillets and ends.
+        fillet: length of a deformed column over the geometric mean of fillet radius and wall.
+        end: length of the column at a constrained end of the sheet over the thickness.
+        through: smallest number of elements through the sheet.
+        bending: wall over fillet radius, times 1 - cos(turn), below which one element through the sheet is enough.
+        height: largest height over length of an element on a fillet, both in the reference configuration.
+    """
+
+    along: int
+    fillet: float
+    end: float
+    through: int
+    bending: float
+    height: float
+
+
+FINENESS = {"draft": Fineness(20, 1.3, 0.5, 1, np.inf, 5.0), "standard": Fineness(24, 0.75, 0.25, 2, 0.04, 4.0),
+            "fine": Fineness(40, 0.4, 0.25, 2, 0.0, 4.0)}
+"""Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
+
+_THICKEST = 0.1
+"""Thickness over length above which a body is no sheet and keeps its elements."""
+
+_SHORTEST = 1 / 16
+"""Smallest over largest length of a column."""
+
+_GROWTH = 0.25
+"""Growth of the length of columns per distance along the sheet."""
+
+_UNSURE = 0.03
+"""Error of an estimated position away from the start, over the length of the sheet; twice as much towards the start."""
+
+_WALL = 0.25
+"""Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
+
+_SAMPLES = 2000            # points of the sheet at which sizes are computed
+
+
+def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
+    """Return the body with the elements that its tools need, or the mesh itself where its elements were given.
+
+    Args:
+        mesh: from `disc` or `parison`.
+        contacts: the contacts of the scene.
+        axisymmetric: False in plane strain.
+        keep_through: at least as many elements through each layer as the mesh has.
+    """
+    preset, columns = mesh.preset, mesh.columns
+    if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
+        return mesh
+    at = np.linspace(*columns.ends[[0, -1]], _SAMPLES)
+    rows = columns.place(at)
+    s = length_along(rows[[0, -1]].mean(0))
+    faces = dict(zip(columns.faces, rows[[0, -1]]))
+    thickness, touching = float(preset.thickness.sum()), [item for item in contacts if item.on in faces]
+    if not touching or thickness > _THICKEST * s[-1]:
+        return mesh
+    fineness = FINENESS[preset.accuracy]
+    longest = s[-1] / fineness.along
+    size = np.full(len(s), longest)
+    for end in (0, -1):
+        if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
+            size = np.minimum(size, fineness.end * thickness + _GROWTH * np.abs(s - s[end]))
+    moving = any(item.direction is not None for item in touching)
+    shortest, bending = longest, 0.0
+    for item in touching:
+        for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
+            wall = thickness * fillet.area_ratio
+            wanted = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
+            wanted = max(wanted, _SHORTEST * longest)
+            shortest = min(shortest, wanted)
+            size = np.minimum(size, wanted + _GROWTH * _distance(s, fillet, moving and item.direction is None))
+            if fillet.concave:
+                bending = max(bending, wall / fillet.radius * fillet.turn)
+    ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
+    through = max(1 if bending < fineness.bending else fineness.through, thickness / (fineness.height * shortest))
+    return preset.make(ends, _through_layers(preset, through, keep_through))
+
+
+def _distance(s: np.ndarray, fillet: FilletInSheet, drawn: bool) -> np.ndarray:
+    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length.
+
+    drawn: a moving tool draws the sheet as well, so that the position is less certain.
+    """
+    unsure = _UNSURE * s[-1]
+    first, last = fillet.first - (4 if drawn else 2) * unsure, fillet.last + unsure
+    return np.maximum(np.maximum(first - s, s - last), 0.0)
+
+
+def _through_layers(preset: Preset, through: float, keep: bool) -> list[int]:
+    """Return the numbers of elements through the layers, by their share of the thickness."""
+    share = preset.thickness / preset.thickness.sum()
+    least = np.array(preset.through if keep else np.ones(len(share)))
+    return np.maximum(np.ceil(np.ceil(through - 1e-9) * share - 1e-9), least).astype(int).tolist()
