@@ -13,7 +13,7 @@ import numpy as np
 
 from .fillets import FilletInSheet, fillets_in_sheet
 from .mesh import Mesh, Preset
-from .sizes import ends_of_columns, length_along, moved_nodes
+from .sizes import GROWTH, ends_of_columns, length_along, moved_nodes
 
 
 class Fineness(NamedTuple):
@@ -45,9 +45,6 @@ _THICKEST = 0.1
 
 _SHORTEST = 1 / 16
 """Smallest over largest length of a column."""
-
-_GROWTH = 0.25
-"""Growth of the length of columns per distance along the sheet."""
 
 _UNSURE = 0.03
 """Error of an estimated position away from the start, over the length of the sheet; twice as much towards the start."""
@@ -82,7 +79,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     size = np.full(len(s), longest)
     for end in (0, -1):
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
-            size = np.minimum(size, fineness.end * thickness + _GROWTH * np.abs(s - s[end]))
+            size = np.minimum(size, fineness.end * thickness + GROWTH * np.abs(s - s[end]))
     moving = any(item.direction is not None for item in touching)
     shortest, bending = longest, 0.0
     for item in touching:
@@ -91,7 +88,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
             wanted = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
             wanted = max(wanted, _SHORTEST * longest)
             shortest = min(shortest, wanted)
-            size = np.minimum(size, wanted + _GROWTH * _distance(s, fillet, moving and item.direction is None))
+            size = np.minimum(size, wanted + GROWTH * _distance(s, fillet, moving and item.direction is None))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
     ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))

@@ -4,6 +4,9 @@ from typing import Any
 
 import numpy as np
 
+GROWTH = 0.25
+"""Growth of the length of columns or triangles per distance along the sheet."""
+
 
 def length_along(line: np.ndarray) -> np.ndarray:
     """Return the length along a line through points, shape (n, 2), from its first point, shape (n,)."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...errors import InputError, positive
 from ...mesh.mesh import Columns, Mesh
-from ...mesh.sizes import ends_of_columns, moved_nodes, number_of_columns
+from ...mesh.sizes import GROWTH, ends_of_columns, moved_nodes, number_of_columns
 from .column_factors import column_factors
-from .sizes import GROWTH, wanted_sizes
+from .sizes import wanted_sizes
 
 _LEAST = 1 / 8
 """Smallest length of a column over its length in the run: finer sizes are unreliable on coarse columns."""

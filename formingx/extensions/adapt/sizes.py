@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from ...mesh.nodes import COORDINATES
+from ...mesh.sizes import GROWTH
 
 _FINEST = 0.25
 """Smallest wanted over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
-GROWTH = 0.25
-"""Growth of the size per distance along the sheet."""
 
 
 def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,178 @@
+"""What `accuracy=` promises for sheets that tools touch: error of the wall and cost in six moulds, beside uniform meshes.
+
+    ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--quick] [--out DIR]
+
+The error is the largest relative difference of the wall at a node, farther than a thickness from the constrained end,
+to a mesh with columns of half the length of "fine" and two more elements through the sheet. The cost is processor time
+of the whole run, forms compiled before, and iterations times unknowns. The cheapest uniform mesh is the one of `UNIFORM`
+with the lowest iterations times unknowns among those that keep the promise. --only keeps the other moulds' numbers.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+import formingx as fx
+from formingx.results import files
+
+PROMISED = {"draft": 0.03, "standard": 0.01, "fine": 0.003}
+UNIFORM = [(20, 1), (20, 2), (30, 1), (30, 2), (40, 1), (40, 2), (60, 1), (60, 2), (80, 2), (120, 2), (160, 2),
+           (240, 2)]
+
+
+BODIES = {"cup": {"radius": 10.0, "thickness": 0.3}, "trough": {"radius": 10.0, "thickness": 0.3},
+          "pot": {"radius": 40.0, "thickness": 1.2}, "bottle": {"inner_radius": 1.1, "thickness": 0.3, "length": 10.6},
+          "dish": {"radius": 50.0, "thickness": 1.0}, "tub": {"radius": 32.0, "thickness": 1.2}}
+
+
+def body(name, **given):
+    """Return the mesh of a body; given: its accuracy or its elements."""
+    return (fx.mesh.parison if name == "bottle" else fx.mesh.disc)(**BODIES[name], **given)
+
+
+def in_mould(mesh, material, tool, pressure, kinematics=None):
+    """Return the path of a sheet that sticks to a mould above it, up to a pressure."""
+    scene = fx.Scene(mesh=mesh, materials=material, kinematics=kinematics,
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", tool, "stick")])
+    return fx.trace(scene, until=fx.pressure(pressure), progress=False)
+
+
+def cup(mesh, kinematics=None):
+    """demos/cup.py; cm, psi."""
+    return in_mould(mesh, fx.MooneyRivlin(c10=50.0, c01=15.0),
+                    fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0), 160.0, kinematics)
+
+
+def trough(mesh):
+    """The cup in plane strain."""
+    return cup(mesh, fx.PlaneStrain())
+
+
+def pot(mesh):
+    """The README's, with a plug; mm, MPa."""
+    tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
+                     contacts=[fx.Contact("top", tools.mould, "stick", separates=False, name="mould"),
+                               fx.Contact("bottom", tools.plug, "none", direction=(0, 1), name="plug")])
+    return fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(22.0)),
+                                  fx.Stage("air", control="air", until=fx.pressure(0.09))], progress=False)
+
+
+def bottle(mesh):
+    """demos/parison.py."""
+    mould = fx.tools.bottle(radius=3.0, height=10.0, neck=1.5, shoulder=2.0, neck_height=1.5, base=-2.9, fillet=0.8,
+                            shoulder_fillet=0.8)
+    scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")], contacts=[fx.Contact("outer", mould, "stick")])
+    return fx.trace(scene, until=fx.pressure(200.0), progress=False)
+
+
+def dish(mesh):
+    """A conical dish with a rounded step half-way up; mm, MPa."""
+    tool = fx.tools.Tool([(0.0, 26.0), (22.0, 26.0), (30.0, 14.0), (38.0, 14.0), (48.0, 1.0), (100.0, 1.0)],
+                         [0.0, 4.0, 3.0, 3.0, 2.0, 0.0])
+    return in_mould(mesh, fx.NeoHookean(c10=0.3), tool, 0.3)
+
+
+def tub(mesh):
+    """A deep narrow tub with a small fillet, of a material that stiffens; mm, MPa."""
+    tool = fx.tools.cup(radius=30.0, depth=36.0, mouth=1.2, draft=4.0, fillet=2.5, lip=2.0)
+    return in_mould(mesh, fx.Gent(mu=0.5, Jm=60.0), tool, 1.0)
+
+
+MOULDS = {run.__name__: run for run in (cup, pot, bottle, trough, dish, tub)}
+
+
+def wall(path):
+    """Return the material coordinates of the nodes that count and the wall there, shape (n,) each, length."""
+    profile = path.profile()
+    s = profile.reference_length
+    counts = s <= s[-1] - profile.original_thickness[-1]
+    return s[counts], profile.wall_thickness[counts]
+
+
+def error(path, reference):
+    """Return the largest relative error of the wall; reference: from `wall`."""
+    s, found = wall(path)
+    return float(np.abs(found / np.interp(s, *reference) - 1).max())
+
+
+def elements(path):
+    """Return the numbers of elements along and through the sheet."""
+    columns = path.problem.scene.mesh.columns
+    return len(columns.ends) - 1, len(columns.place(columns.ends[:1])) // 2
+
+
+def finest(path, preset):
+    """Return the mesh of a reference: half as long columns, two more elements through the sheet."""
+    ends = path.problem.scene.mesh.columns.ends
+    both = np.sort(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+    return preset.make(both, [elements(path)[1] + 2])
+
+
+def measured(name, mesh):
+    """Return the path of a run, and a row of its cost."""
+    began = time.process_time()
+    path = MOULDS[name](mesh)
+    seconds = time.process_time() - began
+    along, through = elements(path)
+    unknowns, iterations = path.problem.n_unknowns, path.counts.iterations
+    return path, {"along": along, "through": through, "unknowns": unknowns, "iterations": iterations,
+                  "states": path.counts.steps, "million": unknowns * iterations / 1e6, "seconds": seconds}
+
+
+def in_one_mould(name, quick=False):
+    """Return the rows of a mould: of each accuracy with its cheapest uniform mesh, and of all uniform meshes."""
+    measured(name, body(name, elements=(10, 1)))                     # compile the forms
+    paths, rows = {}, {}
+    for accuracy in ("standard", "draft", "fine")[:2 if quick else None]:
+        paths[accuracy], rows[accuracy] = measured(name, body(name, accuracy=accuracy))
+    last = paths["standard" if quick else "fine"]
+    path, row = measured(name, finest(last, body(name, accuracy="fine").preset))
+    reference, rows["reference"] = wall(path), row
+    for accuracy, path in paths.items():
+        rows[accuracy]["error"] = error(path, reference)
+    uniform = []
+    for given in () if quick else UNIFORM:
+        path, row = measured(name, body(name, elements=given))
+        uniform.append({**row, "error": error(path, reference)})
+        print(f"{name:8}{line(uniform[-1])}", flush=True)
+    for accuracy in paths:
+        keeps = [row for row in uniform if row["error"] <= PROMISED[accuracy]]
+        cheapest = min(keeps, key=lambda row: row["million"]) if keeps else None
+        rows[accuracy]["cheapest"] = cheapest
+        for cost in ("million", "seconds"):
+            rows[accuracy][f"{cost}_ratio"] = cheapest and rows[accuracy][cost] / cheapest[cost]
+        print(f"{name:8}{line(rows[accuracy])}  {accuracy}"
+              + (f": {rows[accuracy]['million_ratio']:.2f} of {cheapest['along']} x {cheapest['through']}"
+                 if cheapest else ""), flush=True)
+    return {**rows, "uniform": uniform}
+
+
+def line(row):
+    """Return a row as text."""
+    return (f"{row['along']:5} x {row['through']}{100 * row['error']:8.2f} %{row['seconds']:8.2f} s{row['million']:8.3f}"
+            f" million{row['iterations']:5} iterations")
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--only", nargs="+", choices=MOULDS, default=list(MOULDS))
+    options.add_argument("--quick", action="store_true", help="draft and standard of the first mould alone")
+    options.add_argument("--out", type=Path, default=Path("results/accuracy_in_moulds"), help="folder for summary.json")
+    args = options.parse_args()
+    file = args.out / "summary.json"
+    found = json.loads(file.read_text()) if file.is_file() and not args.quick else {}
+    for name in args.only[:1 if args.quick else None]:
+        found[name] = in_one_mould(name, args.quick)
+        files.write_summary(file, {key: found[key] for key in MOULDS if key in found}, MPI.COMM_WORLD)
+
+
+if __name__ == "__main__":
+    main()
