@@ -1,6 +1,6 @@
 """What `accuracy=` promises for sheets that tools touch: error of the wall and cost in six moulds, beside uniform meshes.
 
-    ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--quick] [--out DIR]
+    ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--out DIR]
 
 The error is the largest relative difference of the wall at a node, farther than a thickness from the constrained end,
 to a mesh with columns of half the length of "fine" and two more elements through the sheet. The cost is processor time
@@ -20,8 +20,7 @@ import formingx as fx
 from formingx.results import files
 
 PROMISED = {"draft": 0.03, "standard": 0.01, "fine": 0.003}
-UNIFORM = [(20, 1), (20, 2), (30, 1), (30, 2), (40, 1), (40, 2), (60, 1), (60, 2), (80, 2), (120, 2), (160, 2),
-           (240, 2)]
+UNIFORM = [(20, 1), (20, 2), (30, 1), (30, 2), (40, 1), (40, 2), (60, 1), (60, 2), (80, 2), (120, 2), (160, 2)]
 
 
 BODIES = {"cup": {"radius": 10.0, "thickness": 0.3}, "trough": {"radius": 10.0, "thickness": 0.3},
@@ -127,32 +126,39 @@ def measured(name, mesh):
                   "states": path.counts.steps, "million": unknowns * iterations / 1e6, "seconds": seconds}
 
 
-def in_one_mould(name, quick=False):
-    """Return the rows of a mould: of each accuracy with its cheapest uniform mesh, and of all uniform meshes."""
+def in_one_mould(name, stored=None, accuracies=tuple(PROMISED)):
+    """Return the rows of a mould: its reference, all uniform meshes, and each accuracy beside the cheapest of them.
+
+    stored: rows of an earlier call; its reference and uniform meshes are kept.
+    """
     measured(name, body(name, elements=(10, 1)))                     # compile the forms
-    paths, rows = {}, {}
-    for accuracy in ("standard", "draft", "fine")[:2 if quick else None]:
+    paths, rows = {}, dict(stored or {})
+    for accuracy in accuracies:
         paths[accuracy], rows[accuracy] = measured(name, body(name, accuracy=accuracy))
-    last = paths["standard" if quick else "fine"]
-    path, row = measured(name, finest(last, body(name, accuracy="fine").preset))
-    reference, rows["reference"] = wall(path), row
+    if stored is None:
+        fine = paths[accuracies[-1]]
+        path, row = measured(name, finest(fine, body(name, accuracy="fine").preset))
+        s, h = wall(path)
+        rows["reference"] = {**row, "length": s.tolist(), "wall": h.tolist()}
+    reference = rows["reference"]["length"], rows["reference"]["wall"]
     for accuracy, path in paths.items():
         rows[accuracy]["error"] = error(path, reference)
-    uniform = []
-    for given in () if quick else UNIFORM:
+    for given in UNIFORM if stored is None else ():
         path, row = measured(name, body(name, elements=given))
-        uniform.append({**row, "error": error(path, reference)})
-        print(f"{name:8}{line(uniform[-1])}", flush=True)
-    for accuracy in paths:
-        keeps = [row for row in uniform if row["error"] <= PROMISED[accuracy]]
-        cheapest = min(keeps, key=lambda row: row["million"]) if keeps else None
-        rows[accuracy]["cheapest"] = cheapest
-        for cost in ("million", "seconds"):
-            rows[accuracy][f"{cost}_ratio"] = cheapest and rows[accuracy][cost] / cheapest[cost]
-        print(f"{name:8}{line(rows[accuracy])}  {accuracy}"
-              + (f": {rows[accuracy]['million_ratio']:.2f} of {cheapest['along']} x {cheapest['through']}"
-                 if cheapest else ""), flush=True)
-    return {**rows, "uniform": uniform}
+        rows.setdefault("uniform", []).append({**row, "error": error(path, reference)})
+        print(f"{name:8}{line(rows['uniform'][-1])}", flush=True)
+    return with_cheapest(rows)
+
+
+def with_cheapest(rows):
+    """Return the rows of a mould with the cheapest uniform mesh that keeps each promise, and the ratios of costs."""
+    for accuracy in (name for name in PROMISED if name in rows):
+        row, keeps = rows[accuracy], [row for row in rows["uniform"] if row["error"] <= PROMISED[accuracy]]
+        best = min(keeps, key=lambda row: row["million"], default=None)
+        row["elements"], row["cheapest"] = (f"{r['along']} x {r['through']}" if r else "none" for r in (row, best))
+        row["cheapest_error"], row["cheapest_seconds"] = (best and best[key] for key in ("error", "seconds"))
+        row["million_ratio"], row["seconds_ratio"] = (best and row[key] / best[key] for key in ("million", "seconds"))
+    return rows
 
 
 def line(row):
@@ -164,13 +170,17 @@ def line(row):
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--only", nargs="+", choices=MOULDS, default=list(MOULDS))
-    options.add_argument("--quick", action="store_true", help="draft and standard of the first mould alone")
+    options.add_argument("--again", action="store_true", help="keep stored references and uniform meshes")
     options.add_argument("--out", type=Path, default=Path("results/accuracy_in_moulds"), help="folder for summary.json")
     args = options.parse_args()
     file = args.out / "summary.json"
-    found = json.loads(file.read_text()) if file.is_file() and not args.quick else {}
-    for name in args.only[:1 if args.quick else None]:
-        found[name] = in_one_mould(name, args.quick)
+    found = json.loads(file.read_text()) if file.is_file() else {}
+    for name in args.only:
+        found[name] = rows = in_one_mould(name, found.get(name) if args.again else None)
+        for accuracy in PROMISED:
+            row = rows[accuracy]
+            print(f"{name:8}{line(row)}  {accuracy}; cheapest uniform mesh {row['cheapest']}: ratio of costs"
+                  f" {row['million_ratio'] or 0:.2f}, of times {row['seconds_ratio'] or 0:.2f}", flush=True)
         files.write_summary(file, {key: found[key] for key in MOULDS if key in found}, MPI.COMM_WORLD)
 
 

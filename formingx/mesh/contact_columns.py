@@ -22,7 +22,6 @@ class Fineness(NamedTuple):
     Attributes:
         along: number of columns along the sheet, if it were free of fillets and ends.
         fillet: length of a deformed column over the geometric mean of fillet radius and wall.
-        end: length of the column at a constrained end of the sheet over the thickness.
         through: smallest number of elements through the sheet.
         bending: wall over fillet radius, times 1 - cos(turn), below which one element through the sheet is enough.
         height: largest height over length of an element on a fillet, both in the reference configuration.
@@ -30,14 +29,13 @@ class Fineness(NamedTuple):
 
     along: int
     fillet: float
-    end: float
     through: int
     bending: float
     height: float
 
 
-FINENESS = {"draft": Fineness(20, 1.3, 0.5, 1, np.inf, 5.0), "standard": Fineness(24, 0.75, 0.25, 2, 0.04, 4.0),
-            "fine": Fineness(40, 0.4, 0.25, 2, 0.0, 4.0)}
+FINENESS = {"draft": Fineness(16, 1.3, 1, np.inf, 5.0), "standard": Fineness(20, 0.75, 2, 0.04, 4.0),
+            "fine": Fineness(40, 0.4, 2, 0.0, 4.0)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 0.1
@@ -48,6 +46,9 @@ _SHORTEST = 1 / 16
 
 _UNSURE = 0.03
 """Error of an estimated position away from the start, over the length of the sheet; twice as much towards the start."""
+
+_END = 0.5
+"""Length over height of an element at a constrained end: shorter elements lock, longer ones miss the bending."""
 
 _WALL = 0.25
 """Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
@@ -77,9 +78,6 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     fineness = FINENESS[preset.accuracy]
     longest = s[-1] / fineness.along
     size = np.full(len(s), longest)
-    for end in (0, -1):
-        if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
-            size = np.minimum(size, fineness.end * thickness + GROWTH * np.abs(s - s[end]))
     moving = any(item.direction is not None for item in touching)
     shortest, bending = longest, 0.0
     for item in touching:
@@ -91,8 +89,12 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
             size = np.minimum(size, wanted + GROWTH * _distance(s, fillet, moving and item.direction is None))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
+    through = max(1 if bending < fineness.bending else fineness.through,
+                  int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
+    for end in (0, -1):
+        if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
+            size = np.minimum(size, _END * thickness / through + GROWTH * np.abs(s - s[end]))
     ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
-    through = max(1 if bending < fineness.bending else fineness.through, thickness / (fineness.height * shortest))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
 
@@ -106,8 +108,8 @@ def _distance(s: np.ndarray, fillet: FilletInSheet, drawn: bool) -> np.ndarray:
     return np.maximum(np.maximum(first - s, s - last), 0.0)
 
 
-def _through_layers(preset: Preset, through: float, keep: bool) -> list[int]:
+def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:
     """Return the numbers of elements through the layers, by their share of the thickness."""
     share = preset.thickness / preset.thickness.sum()
     least = np.array(preset.through if keep else np.ones(len(share)))
-    return np.maximum(np.ceil(np.ceil(through - 1e-9) * share - 1e-9), least).astype(int).tolist()
+    return np.maximum(np.ceil(through * share - 1e-9), least).astype(int).tolist()
