@@ -1,6 +1,6 @@
 """What `accuracy=` promises for sheets that tools touch: error of the wall and cost in six moulds, beside uniform meshes.
 
-    ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--out DIR]
+    ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--references FILE]
 
 The error is the largest relative difference of the wall at a node, farther than a thickness from the constrained end,
 to a mesh with columns of half the length of "fine" and two more elements through the sheet. The cost is processor time
@@ -171,6 +171,7 @@ def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--only", nargs="+", choices=MOULDS, default=list(MOULDS))
     options.add_argument("--again", action="store_true", help="keep stored references and uniform meshes")
+    options.add_argument("--references", type=Path, help="also write the walls on the finest meshes, to 6 digits")
     options.add_argument("--out", type=Path, default=Path("results/accuracy_in_moulds"), help="folder for summary.json")
     args = options.parse_args()
     file = args.out / "summary.json"
@@ -182,6 +183,9 @@ def main():
             print(f"{name:8}{line(row)}  {accuracy}; cheapest uniform mesh {row['cheapest']}: ratio of costs"
                   f" {row['million_ratio'] or 0:.2f}, of times {row['seconds_ratio'] or 0:.2f}", flush=True)
         files.write_summary(file, {key: found[key] for key in MOULDS if key in found}, MPI.COMM_WORLD)
+    if args.references:
+        args.references.write_text(json.dumps({name: {key: [float(f"{x:.6g}") for x in found[name]["reference"][key]]
+                                                      for key in ("length", "wall")} for name in found}) + "\n")
 
 
 if __name__ == "__main__":

@@ -23,19 +23,19 @@ class Fineness(NamedTuple):
         along: number of columns along the sheet, if it were free of fillets and ends.
         fillet: length of a deformed column over the geometric mean of fillet radius and wall.
         through: smallest number of elements through the sheet.
-        bending: wall over fillet radius, times 1 - cos(turn), below which one element through the sheet is enough.
+        even: length from a constrained end with columns of the shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
     """
 
     along: int
     fillet: float
     through: int
-    bending: float
+    even: float
     height: float
 
 
-FINENESS = {"draft": Fineness(16, 1.3, 1, np.inf, 5.0), "standard": Fineness(20, 0.75, 2, 0.04, 4.0),
-            "fine": Fineness(40, 0.4, 2, 0.0, 4.0)}
+FINENESS = {"draft": Fineness(16, 1.3, 1, 0.0, 5.0), "standard": Fineness(20, 0.8, 2, 0.0, 4.0),
+            "fine": Fineness(40, 0.4, 3, 1.5, 4.0)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 0.1
@@ -48,7 +48,11 @@ _UNSURE = 0.03
 """Error of an estimated position away from the start, over the length of the sheet; twice as much towards the start."""
 
 _END = 0.5
-"""Length over height of an element at a constrained end: shorter elements lock, longer ones miss the bending."""
+"""Length of a column at a constrained end over the height of an element, of half the thickness at least: shorter
+elements lock, longer ones miss the bending."""
+
+_BENDING = 0.04
+"""Wall over fillet radius, times 1 - cos(turn), below which one element less through the sheet is enough."""
 
 _WALL = 0.25
 """Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
@@ -89,11 +93,12 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
             size = np.minimum(size, wanted + GROWTH * _distance(s, fillet, moving and item.direction is None))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
-    through = max(1 if bending < fineness.bending else fineness.through,
+    through = max(fineness.through - 1 if bending < _BENDING else fineness.through, 1,
                   int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
     for end in (0, -1):
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
-            size = np.minimum(size, _END * thickness / through + GROWTH * np.abs(s - s[end]))
+            away = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
+            size = np.minimum(size, _END * thickness / min(through, 2) + GROWTH * away)
     ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
@@ -104,7 +109,7 @@ def _distance(s: np.ndarray, fillet: FilletInSheet, drawn: bool) -> np.ndarray:
     drawn: a moving tool draws the sheet as well, so that the position is less certain.
     """
     unsure = _UNSURE * s[-1]
-    first, last = fillet.first - (4 if drawn else 2) * unsure, fillet.last + unsure
+    first, last = fillet.first - (3 if drawn else 2) * unsure, fillet.last + unsure
     return np.maximum(np.maximum(first - s, s - last), 0.0)
 
 
