@@ -34,8 +34,8 @@ class Fineness(NamedTuple):
     height: float
 
 
-FINENESS = {"draft": Fineness(16, 1.3, 1, 0.0, 5.0), "standard": Fineness(20, 0.8, 2, 0.0, 4.0),
-            "fine": Fineness(40, 0.4, 3, 1.5, 4.0)}
+FINENESS = {"draft": Fineness(16, 1.0, 1, 0.0, 5.0), "standard": Fineness(20, 0.68, 2, 0.0, 4.0),
+            "fine": Fineness(40, 0.36, 3, 1.5, 4.0)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 0.1
@@ -45,7 +45,8 @@ _SHORTEST = 1 / 16
 """Smallest over largest length of a column."""
 
 _UNSURE = 0.03
-"""Error of an estimated position away from the start, over the length of the sheet; twice as much towards the start."""
+"""Error of an estimated position away from the start, over the length of the sheet; three times as much towards
+the start."""
 
 _END = 0.5
 """Length of a column at a constrained end over the height of an element, of half the thickness at least: shorter
@@ -56,6 +57,9 @@ _BENDING = 0.04
 
 _WALL = 0.25
 """Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
+
+_TURN = 1 / 8
+"""Power of 1 - cos(turn) of a fillet: the sheet bridges a flat fillet less, and its columns may be longer."""
 
 _SAMPLES = 2000            # points of the sheet at which sizes are computed
 
@@ -82,15 +86,15 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     fineness = FINENESS[preset.accuracy]
     longest = s[-1] / fineness.along
     size = np.full(len(s), longest)
-    moving = any(item.direction is not None for item in touching)
     shortest, bending = longest, 0.0
     for item in touching:
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
             wall = thickness * fillet.area_ratio
             wanted = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
+            wanted *= fillet.turn ** -_TURN
             wanted = max(wanted, _SHORTEST * longest)
             shortest = min(shortest, wanted)
-            size = np.minimum(size, wanted + GROWTH * _distance(s, fillet, moving and item.direction is None))
+            size = np.minimum(size, wanted + GROWTH * _distance(s, fillet))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
     through = max(fineness.through - 1 if bending < _BENDING else fineness.through, 1,
@@ -103,14 +107,10 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
 
-def _distance(s: np.ndarray, fillet: FilletInSheet, drawn: bool) -> np.ndarray:
-    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length.
-
-    drawn: a moving tool draws the sheet as well, so that the position is less certain.
-    """
+def _distance(s: np.ndarray, fillet: FilletInSheet) -> np.ndarray:
+    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length."""
     unsure = _UNSURE * s[-1]
-    first, last = fillet.first - (3 if drawn else 2) * unsure, fillet.last + unsure
-    return np.maximum(np.maximum(first - s, s - last), 0.0)
+    return np.maximum(np.maximum(fillet.first - 3 * unsure - s, s - fillet.last - unsure), 0.0)
 
 
 def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:

@@ -126,15 +126,16 @@ def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray)
     stretches evenly between the points at its ends, which stick.
     """
     points = np.concatenate([face[:1], x, face[-1:]])
-    for end, neighbour in ((0, 1), (-1, -2)):
-        if face[end, 0] <= 1e-9 * s[-1]:
-            points[end] = (0.0, points[neighbour, 1])                # it moves along the axis
+    on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]
     place, sticks = np.full(len(points), np.nan), np.zeros(len(points), bool)
     place[[0, -1]], sticks[[0, -1]] = s[[0, -1]], True
     for radius in np.geomspace(max(free.max(), 1e-12 * s[-1]), max(free.min(), 1e-6 * s[-1]), _LEVELS):
         touches = sticks.copy()
         touches[1:-1] |= free >= (1 - 1e-9) * radius
-        chord = np.hypot(*np.diff(points[touches], axis=0).T)
+        line = points[touches]
+        for end, neighbour in on_axis:
+            line[end, 1] = np.clip(line[neighbour, 1], *sorted((face[end, 1], x[end, 1])))     # it moves along the axis
+        chord = np.hypot(*np.diff(line, axis=0).T)
         arc = np.maximum(2 * radius * np.arcsin(np.minimum(chord / (2 * radius), 1.0)), chord)
         along, known = np.concatenate([[0.0], np.cumsum(arc)]), sticks[touches]
         place[touches] = np.interp(along, along[known], place[touches][known])
