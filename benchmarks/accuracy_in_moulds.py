@@ -1,11 +1,12 @@
-"""What `accuracy=` promises for sheets that tools touch: error of the wall and cost in six moulds, beside uniform meshes.
+"""Error of the wall and cost of `accuracy=` for sheets that tools touch, in six moulds, beside uniform meshes.
 
     ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--references FILE]
 
 The error is the largest relative difference of the wall at a node, farther than a thickness from the constrained end,
 to a mesh with columns of half the length of "fine" and two more elements through the sheet. The cost is processor time
-of the whole run, forms compiled before, and iterations times unknowns. The cheapest uniform mesh is the one of `UNIFORM`
-with the lowest iterations times unknowns among those that keep the promise. --only keeps the other moulds' numbers.
+of the whole run, forms compiled before, and iterations times unknowns. The cheapest uniform mesh is the one of
+`UNIFORM` with the lowest iterations times unknowns among those that keep the promise. --only keeps the other moulds'
+numbers, --again their references and uniform meshes.
 """
 
 import argparse
@@ -155,16 +156,16 @@ def with_cheapest(rows):
     for accuracy in (name for name in PROMISED if name in rows):
         row, keeps = rows[accuracy], [row for row in rows["uniform"] if row["error"] <= PROMISED[accuracy]]
         best = min(keeps, key=lambda row: row["million"], default=None)
-        row["elements"], row["cheapest"] = (f"{r['along']} x {r['through']}" if r else "none" for r in (row, best))
-        row["cheapest_error"], row["cheapest_seconds"] = (best and best[key] for key in ("error", "seconds"))
+        row["elements"] = f"{row['along']} x {row['through']}"
+        row["cheapest"] = best and f"{best['along']} x {best['through']}: {best['error']:.2%}, {best['seconds']:.2f} s"
         row["million_ratio"], row["seconds_ratio"] = (best and row[key] / best[key] for key in ("million", "seconds"))
     return rows
 
 
 def line(row):
     """Return a row as text."""
-    return (f"{row['along']:5} x {row['through']}{100 * row['error']:8.2f} %{row['seconds']:8.2f} s{row['million']:8.3f}"
-            f" million{row['iterations']:5} iterations")
+    return (f"{row['along']:5} x {row['through']}{100 * row['error']:8.2f} %{row['seconds']:8.2f} s"
+            f"{row['million']:8.3f} million{row['iterations']:5} iterations")
 
 
 def main():

@@ -34,8 +34,8 @@ class Fineness(NamedTuple):
     height: float
 
 
-FINENESS = {"draft": Fineness(16, 1.0, 1, 0.0, 5.0), "standard": Fineness(20, 0.68, 2, 0.0, 4.0),
-            "fine": Fineness(40, 0.36, 3, 1.5, 4.0)}
+FINENESS = {"draft": Fineness(16, 1.15, 1, 0.0, 5.0), "standard": Fineness(20, 0.68, 2, 0.0, 4.0),
+            "fine": Fineness(40, 0.36, 3, 1.0, 4.0)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 0.1
@@ -53,7 +53,7 @@ _END = 0.5
 elements lock, longer ones miss the bending."""
 
 _BENDING = 0.04
-"""Wall over fillet radius, times 1 - cos(turn), below which one element less through the sheet is enough."""
+"""Wall over fillet radius, times 1 - cos(turn), below which two elements through the sheet are enough."""
 
 _WALL = 0.25
 """Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
@@ -76,7 +76,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
-    at = np.linspace(*columns.ends[[0, -1]], _SAMPLES)
+    at = np.linspace(columns.ends[0], columns.ends[-1], _SAMPLES)
     rows = columns.place(at)
     s = length_along(rows[[0, -1]].mean(0))
     faces = dict(zip(columns.faces, rows[[0, -1]]))
@@ -91,18 +91,18 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
             wall = thickness * fillet.area_ratio
             wanted = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
-            wanted *= fillet.turn ** -_TURN
+            wanted *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
             wanted = max(wanted, _SHORTEST * longest)
             shortest = min(shortest, wanted)
             size = np.minimum(size, wanted + GROWTH * _distance(s, fillet))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
-    through = max(fineness.through - 1 if bending < _BENDING else fineness.through, 1,
+    through = max(fineness.through if bending >= _BENDING else min(fineness.through, 2),
                   int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
     for end in (0, -1):
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
             away = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
-            size = np.minimum(size, _END * thickness / min(through, 2) + GROWTH * away)
+            size = np.minimum(size, _END * thickness / min(through, fineness.through) + GROWTH * away)
     ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 

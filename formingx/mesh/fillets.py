@@ -1,9 +1,9 @@
 """Estimate of the part of an undeformed sheet that comes to lie on each fillet of a tool.
 
-A sheet under pressure is nearly a membrane: in the tool its free surface is that of the largest ball that fits. The
-radius of this ball falls as the pressure grows, and orders the points of the tool by their time of contact. What touches
-sticks; the free film stretches evenly along the section. Without a solution this gives the position of the fillet
-material to 5 % of the length of the sheet in deep moulds (benchmarks/accuracy_in_moulds.py).
+A sheet under pressure is nearly a membrane. In the tool its free surface is that of the largest ball that fits. The
+radius of this ball falls as the pressure grows; it orders the points of the tool by their time of contact. Points that
+touch stick, and the free film stretches evenly along the section. The position of the fillet material is found to 5 %
+of the length of the sheet in a cup (tests/test_accuracy_in_moulds.py).
 """
 
 from __future__ import annotations
@@ -111,7 +111,8 @@ def _groups(curvature: np.ndarray) -> list[np.ndarray]:
 
 def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) -> np.ndarray:
     """Return the radius of the largest ball outside the tool that touches it at each point, shape (m,), length."""
-    low, high = np.zeros(len(x)), np.full(len(x), largest)
+    low: np.ndarray = np.zeros(len(x))
+    high: np.ndarray = np.full(len(x), largest)
     for _ in range(40):
         radius = (low + high) / 2
         fits = tool.signed_distance(x - radius[:, None] * normal) <= -(1 - 1e-6) * radius

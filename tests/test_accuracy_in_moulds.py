@@ -1,0 +1,137 @@
+"""The promises of `accuracy` for sheets that tools touch, and the elements that they get."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+import formingx as fx
+from formingx.mesh.fillets import fillets_in_sheet
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import accuracy_in_moulds as moulds  # noqa: E402
+
+# walls on the finest meshes: benchmarks/accuracy_in_moulds.py --references writes them
+REFERENCES = json.loads((ROOT / "docs" / "data" / "walls_in_moulds.json").read_text())
+MOULD = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
+
+
+def error(name, path):
+    return moulds.error(path, (REFERENCES[name]["length"], REFERENCES[name]["wall"]))
+
+
+@pytest.fixture(scope="module")
+def standard_cup():
+    return moulds.cup(moulds.body("cup", accuracy="standard"))
+
+
+def test_draft_keeps_its_promise_in_the_cup():
+    path = moulds.cup(moulds.body("cup", accuracy="draft"))
+    assert error("cup", path) < moulds.PROMISED["draft"]
+    assert path.problem.n_unknowns < 700
+
+
+def test_standard_keeps_its_promise_in_the_cup(standard_cup):
+    """A uniform mesh needs 60 x 2 elements for it."""
+    assert error("cup", standard_cup) < moulds.PROMISED["standard"]
+    assert standard_cup.problem.n_unknowns < 1800
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", moulds.MOULDS)
+@pytest.mark.parametrize("accuracy", moulds.PROMISED)
+def test_every_accuracy_keeps_its_promise(name, accuracy):
+    assert error(name, moulds.MOULDS[name](moulds.body(name, accuracy=accuracy))) < moulds.PROMISED[accuracy]
+
+
+def test_material_of_the_fillet_and_its_wall_are_estimated(standard_cup):
+    """To 5 % of the sheet's length, and to a tenth of the wall."""
+    disc = np.column_stack([np.linspace(0, 10, 500), np.full(500, 0.3)])
+    fillet, = fillets_in_sheet(MOULD, disc, axisymmetric=True, moving=False)
+    assert (fillet.radius, fillet.turn) == pytest.approx((1.0, 1.0), rel=1e-2)
+    profile = standard_cup.profile()
+    on_fillet = (profile.top > (8.999, 4.299)).all(1)
+    R = profile.reference_radius[on_fillet]
+    assert (fillet.first, fillet.last) == pytest.approx((R.min(), R.max()), abs=0.5)
+    assert 0.3 * fillet.area_ratio == pytest.approx(profile.wall_thickness[on_fillet].mean(), rel=0.1)
+
+
+def columns(mesh, **scene):
+    """Return the reference ends of the columns of a scene of a disc under the cup, and the numbers through layers."""
+    layers = {name: fx.NeoHookean(c10=1.0) for name in mesh.layers}
+    scene = fx.Scene(**{"mesh": mesh, "materials": layers, "supports": [fx.Symmetry("axis"), fx.Clamped("rim")],
+                        "loads": [fx.Pressure("bottom")], "contacts": [fx.Contact("top", MOULD)]} | scene)
+    ends = scene.mesh.columns.ends
+    return ends, [len(scene.mesh.cells.find(tag)) // 2 // (len(ends) - 1) for tag in scene.mesh.layers.values()]
+
+
+def test_columns_are_short_where_the_sheet_comes_to_lie_on_a_fillet():
+    """Also of a sharper fillet, of a thinner wall, and in plane strain."""
+    def shortest(disc, **scene):
+        ends, _ = columns(fx.mesh.disc(**{"radius": 10.0, "thickness": 0.3} | disc), **scene)
+        lengths, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
+        inside = middle < 9.0                                            # those at the rim are short as well
+        least = lengths[inside].min()
+        return middle[inside & (lengths < 1.05 * least)].mean(), least
+    place, length = shortest({})
+    assert 6.0 < place < 7.5 and length < 0.2
+    sharper = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=0.5)
+    assert shortest({}, contacts=[fx.Contact("top", sharper)])[1] < 0.8 * length
+    thinner = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.15, fillet=1.0)
+    assert shortest({"thickness": 0.15}, contacts=[fx.Contact("top", thinner)])[1] < 0.8 * length
+    assert 6.0 < shortest({}, kinematics=fx.PlaneStrain())[0] < 7.5
+    assert shortest({"accuracy": "fine"})[1] < 0.6 * length < 0.5 * shortest({"accuracy": "draft"})[1]
+
+
+def test_layers_share_the_elements_through_the_sheet():
+    assert columns(fx.mesh.disc(radius=10.0, thickness={"core": 0.25, "skin": 0.05}))[1] == [2, 1]
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=0.2, density=1.0, heat_capacity=1.0), [], unit="C")
+    cooled = {"heat": heat, "temperature": 100.0}
+    assert columns(fx.mesh.disc(radius=10.0, thickness=0.3), **cooled)[1] == [4]            # as without a tool
+
+
+def test_given_elements_and_bodies_without_tools_stay():
+    def same(mesh, **scene):
+        ends, through = columns(mesh, **scene)
+        return np.array_equal(ends, mesh.columns.ends) and through == [len(mesh.columns.place(ends[:1])) // 2]
+    sheet = {"radius": 10.0, "thickness": 0.3}
+    assert not same(fx.mesh.disc(**sheet))
+    assert same(fx.mesh.disc(**sheet), contacts=[])
+    assert same(fx.mesh.disc(**sheet, elements=(40, 4)))
+    assert same(fx.mesh.disc(**sheet, grading=0.5)) and same(fx.mesh.disc(**sheet, concentrate={7.0: 0.3}))
+    block = [fx.Contact("top", fx.tools.plane(2.0))]
+    assert columns(fx.mesh.disc(radius=10.0, thickness=2.0), contacts=block)[0].size == 41             # a thick body
+    moved = fx.mesh.disc(**sheet)
+    moved.domain.geometry.x[:, 1] *= 0.9
+    assert columns(moved)[0].size == 41
+
+
+def test_parts_of_boundaries_stay():
+    mesh = fx.mesh.disc(radius=10.0, thickness=0.3).with_part("middle", "bottom", (0.0, 5.0))
+    ends, _ = columns(mesh, loads=[fx.Pressure("middle")])
+    assert np.isclose(ends, 5.0).any()
+
+
+def test_a_parison_has_an_accuracy():
+    mould = fx.tools.bottle(radius=3.0, height=10.0, neck=1.5, shoulder=2.0, neck_height=1.5, base=-2.9, fillet=0.8)
+    parison = {"inner_radius": 1.1, "thickness": 0.3, "length": 10.6}
+
+    def scene(**given):
+        return fx.Scene(mesh=fx.mesh.parison(**parison, **given), materials=fx.NeoHookean(c10=1.0),
+                        supports=[fx.Symmetry("axis"), fx.Clamped("neck")], loads=[fx.Pressure("inner")],
+                        contacts=[fx.Contact("outer", mould)])
+    n = {accuracy: len(scene(accuracy=accuracy).mesh.columns.ends) for accuracy in moulds.PROMISED}
+    assert n["draft"] < n["standard"] < n["fine"]
+    assert len(scene().mesh.columns.ends) == 61
+    with pytest.raises(fx.InputError, match="parison: accuracy"):
+        fx.mesh.parison(**parison, accuracy="finest")
+
+
+def test_a_small_nose_of_a_plug_gets_short_columns():
+    plug = fx.tools.male(radius=4.0, height=60.0, base=-60.0, fillet=0.5)
+    ends, _ = columns(fx.mesh.disc(radius=10.0, thickness=0.3), contacts=[
+        fx.Contact("bottom", plug, "none", direction=(0, 1))], loads=[])
+    lengths, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
+    assert lengths[(middle > 2.4) & (middle < 4.0)].max() < 0.6 * lengths[middle < 1.0].max()
