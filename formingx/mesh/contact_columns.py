@@ -38,7 +38,7 @@ FINENESS = {"draft": Fineness(16, 1.15, 1, 0.0, 5.0), "standard": Fineness(20, 0
             "fine": Fineness(40, 0.36, 3, 1.0, 4.0)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
-_THICKEST = 0.1
+_THICKEST = 1 / 10
 """Thickness over length above which a body is no sheet and keeps its elements."""
 
 _SHORTEST = 1 / 16

@@ -46,8 +46,8 @@ _LEVELS = 80
 _LARGEST = 30.0
 """Largest radius of the free surface over the length of the sheet."""
 
-_UNDER_PLUG = (0.6, 0.8)
-"""Smallest reference over present radius of the sheet at the edge of a moving tool, and the ratio of lengths there."""
+_UNDER_PLUG = 0.6
+"""Smallest reference over present radius of the sheet at the edge of a moving tool; the largest is 1."""
 
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
@@ -67,8 +67,9 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
     if moving:
         for group in groups:
             r = x[group, 0].max()
-            first, last = np.interp([_UNDER_PLUG[0] * r, r], face[:, 0], s)
-            yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, _UNDER_PLUG[1], _UNDER_PLUG[1], False)
+            first, last = np.interp([_UNDER_PLUG * r, r], face[:, 0], s)
+            stretch = (1 + _UNDER_PLUG) / 2
+            yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, stretch, stretch, False)
         return
     free = _free_radii(tool, x, normal, _LARGEST * s[-1])
     place, along = _positions(x, free, face, s), length_along(x)
