@@ -52,7 +52,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         accuracy: "draft", "standard" or "fine", for the number of elements. Sheets that bend near the rim get more
             elements through the thickness. Thick layers get more, too, so that no element is 1.5 times taller than
             wide. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
-            sheet, the `Scene` chooses other elements: short ones where the sheet comes to lie on a fillet of the tool,
+            sheet, the `Scene` chooses other elements: short ones where the sheet reaches a fillet of the tool,
             and fewer through the thickness (docs/accuracy.md). A given `grading` or `concentrate` is kept.
         elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a list with an
             entry for each layer. An entry is a count, or relative sizes of elements from the bottom up, as in (60, [[1,

@@ -1,7 +1,7 @@
 """Elements of a sheet that tools touch, for `accuracy=` of `disc` and `parison`.
 
 The wall of a formed sheet is least accurate where the sheet lies on a fillet of a tool. The columns of elements there
-are short; elsewhere few are enough. `fillets_in_sheet` estimates which part of the sheet comes to lie on a fillet.
+are short; elsewhere few are enough. `fillets_in_sheet` estimates which part of the sheet reaches a fillet.
 """
 
 from __future__ import annotations

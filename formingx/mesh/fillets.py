@@ -1,4 +1,4 @@
-"""Estimate of the part of an undeformed sheet that comes to lie on each fillet of a tool.
+"""Estimate of the part of an undeformed sheet that reaches each fillet of a tool.
 
 A sheet under pressure is nearly a membrane. In the tool its free surface is that of the largest ball that fits. The
 radius of this ball falls as the pressure grows; it orders the points of the tool by their time of contact. Points that
@@ -51,7 +51,7 @@ _UNDER_PLUG = 0.6
 
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
-    """Yield the fillets of a tool that a sheet may come to lie on.
+    """Yield the fillets of a tool that a sheet may reach.
 
     Args:
         tool: a tool of a section.
