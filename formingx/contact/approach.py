@@ -1,4 +1,4 @@
-"""The approach of contact points to their tool in a step: gap closures, and steps that are too long."""
+"""Contact of one face during a step: prediction of gap closures, and checks for steps that are too long."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ class StepLimits:
     """Limits that contact sets to a step.
 
     Attributes:
-        as_good: part of a step within which a point is as good as in touch.
-        beyond: length of a step that ends at a gap closure, over the length up to the closure.
-        near: distances, over thickness, at which a point is as good as in touch.
-        at_end: part of a step after which sticking points that touch have no friction until the next step.
-        slides: largest slip of such a point, over its tributary length.
-        nearer: largest motion of a point in a step of lagged contact, less its tributary length, over its distance from
-            the tool.
-        cut_off: largest depth of the straight path of a point through a tool, over its tributary length.
+        as_good: fraction of a step; gaps that close earlier in the step count as closed at its start.
+        beyond: length of a step that ends at a gap closure, over the arc length to the closure.
+        near: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
+        at_end: fraction of a step; sticking points whose gap closes later carry no friction until the next step.
+        slides: largest slip of a sticking point after its gap closure in a step, over its tributary length.
+        nearer: largest motion of a point in a step of lagged contact, less its tributary length, over its gap.
+        cut_off: largest depth of the straight path of a point inside a tool, over its tributary length.
         places: largest number of positions at which this path is checked.
-        lag: change of the pressure in a step of lagged friction, over the pressure.
+        lag: largest predicted change of the pressure in a step of lagged friction, over the pressure.
         behind: allowed difference between the pressure at the end of the step and the pressure that limits friction,
             over the pressure.
-        corrections: largest number of solutions of a step that reduce this difference.
-        inaccurate: change of the pressure, over `lag`, at which a step is taken again.
-        settling: iterations in which such friction settles, however short the step.
-        weak: smallest normal force to which these changes relate, over shear modulus times thickness times length.
-        shortest: lengths of steps (dimensionless) that are never too long for points that come into contact.
-        mixed: the same for steps in which sticking points lift off while the gaps of others close.
+        corrections: largest number of repeated solutions of a step that reduce this difference.
+        inaccurate: change of the pressure in a step, over `lag`, from which on the step is rejected.
+        settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
+        weak: normal force, over shear modulus times thickness times length, that is added to the pressure in these
+            ratios: lightly loaded contacts do not limit the step.
+        shortest: arc length (dimensionless) below which steps are never too long for these changes.
+        mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others close.
     """
 
     as_good: float = 0.02
@@ -59,16 +59,17 @@ LIMITS = StepLimits()
 
 
 class Approach:
-    """The step ahead of one contact: `reach` and `prepare` before each step, the other methods at its end.
+    """One contact during a step: `reach`, `along` and `prepare` are called before the solve, the other methods after
+    it.
 
     Args:
         face: the contact.
         conducts: True if heat flows through points in contact, from the end of the step on.
 
     Attributes:
-        points: number of points of the face, all ranks.
-        at_once: number of points that may come into contact in one step along the tangent. (If the order of the gap
-            closures does not matter, it is larger: the convergence of contact limits steps.)
+        points: number of points of the face on all ranks.
+        at_once: number of points that may come into contact in one step along the tangent. It is ten times larger if
+            the result does not depend on the order of the gap closures.
     """
 
     def __init__(self, face: FaceContact, conducts: bool):
@@ -79,13 +80,33 @@ class Approach:
         self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
-        """Return True if a point touches the tool."""
+        """Return True if any point of the face, on any rank, is in contact with the tool.
+
+        Args:
+            fields: locally owned unknowns of the state, shape (n,).
+            control: control of the state.
+
+        Returns:
+            True if a point is in contact.
+        """
         return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
 
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Return the length of a step along a tangent up to the first touch, or until enough new points touch.
+        """Return the admissible arc length of a step along a tangent.
 
-        A step that would bring a whole region into contact at once would decide by its own length where it sticks.
+        The step ends at the first gap closure of a face without contact, otherwise where `at_once` new points have come
+        into contact. If a whole region came into contact in one step, its sticking positions would depend on the step
+        length.
+
+        Args:
+            fields: locally owned unknowns of the state, shape (n,).
+            control: control of the state.
+            direction: derivative of the unknowns by arc length, shape (n,).
+            slope: derivative of the control by arc length.
+            length: largest arc length.
+
+        Returns:
+            Arc length, at most `length`.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
@@ -105,10 +126,18 @@ class Approach:
 
     def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
               length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the arc lengths along a tangent at which gaps close, at most `length`, and the positions there.
+        """Return the gap closures along a tangent.
+
+        Args:
+            fields: locally owned unknowns of the state, shape (n,).
+            control: control of the state.
+            direction: derivative of the unknowns by arc length, shape (n,).
+            slope: derivative of the control by arc length.
+            length: arc length of the step.
 
         Returns:
-            Arc lengths, shape (n,), and positions seen from the tool, shape (n, c), length.
+            For each locally owned point, the arc length at which its gap closes, or `length` if it stays open, shape
+            (n,). The position of the point at this arc length, relative to the tool, shape (n, c), length.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
@@ -118,15 +147,15 @@ class Approach:
 
     def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
                 ends: bool) -> None:
-        """Prepare a step: store the predicted positions of the gap closures.
+        """Prepare the solve of a step: store the predicted positions at which gaps close.
 
         Args:
             times: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
-            places: positions of the points there, seen from the tool, shape (n, c), length.
-            guessed: mask of points whose first guess is predicted from their forces, shape (n,); None: no points.
+            places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
+            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
             length: arc length of the step (dimensionless).
-            ends: True if the step ends where a sticking point closes its gap (see `touches_by`). The point has no
-                friction before.
+            ends: True if the run will end the step where a sticking point closes its gap (see `touches_by`). A point
+                whose gap closes near the end of the step then carries no friction before the next step.
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
@@ -137,9 +166,20 @@ class Approach:
             face.expect_arrivals(places)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if more than twice the intended, or predicted, number of new points came into contact.
+        """Return True if too many points came into contact in a step.
 
-        In lagged contact: if a new point is deeper in its tool than twice its tributary length.
+        The limit is about twice `at_once`, or twice the predicted number of gap closures. In lagged contact the limit
+        concerns
+        the depth: a new point must not be deeper in the tool than twice its tributary length.
+
+        Args:
+            old: locally owned unknowns at the start of the step, shape (n,).
+            old_control: control at the start of the step.
+            new: locally owned unknowns at its end, shape (n,).
+            control: control at its end.
+
+        Returns:
+            True if the step is too long.
         """
         face, theta = self.face, self.face.law.theta
         if face.touch is None:
@@ -153,15 +193,32 @@ class Approach:
 
     @property
     def lags(self) -> bool:
-        """True if friction is limited by a pressure that is fixed in a step."""
+        """True if friction in a step is limited by a fixed pressure, taken from the last accepted state (lagged
+        friction)."""
         return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
 
     def change_of_pressure(self, new: np.ndarray, control: float) -> float:
-        """Return the change of the pressure that limits lagged friction in a step, over the pressure."""
+        """Return the relative change of the contact pressure in a step with lagged friction.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: control at the end of the step.
+
+        Returns:
+            Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
+        """
         return self._part_of_pressure(self.face.tractions(new, control).normal) if self.lags else 0.0
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Limit lagged friction by the pressure at the end of the step; return False if it is close (`behind`)."""
+        """Update the pressure that limits lagged friction to the pressure at the end of the step.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: control at the end of the step.
+
+        Returns:
+            True if the pressure was updated; False if both agree to `StepLimits.behind`, or friction is not lagged.
+        """
         if not self.lags:
             return False
         face, law = self.face, self.face.law
@@ -172,7 +229,12 @@ class Approach:
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return a length, reduced so that the pressure of lagged friction changes by `StepLimits.lag` at most."""
+        """Return the arc length, at most `length`, at which the pressure of lagged friction has changed by
+        `StepLimits.lag`.
+
+        The pressure is extrapolated linearly from `start` (positions, shape (n, c), length) with `velocity` (their
+        derivative by arc length). Without lagged friction the result is `length`.
+        """
         if not self.lags:
             return length
         law, touch = self.face.law, self.face.touch
@@ -181,9 +243,17 @@ class Approach:
         return length * min(LIMITS.lag / change, 1.0) if change else length
 
     def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
-        """Return the relative difference between `normal` and another pressure, by default the last state's (stress).
+        """Return the relative difference between two pressure fields in the area-weighted 1-norm.
 
-        Only points under pressure at the last state count.
+        The difference is summed over the points that were under pressure at the last accepted state. It is divided by
+        the total normal force at that state plus a small force (`StepLimits.weak`).
+
+        Args:
+            normal: normal tractions, shape (n,), stress; tension counts as 0.
+            other: pressure to compare with, shape (n,), stress; None: the pressure at the last accepted state.
+
+        Returns:
+            Relative difference over all ranks.
         """
         face, before = self.face, self.face.law.pressure(self.face.touch)
         off = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
@@ -192,10 +262,17 @@ class Approach:
         return float(change / (pressure + LIMITS.weak * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
-        """Return True if sticking points lifted off and sprang back in the step to a state while the gaps of others
+        """Return True if some sticking points lifted off and moved back along the tool in a step while other gaps
         closed.
 
-        Positions where gaps close depend on which points still stick: a long step gets them wrong.
+        The positions at which gaps close depend on the points that still stick. A long step gets these positions wrong.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: control at the end of the step.
+
+        Returns:
+            True if both happened in the step, on any ranks.
         """
         face, theta, touch = self.face, self.face.law.theta, self.face.touch
         if touch is None or not face.contact.sticks or face.law.pulls or face.contact.lagged:
@@ -209,14 +286,31 @@ class Approach:
         return bool(np.all(found > 0))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if a point's straight way from one state to another, seen from the tool, leads through the
-        tool."""
+        """Return True if the straight path of a point in a step, relative to the tool, leads through the tool.
+
+        Args:
+            old: locally owned unknowns at the start of the step, shape (n,).
+            old_control: control at the start of the step.
+            new: locally owned unknowns at its end, shape (n,).
+            control: control at its end.
+
+        Returns:
+            True if a path cuts the tool deeper than allowed, see `cuts`.
+        """
         return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
 
     def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """Return True if a straight path from positions a to b is deeper than both ends by `StepLimits.cut_off`.
+        """Return True if the straight path of a point between two positions penetrates the tool too deeply.
 
-        A point that slides over an edge may cut it off by this depth.
+        The depth on the path may exceed the larger depth of its ends by `StepLimits.cut_off` times the tributary
+        length. A point that slides over an edge of the tool may cut the edge off by this depth.
+
+        Args:
+            a: positions of the points at the start, relative to the tool, shape (n, c), length.
+            b: positions at the end, shape (n, c), length.
+
+        Returns:
+            True if a path on any rank is too deep.
         """
         law, lengths = self.face.law, self.face.rule.lengths
         way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
@@ -231,11 +325,21 @@ class Approach:
         return bool(self._comm.allreduce(found, MPI.LOR))
 
     def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Return the part of a step up to the first gap closure of a point with wrong slip; 1 without such points.
+        """Return the fraction of a step up to the first gap closure of a point that then slipped wrongly.
 
-        Since the gap closed, pressure and slip are taken to grow at their final rates along (direction, slope). The
-        slip of a sticking point is wrong if it slid too far without friction. Under Coulomb's law it is wrong if the
-        final rate opposes the accumulated slip.
+        Pressure and slip since the gap closure are assumed to grow at their rates at the end of the step, along
+        (direction, slope). A sticking point is wrong if it slid too far without friction. A point with Coulomb friction
+        is wrong if its final sliding opposes the accumulated slip.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: control at the end of the step.
+            direction: derivative of the unknowns by arc length at the end, shape (n,).
+            slope: derivative of the control by arc length at the end.
+            length: arc length of the step.
+
+        Returns:
+            Fraction of the step, 1 without such points.
         """
         face, law, touch = self.face, self.face.law, self.face.touch
         if touch is None or not law.has_friction:
@@ -256,7 +360,19 @@ class Approach:
 
 
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Return the arc lengths at which free points (a mask) on straight paths meet the ramp, else `length`, (n,)."""
+    """Return the arc lengths at which open points on straight paths reach the outer edge of the ramp of their tool.
+
+    Args:
+        law: contact law.
+        start: positions of the points relative to the tool, shape (n, c), length.
+        velocity: their derivatives by arc length, shape (n, c), length.
+        free: mask of the open points, shape (n,).
+        length: arc length of the paths.
+
+    Returns:
+        Arc length of the first gap closure of each point, shape (n,); `length` for points that stay open or were
+        closed.
+    """
     at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
     ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
     near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))

@@ -1,4 +1,4 @@
-"""One increment of a contact: its tractions, as Newton's method linearises them."""
+"""One increment of a contact: tractions at its points, with the linearisation that Newton's method uses."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
 
 
 class Increment:
-    """Tractions at n points from their history variables of the last accepted state, until the next one is accepted.
+    """Tractions at n contact points during one increment, computed from the history variables of the last accepted
+    state.
 
-    Each run of Newton's method begins one, and so does the evaluation of a state. In each iteration
-
-        tractions(x)     gives the residual, at the positions x of the points seen from the tool, shape (n, c);
-        linearise(x)     is called at the same positions: `tractions(x)` then contains the tangent of the iteration;
-
-    and then `status`, `arrivals`, `taken` and `foretold` may be read. `expect` sets the sense of sliding for the next
-    iteration. A new increment begins when the state is accepted.
+    An increment begins with each run of Newton's method, and with each evaluation of a state. It ends when the state is
+    accepted. In each iteration the contact calls `tractions(x)` for the residual, with x the positions of the points
+    relative to the tool, shape (n, c). It then calls `linearise(x)` at the same positions. From then on `tractions(x)`
+    contains the tangent of the iteration. The local solve of contact (`LocalSolve`) then reads `status`, `arrivals`,
+    `taken` and `foretold`, and calls `expect` to set the sense of sliding for the next iteration.
 
     Args:
         law: contact law.
         touch: history variables of the points; None without friction.
-        start: positions of the points at the last accepted state, shape (n, c), length; None without such a state.
-        guessed: mask of the points whose first guess is predicted from their forces, shape (n,). The law of these
-            points is first linearised at the guess.
+        start: positions of the points relative to the tool at the last accepted state, shape (n, c), length; None
+            without such a state.
+        guessed: mask of the points whose contact forces are predicted at the first guess of the iteration, shape (n,).
+            The law of these points is first linearised at the guess, that of the others at the start.
     """
 
     def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
@@ -38,19 +38,29 @@ class Increment:
         self._last: tuple[np.ndarray, Tractions] | None = None
 
     def tractions(self, x: np.ndarray) -> Tractions:
-        """Compute the tractions of the law at positions x, once; after `linearise` at them, linearised."""
+        """Return the tractions of the law at given positions.
+
+        They are computed once per position. After `linearise` at the same positions, they are those of the linearised
+        law.
+
+        Args:
+            x: positions of the points relative to the tool, shape (n, c), length.
+
+        Returns:
+            Tractions at the points, with their stiffness.
+        """
         if self._last is None or not np.array_equal(x, self._last[0]):
             self._last = x, self._law.tractions(x, self._touch)
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
-        """Linearise the law at the motion predicted by the last iteration; return the change of the tractions at x.
+        """Linearise the law at the distances and slips that the last iteration predicted to first order.
 
         Args:
-            x: positions of the points, seen from the tool, shape (n, c), length.
+            x: positions of the points relative to the tool in this iteration, shape (n, c), length.
 
         Returns:
-            Tractions of the linearised law less the tractions of the law itself, shape (n, c), stress.
+            Tractions of the linearised law minus tractions of the law itself, at x, shape (n, c), stress.
         """
         plain = found = self.tractions(x)
         now = self._law.motion(x, self._touch)
@@ -66,33 +76,71 @@ class Increment:
 
     @property
     def status(self) -> np.ndarray:
-        """`Tractions.status` of those last computed, shape (n,)."""
+        """`ContactStatus` of each point (open, sticking, sliding) in the last computed tractions, shape (n,)."""
         return self._now[1].status
 
     @property
     def arrivals(self) -> np.ndarray:
+        """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
             return np.zeros(len(self._now[0]), dtype=bool)
         return self._law.touching(self._now[0], self._touch) & ~self._touched
 
     @property
     def ramp(self) -> float:
-        """Half-width of the ramp in which contact begins, length."""
+        """Half-width theta of the ramp, the range of distances over which the contact pressure sets in, length."""
         return self._law.theta
 
     def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tractions and stiffnesses that the last `linearise` used at some points.
+
+        Args:
+            points: indices of the points, shape (m,).
+
+        Returns:
+            Tractions, shape (m, c), stress; their derivatives by the position, shape (m, c, c), stress/length.
+        """
         return self._now[1].force[points], self._now[1].stiffness[points]
 
     def foretold(self, by: np.ndarray) -> Tractions:
-        """Return the law linearised at the positions after a motion, shape (n, c), length."""
+        """Return the tractions after a further motion of all points, with distances and slips predicted to first order.
+
+        Args:
+            by: motion of the points relative to the tool since the last computed tractions, shape (n, c), length.
+
+        Returns:
+            Tractions of the law, linearised at the predicted distances and slips.
+        """
         return self.ahead(slice(None))(by)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+        """Return a function that predicts the tractions at some points after a further motion.
+
+        Args:
+            points: indices of the points, shape (m,), or a slice.
+
+        Returns:
+            Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
+            their `Tractions`, linearised at the distances and slips predicted to first order.
+        """
         touch = self._touch and Touch(*(part[points] for part in self._touch))
         law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
         return lambda by: law.tractions(x, touch, None, there(by))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Return a function that predicts how deep some points are in the ramp after a further motion.
+
+        The local solve of contact uses this function to stop sticking points near the outer edge of the ramp.
+
+        Args:
+            points: indices of the points, shape (m,).
+
+        Returns:
+            Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
+            the depth over the width 2 theta of the ramp, shape (m,): 0 at the outer edge, 1 at the inner edge. Its
+            second value is the vector through the ramp along the normal, shape (m, c), length; 0 for points that slide,
+            adhere or have no friction.
+        """
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
         before = Motion(*(part[points] for part in self._before))
@@ -103,15 +151,22 @@ class Increment:
         return found
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function that maps a displacement of points to their `Motion` at the tool, to first order."""
+        """Return a function that maps motions of some points, shape (m, c), length, to their first-order `Motion`."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
         return lambda by: before.to(x + by)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
+        """Set the sense of sliding that the next `linearise` assumes at some points.
+
+        Args:
+            points: mask of these points, shape (n,).
+            sense: sense of sliding along the tangent of the tool, 1 or -1; 0 for sticking points, shape (n,).
+        """
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property
     def _now(self) -> tuple[np.ndarray, Tractions]:
+        """Positions and tractions of the last call of `tractions` or `linearise`."""
         assert self._last is not None, "call `tractions` first"
         return self._last

@@ -1,4 +1,8 @@
-"""Resultants of a contact in a state (fields: locally owned unknowns; control), of all ranks; collective."""
+"""Resultants of one contact at a state: force, energy, contact length and area, summed over all ranks.
+
+Each function is collective. The state is given by `fields`, the locally owned unknowns, shape (n,), and by `control`,
+the dimensionless control.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +15,33 @@ from .rule import without_area
 
 
 def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Depth of the deepest point inside the tool, 0 if none is, length."""
+    """Return the largest penetration depth of the contact points into the tool.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Depth, length; 0 if no point is inside the tool.
+    """
     d = face.contact.tool.signed_distance(face.positions(fields, control))
     return float(face.comm.allreduce(max(float(d.max(initial=0.0)), 0.0), MPI.MAX))
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the reference length of the face that is in touch; in three dimensions its area.
+    """Return the reference length of the part of the face that is in contact; in three dimensions its reference area.
 
-    The node on the axis carries hardly any force and may have a small gap where its neighbours stick. It is in touch if
-    the point next to it is.
+    The node on the axis carries hardly any force and may have a small gap where its neighbours stick. It counts as in
+    contact if the point next to it does.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Length; in three dimensions area, length^2.
     """
     rule = face.rule
     rows = gathered(face.comm, np.column_stack([rule.points, rule.lumped, rule.extent, face.touching(fields, control)]))
@@ -31,34 +52,81 @@ def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Deformed area of the face of a sheet in three dimensions that is in touch, length^2."""
+    """Return the deformed contact area of a sheet in three dimensions.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Deformed area of the part of the face that is in contact, length^2.
+    """
     return _sum(face, face.rule.lumped * face.rule.area_ratio(fields) * face.touching(fields, control))
 
 
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
-    """Total force of the body on the tool, shape (components,), stress length^2 (per depth: length).
+    """Return the resultant contact force of the body on the tool.
 
-    Axisymmetric: the r entry is the radial traction summed around, not a resultant (which is 0).
+    In axisymmetric problems the r entry is the radial traction integrated over the circumference. It is no resultant:
+    the resultant radial force is 0.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Force, shape (components,), stress length^2; in plane strain per depth, stress length.
     """
     total = (face.area[:, None] * face.tractions(fields, control).force).sum(0) - face.unbalanced
     return np.asarray(face.comm.allreduce(total, MPI.SUM))
 
 
 def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Sum of the normal forces at the points, in the units of `force`."""
+    """Return the sum of the normal contact forces at all points, as a scalar.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Sum of the normal forces, stress length^2; in plane strain per depth, stress length.
+    """
     return _sum(face, face.area * face.tractions(fields, control).normal)
 
 
 def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the energy of the normal tractions, stress length^3 (per depth: length^2)."""
+    """Return the energy stored by the penalty of the contact, the integral of the normal tractions over the distance.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Energy, stress length^3; in plane strain per depth, stress length^2.
+    """
     return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.touch))
 
 
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (reference points, shape (m, components), normal and tangential traction per reference area (m, 2)), by R.
+    """Return the contact tractions at all points of the face, sorted by the reference coordinate R.
 
-    That is force over `lumped` area: their sum is the force. The node on the axis has none: its force counts to the
-    middle of its facet, whose pressure it shows (pressure is even in R, tangential traction odd).
+    A traction is the force at a point over its tributary reference area (`Rule.lumped`); the sum of the products is the
+    force. The node on the axis has no tributary area. Its force is added to the middle node of its facet, whose
+    pressure it
+    is given: the pressure is even in R, the tangential traction odd.
+
+    Args:
+        face: the contact.
+        fields: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+
+    Returns:
+        Reference positions of the m points of all ranks, shape (m, components), length. Normal and tangential traction
+        per reference area, shape (m, 2), stress.
     """
     found, rule, c = face.tractions(fields, control), face.rule, face.points.shape[1]
     rows = np.column_stack([rule.points, rule.area, rule.lumped, rule.lengths, found.normal, found.tangential])
@@ -75,9 +143,10 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
 
 
 def _beside(points: np.ndarray, i: int) -> int:
-    """Return the point next to points[i]."""
+    """Return the index of the point nearest to `points[i]`, among positions of shape (m, components)."""
     return int(np.argsort(np.linalg.norm(points - points[i], axis=1))[1])
 
 
 def _sum(face: FaceContact, values: np.ndarray) -> float:
+    """Return the sum of values at the locally owned points, shape (n,), over the points of all ranks."""
     return float(face.comm.allreduce(float(values.sum()), MPI.SUM))

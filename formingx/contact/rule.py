@@ -1,6 +1,7 @@
-"""Quadrature of contact on the facets of a face, and the motion of its points with the unknowns.
+"""Quadrature of contact on a face of the body, and the motion of the quadrature points with the unknowns.
 
-Gauss-Lobatto's points are the nodes of six-node triangles; at Gauss points a face separates more smoothly.
+The points of the Gauss-Lobatto rule are the nodes of six-node triangles. With Gauss points a face separates more
+smoothly.
 """
 
 from __future__ import annotations
@@ -16,15 +17,17 @@ from ..ranks import gathered
 
 
 class Rule(Protocol):
-    """The n locally owned points of a face.
+    """Quadrature rule of a face: the n contact points that this rank owns.
 
     Attributes:
         dofs: local numbers of the unknowns that move each point, component by component of each of its nodes, (n, m).
         points: reference positions, shape (n, components), length.
         nodes: reference positions of the nodes of each point, shape (n, components) if a point is a node, else
             (n, nodes, components).
-        lengths, lumped: tributary reference length and area of each point, shape (n,) (lumped: 0 on the axis).
-        area: area on which the forces act, shape (n,): `lumped`, but see `Lobatto`.
+        lengths: tributary reference length of each point, shape (n,), length.
+        lumped: tributary reference area of each point, shape (n,), length^2 (per depth: length); 0 on the axis.
+        area: reference area on which the contact forces act, shape (n,). It equals `lumped`, except on the axis with
+            `Lobatto`.
     """
 
     dofs: np.ndarray
@@ -36,29 +39,63 @@ class Rule(Protocol):
 
     @property
     def extent(self) -> np.ndarray:
-        """Reference length of the face of each point, as in `contact_length`, shape (n,); in three dimensions an
-        area."""
+        """Share of each point in the contact length of the face, shape (n,), length; in three dimensions its area,
+        length^2.
+
+        The shares are taken in the reference configuration.
+        """
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components), in the units of the owned unknowns;
-        collective."""
+        """Return the displacement of the contact points; collective.
+
+        Args:
+            values: locally owned unknowns.
+
+        Returns:
+            Displacement, shape (n, components), in the units of `values`.
+        """
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add forces at the points, shape (n, components), to the owned residual; collective."""
+        """Add contact forces to the residual; collective.
+
+        Args:
+            values: locally owned entries of the residual, changed in place.
+            forces: forces at the points, shape (n, components), in the units of `values`.
+        """
 
     def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Stiffness of the points, shape (n, components, components), as the stiffness of their `dofs`, shape (n, m,
-        m)."""
+        """Return the stiffness of each point with respect to the unknowns that move the point.
+
+        Args:
+            stiffness: derivative of the force at a point by its position, shape (n, components, components).
+
+        Returns:
+            Derivative of the nodal forces by the unknowns `dofs`, shape (n, m, m).
+        """
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Return values at the points, shape (n,), from values at `nodes`."""
+        """Interpolate a scalar field to the contact points.
+
+        Args:
+            values: values at the nodes of each point (`nodes`), shape (n,) if a point is a node, else (n, nodes).
+
+        Returns:
+            Values at the points, shape (n,).
+        """
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Deformed over reference area at the points, shape (n,); `fields`: owned unknowns; collective."""
+        """Return the ratio of deformed to reference area of the face at the contact points; collective.
+
+        Args:
+            fields: locally owned unknowns of the state.
+
+        Returns:
+            Area ratio, shape (n,).
+        """
 
 
 class _Nodes:
-    """Points at nodes, which the unknowns of the nodes move."""
+    """Contact points that are nodes of the face: a point moves with the unknowns of its node."""
 
     dofs: np.ndarray
 
@@ -76,7 +113,10 @@ class _Nodes:
 
 
 class Lobatto(_Nodes):
-    """The nodes of the face. `lumped`, exact for cubics along a facet, gives the node on the axis no area."""
+    """Gauss-Lobatto rule: the contact points are the nodes of the face.
+
+    The tributary areas `lumped` are exact for cubic functions along a facet. A node on the axis has the area 0.
+    """
 
     def __init__(self, solid: Any, on: str, assemble: Any):
         kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
@@ -94,9 +134,16 @@ class Lobatto(_Nodes):
         self._facets = _own_facets(solid.scene.mesh, on)
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the mean area ratio of the edges on both sides of a node, shape (n,).
+        """Return the area ratio at each node, the mean over the edges on both sides of the node, shape (n,);
+        collective.
 
         On the axis the circumferential stretch equals the stretch along the edge.
+
+        Args:
+            fields: locally owned unknowns of the state.
+
+        Returns:
+            Ratio of deformed to reference area, shape (n,).
         """
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
@@ -109,12 +156,15 @@ class Lobatto(_Nodes):
 
     @property
     def extent(self) -> np.ndarray:
-        """Length of the face of each point on the first mesh of the body."""
+        """Share of each node in the contact length of the face, on the first mesh of the body, shape (n,), length."""
         return self._first_lengths
 
     @cached_property
     def _first_lengths(self) -> np.ndarray:
-        """`lengths` times the mean length ratio, first over present mesh, of the edges at each node, shape (n,)."""
+        """Tributary length of each node on the first mesh of the body, shape (n,), length.
+
+        It is `lengths` times the mean ratio of edge lengths at the node, first mesh over present mesh.
+        """
         if self._brought is None:
             return self.lengths
         first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
@@ -124,21 +174,25 @@ class Lobatto(_Nodes):
 
     @property
     def has_area(self) -> np.ndarray:
-        """Mask of the points with a `lumped` area: all but a node on the axis, shape (n,)."""
+        """Mask of the points with a tributary area `lumped`, shape (n,): all except a node on the axis."""
         return self.lumped > 1e-9 * self.lumped.max()
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """Two ends and the middle of each edge of the face, all ranks', as rows of all ranks' points, shape (m, 3)."""
+        """Indices of the end nodes and the middle node of each edge of the face on all ranks, shape (m, 3).
+
+        The indices count the points of all ranks, in the order of the ranks.
+        """
         from scipy.spatial import cKDTree
         X = gathered(self._comm, self._X[_nodes_of(self._facets, self._vectors, self._X)])
         found = cKDTree(gathered(self._comm, self.points)).query(X.reshape(-1, X.shape[2]))[1]
         return np.asarray(found).reshape(-1, 3)
 
     def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
-        """Give the node on the axis a part of the area of its facet, so that contact forces act on it.
+        """Give the node on the axis a share of the area of its facet, so that contact forces act on the node.
 
-        (1/24, -2/24, 1/24) of L times the weight at L: integrals of linear functions along the facet stay exact.
+        The three nodes of the facet get (1/24, -2/24, 1/24) of its length L times the weight at L. Integrals of linear
+        functions along the facet stay exact.
         """
         nodes = gathered(comm, np.column_stack([self.points, self.lengths, self.lumped]))
         for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:
@@ -151,7 +205,7 @@ class Lobatto(_Nodes):
 
 
 class Vertices(_Nodes):
-    """The nodes of a sheet in three dimensions, each with a third of the area of the triangles around it.
+    """Nodes of a sheet in three dimensions, each with a third of the area of the adjacent triangles.
 
     `lengths` is the square root of this area.
     """
@@ -167,10 +221,18 @@ class Vertices(_Nodes):
 
     @cached_property
     def _deformed_area(self) -> Any:
+        """Compiled linear form whose entries are the deformed tributary areas of the nodes."""
         return self._surface.compile(self._surface.area_row(deformed=True))
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the present over the reference area of the triangles around each node."""
+        """Return the deformed area of the triangles around each node over their reference area, shape (n,); collective.
+
+        Args:
+            fields: locally owned unknowns of the state.
+
+        Returns:
+            Area ratio, shape (n,).
+        """
         w = self._surface.w.x
         before = w.array.copy()
         w.array[: len(fields)] = fields
@@ -181,10 +243,12 @@ class Vertices(_Nodes):
 
 
 class Gauss:
-    """`count` Gauss points of each facet of a cell that this rank owns. Nodes of such a facet may be ghosts.
+    """Gauss rule with `count` points on each facet of a face whose adjacent cell this rank owns.
+
+    Nodes of such a facet may be ghosts.
 
     Attributes:
-        shapes: shape functions of the three nodes at the points, shape (n, 3).
+        shapes: shape functions of the three nodes of the facet at the points, shape (n, 3).
     """
 
     def __init__(self, solid: Any, on: str, count: int):
@@ -220,7 +284,8 @@ class Gauss:
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Return values at the points; a uniform field stays uniform to the last bit."""
+        """Interpolate values at the nodes, shape (n, 3), to the points, shape (n,); a uniform field stays uniform to
+        the last bit."""
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
@@ -230,7 +295,8 @@ class Gauss:
         return grown * weight(now.T) / weight(self.points.T)
 
     def _at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the three nodes of each point, shape (n, 3, components), from owned unknowns."""
+        """Return the displacement of the three nodes of each point, shape (n, 3, components), from locally owned
+        unknowns."""
         unknowns, n = self._unknowns, self._owned
         unknowns.array[:n] = values[:n]
         unknowns.scatter_forward()
@@ -238,35 +304,46 @@ class Gauss:
 
     @property
     def _owned(self) -> int:
+        """Number of locally owned unknowns."""
         return self._unknowns.index_map.size_local
 
 
 def _along(edges: np.ndarray) -> np.ndarray:
-    """dx/ds at the two ends and the middle of edges, shape (m, 3, components)."""
+    """Return dx/ds, s being the edge coordinate from 0 to 1, at the ends and the middle of edges, shape (m, 3,
+    components)."""
     a, b, m = edges.transpose(1, 0, 2)
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 
 
 def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return a mask of the nodes of a face on the axis, of all ranks, shape (n,)."""
+    """Return a mask of the nodes of a face that lie on the axis and therefore have no tributary area.
+
+    Args:
+        lumped: tributary areas of the points, shape (n,).
+        lengths: their tributary lengths, shape (n,), length; 0 for points outside the face.
+
+    Returns:
+        Mask, shape (n,).
+    """
     return (lumped < 1e-9 * lumped.max()) & (lengths > 0)
 
 
 def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
-    """(space of the displacement, local numbers of each node's unknowns, shape (nodes, components))."""
+    """Return the space of the displacement and the local numbers of each node's unknowns, shape (nodes, components)."""
     vectors, numbers = solid.space.sub(0).collapse()
     return vectors, np.asarray(numbers, dtype=np.int32).reshape(-1, solid.scene.kinematics.components)
 
 
 def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
-    """Two ends and the middle of each facet, local numbers of nodes at X, shape (facets, 3)."""
+    """Return the local numbers of the two end nodes and the middle node of each facet, shape (facets, 3)."""
     found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
              for f in facets]
     return np.array(found, dtype=np.int32).reshape(-1, 3)
 
 
 def _own_facets(mesh: Any, on: str) -> np.ndarray:
-    """Local numbers of the facets of a boundary whose cells this rank owns: each facet is one rank's."""
+    """Return the local numbers of the facets of a boundary whose cells this rank owns; each facet belongs to one
+    rank."""
     topology, facets = mesh.domain.topology, mesh.facets_of(on)
     topology.create_connectivity(1, 2)
     cells = np.array([topology.connectivity(1, 2).links(f)[0] for f in facets], dtype=np.int64)

@@ -1,6 +1,6 @@
 """Limits to the number of points that come into contact in one step.
 
-If a whole region comes into contact in one step, its sticking positions depend on the length of that step.
+If a whole region comes into contact in one step, the positions at which its points stick depend on the step length.
 """
 
 from __future__ import annotations
@@ -15,21 +15,52 @@ from .approach import LIMITS, Approach
 
 
 class EventPrediction(Protocol):
-    """The contact events ahead of a state and the path that they bend (`formingx.extensions.contact_events`)."""
+    """Predicted contact events after an accepted state, and the path bent by them
+    (`formingx.extensions.contact_events`).
+
+    `StepLimit` calls `step_length` first, then `closures` and `bend` for the length that the step has in the end.
+    """
 
     def step_length(self, length: float) -> float | None:
-        """Return the length of a step, at most `length`; None: the events are unknown, from now on."""
+        """Return the admissible arc length of the step.
+
+        Args:
+            length: largest arc length.
+
+        Returns:
+            Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
+        """
 
     def closures(self, length: float) -> list[tuple] | None:
-        """Return for each contact the first three arguments of `Approach.prepare`; None: the events are unknown."""
+        """Return the gap closures predicted within the step.
+
+        Args:
+            length: arc length of the step.
+
+        Returns:
+            For each active contact the arguments times, places and guessed of `Approach.prepare`; None if the
+            prediction failed.
+        """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the change of (x, control) at a length along the tangent by the events, locally owned entries;
-        None: zero."""
+        """Return the deviation of the predicted path from the tangent of the state.
+
+        Args:
+            length: arc length along the tangent.
+
+        Returns:
+            Change of x, locally owned entries, shape (n,), and of the control; None if it is zero or unknown.
+        """
 
 
 class State(Start, Protocol):
-    """An accepted state: the unit tangent (direction, slope) of its path; kind: "start" of a path, or another."""
+    """Accepted state from which contact events are predicted.
+
+    Attributes:
+        direction: derivative of x by arc length (unit tangent of the path), locally owned entries, shape (n,).
+        slope: derivative of the control by arc length.
+        kind: "start" for the first state of a path; another word for its later states.
+    """
 
     direction: np.ndarray
     slope: float
@@ -37,27 +68,51 @@ class State(Start, Protocol):
 
 
 class Curve(Protocol):
-    """A path with the LU factors of its tangents."""
+    """Path solver that stores the LU factors of its last tangent."""
 
     def factorise_ahead(self, state: State) -> bool:
-        """Factorise the tangent ahead of an accepted state, unless it is at hand; False: it is singular."""
+        """Make sure that the stored LU factors belong to the tangent towards the next step from an accepted state.
+
+        An event predictor calls this method before it solves for the compliance of contact points. The tangent is
+        factorised only if the stored factors belong to another state.
+
+        Args:
+            state: the accepted state.
+
+        Returns:
+            True if the factors can be used; False if the tangent is singular.
+        """
 
 
 class EventPredictor(Protocol):
-    """Predicts the contact events of the contacts of a `StepLimit`."""
+    """Predictor of the contact events of all contacts of a `StepLimit`."""
 
     @property
     def active(self) -> bool:
-        """True if events are predicted for this body."""
+        """True if contact events are predicted for the contacts that are active now."""
 
     def predict(self, curve: Curve, state: State) -> EventPrediction | None:
-        """Return the events ahead of an accepted state, or None."""
+        """Return the contact events after an accepted state.
+
+        Args:
+            curve: path solver, for the tangent at the state.
+            state: the accepted state.
+
+        Returns:
+            The prediction; None if no events can be predicted.
+        """
 
 
 class Way(NamedTuple):
-    """A straight piece of a path: from (x, control) along (direction, slope), with an arc length.
+    """Straight piece of a path: a step along the tangent of an accepted state.
 
-    Arrays are locally owned entries, shape (n,). events: predicted contact events ahead of (x, control), or None.
+    Attributes:
+        x: unknowns at the state, locally owned entries, shape (n,).
+        control: control at the state.
+        direction: derivative of x by arc length, shape (n,).
+        slope: derivative of the control by arc length.
+        length: arc length of the step, dimensionless.
+        events: contact events predicted after the state, or None.
     """
 
     x: np.ndarray
@@ -69,17 +124,28 @@ class Way(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Reason for which a step is too long, and the admissible part of it; 0: not known."""
+    """Reason for rejecting a step that is too long.
+
+    Attributes:
+        why: the reason, as text for the log.
+        part: admissible fraction of the step length; 0 if unknown.
+    """
 
     why: str
     part: float = 0.0
 
 
 class StepLimit:
-    """Limits that the contacts of a problem set to each step, in this order: `length`, `prepare`, `check`.
+    """Limits the length of a step so that contacts do not change too much.
+
+    The run calls `length` (largest admissible arc length), then `prepare` (before the solve), then `check` (accept the
+    solved step or shorten it).
 
     Args:
         problem: the `Problem`.
+
+    Attributes:
+        several: True if several gaps may close in one step, in the predicted order.
     """
 
     def __init__(self, problem: Any):
@@ -95,30 +161,51 @@ class StepLimit:
 
     @property
     def present(self) -> list[Approach]:
-        """Return the contacts that take part now."""
+        """Contacts (`Approach`) that are active in the present stage."""
         return [approach for approach in self._all if approach.face.present]
 
     @property
     def only_sticks(self) -> bool:
-        """True if all contacts with friction stick: then sliding never ends a path, and short steps go on."""
+        """True if every active contact with friction sticks, with plane tools.
+
+        No contact slides then, so that a path does not end by sliding. The run may reduce a step to the shortest
+        length.
+        """
         coarse = [approach.face for approach in self.present if approach.face.law.has_friction]
         return bool(coarse) and all(face.contact.sticks and not face.contact.lagged for face in coarse)
 
     @property
     def predicts_events(self) -> bool:
-        """True if contact events ahead of a state are predicted."""
+        """True if contact events after an accepted state are predicted."""
         return self._predictor is not None and self._predictor.active
 
     def one_by_one(self) -> None:
-        """End steps where each point touches: predict no contact events."""
+        """End each step at the next gap closure from now on, without prediction of contact events."""
         self.several = False
 
     def predict(self, curve: Curve, state: State) -> EventPrediction | None:
-        """Return the contact events ahead of an accepted state, or None."""
+        """Return the contact events after an accepted state.
+
+        Args:
+            curve: path solver, for the tangent at the state.
+            state: the accepted state.
+
+        Returns:
+            The prediction; None if no events are predicted.
+        """
         return self._predictor.predict(curve, state) if self._predictor else None
 
     def length(self, way: Way) -> float:
-        """Return the admissible length of a step: up to where contact begins, or enough new nodes touch."""
+        """Return the largest admissible arc length of a step along a tangent.
+
+        The step ends where the first gap closes, or where the allowed number of new points has come into contact.
+
+        Args:
+            way: the step, with the wanted arc length.
+
+        Returns:
+            Arc length, at most `way.length`.
+        """
         found = way.events.step_length(way.length) if way.events else None
         if found is not None:
             return found
@@ -127,14 +214,15 @@ class StepLimit:
                     for c in self.present], default=way.length)
 
     def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
-        """Prepare all contacts for the next step; return the deviation from the tangent due to predicted events.
+        """Prepare all active contacts for the solve of a step: store the predicted positions of gap closures.
 
         Args:
             way: the step.
-            ends: True if the step ends at the first gap closure, see `check`.
+            ends: True if the run will end the step at the first gap closure that it handles wrongly, see `check`.
 
         Returns:
-            Change of (x, control) at the end of the step, locally owned entries; None: zero.
+            Deviation of the predicted end of the step from the tangent, due to contact events: change of x, locally
+            owned entries, shape (n,), and of the control. None if it is zero.
         """
         n, found = self._n, way.events.closures(way.length) if way.events else None
         for k, approach in enumerate(self.present):
@@ -146,9 +234,17 @@ class StepLimit:
         return way.events.bend(way.length) if way.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
-        """Return the reason for which the step between two states is too long, or None.
+        """Check after the solve whether a step was too long for the contacts.
 
-        `ends`: points that come into contact in it stick or slide from where they touch, which a long step gets wrong.
+        Args:
+            old: accepted state at the start of the step.
+            new: converged state at its end.
+            length: arc length of the step.
+            ends: True to also reject a step in which a point closes its gap and then slips wrongly. Such a point should
+                stick or slide from its gap closure on; a long step misses this position.
+
+        Returns:
+            Reason and admissible fraction of the step; None if the step is accepted.
         """
         n, contacts = self._n, self.present
         if any([c.grew_too_much(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
@@ -169,30 +265,36 @@ class StepLimit:
 
     @property
     def settling(self) -> int:
-        """Iterations in which friction in three dimensions settles, however short the step."""
+        """Number of Newton iterations that lagged friction needs in a step, however short; 0 without lagged friction.
+
+        The step control does not count them. Friction is lagged on tools in three dimensions.
+        """
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
     def let_go(self, new: Any) -> bool:
-        """Open the contact of points in tension at tools in three dimensions, at a converged state.
+        """Separate points under tension from tools in three dimensions, at a converged state.
+
+        Args:
+            new: the converged state.
 
         Returns:
-            True if any point opened.
+            True if any point separated, so that the state must be solved for again.
         """
         return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
 
     def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
-        """Put the points that penetrated tools in three dimensions during a step into contact, at its converged state.
+        """Close the contact of points that penetrated a tool in three dimensions during a step, at its converged state.
 
-        At a target these are the points of all tools, else only the points on tools with friction. Friction begins
-        then, limited by the pressure of the state.
+        At a target this applies to all tools, otherwise only to tools with friction. Friction then acts at these
+        points, limited by the pressure of the state.
 
         Args:
             new: the converged state.
-            at_target: True if the state meets a target.
+            at_target: True if the state meets a target of the run.
             sweep: number of earlier calls for this step.
 
         Returns:
-            True if anything changed, so that the state must be solved for again.
+            True if a contact status or a friction pressure changed, so that the state must be solved for again.
         """
         n, again = self._n, sweep < LIMITS.corrections
         late = [c.face.hold_late(new.x[:n], new.control, LIMITS.near * c.face.thickness)
@@ -200,6 +302,15 @@ class StepLimit:
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
     def passes_through(self, old: Any, new: Any) -> bool:
-        """Return True if a contact point goes through its tool on the straight way from one state to another."""
+        """Return True if a contact point passes through its tool between two states.
+
+        Args:
+            old: state at the start of the step.
+            new: state at its end.
+
+        Returns:
+            True if the straight path of a point, seen from the tool, cuts the tool deeper than allowed
+            (`Approach.cuts`).
+        """
         n = self._n
         return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.present])

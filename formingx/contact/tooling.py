@@ -1,4 +1,4 @@
-"""The tools of a scene and where they stand in its states: for pictures and tables."""
+"""Names and positions of the tools of a scene in its states, for pictures and tables."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..tools.shapes import Arc, Line, Tool
 
 
 class Tooling(NamedTuple):
-    """All contacts of a scene.
+    """All contacts of a scene, with names, travels and positions of their tools.
 
     Attributes:
-        contacts: in the order of the scene.
-        before: number of items of the scene before the contacts (`Scene.items`).
-        length: length scale of the forms of a problem: travel over amplitude, length.
+        contacts: contacts in the order of the scene.
+        before: number of items of the scene that precede the contacts in `Scene.items`.
+        length: length by which an amplitude is multiplied to give the travel of a tool, length.
     """
 
     contacts: list[Contact]
@@ -28,19 +28,30 @@ class Tooling(NamedTuple):
 
     @classmethod
     def of_problem(cls, problem: Any) -> Tooling:
-        """Return the tools of a `Problem`."""
+        """Return the tooling of a `Problem`."""
         scene = problem.scene
         return cls(scene.contacts, len(scene.loads) + len(scene.supports), problem.forms.length)
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> Tooling:
-        """Return the tools of a scene as plain data (`description.describe`)."""
+        """Return the tooling of a scene that is given as plain data.
+
+        Args:
+            scene: the scene, as `description.describe` returns it.
+
+        Returns:
+            The tooling.
+        """
         return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
                    scene["mesh"]["length"])
 
     @property
     def names(self) -> list[str]:
-        """Name of the tool of each contact; one without a name is "tool 1" and so on, by its (first) contact."""
+        """Name of the tool of each contact, in the order of the contacts.
+
+        A tool without a name is called "tool 1", "tool 2", ..., by the number of its first contact. Tools with the same
+        direction of motion count as one tool.
+        """
         first: dict[Any, int] = {}
         # tools with one motion are one
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
@@ -48,12 +59,23 @@ class Tooling(NamedTuple):
 
     @property
     def force_columns(self) -> dict[str, str]:
-        """{tool: the column of its force}: "tool_force" of the only one, else "plug_force" of one named "plug"."""
+        """Column name of the contact force on each tool, {tool name: column}.
+
+        The force on the only tool is in "tool_force". Of several tools, the force on "plug" is in "plug_force".
+        """
         names = list(dict.fromkeys(self.names))
         return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
-        """Return the travel of each tool (length) for these step data and control; None: the tool is inactive."""
+        """Return the travel of each tool in a state.
+
+        Args:
+            setting: step data of the state, as plain data of a `StepData`; empty for the reference configuration.
+            control: control of the state.
+
+        Returns:
+            Travel of each tool along its direction of motion, length; None for an inactive tool.
+        """
         if not setting:
             return [0.0] * len(self.contacts)
         there = StepData(**setting)
@@ -61,7 +83,14 @@ class Tooling(NamedTuple):
                 for i in range(self.before, self.before + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
-        """(tool, its shift (r, z)) of the active tools."""
+        """Return the active tools with their displacements.
+
+        Args:
+            travels: travel of each tool, length; None for an inactive tool.
+
+        Returns:
+            For each active tool the tool and its displacement (r, z), shape (2,), length.
+        """
         return [(contact.tool, travel * contact.way)
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
@@ -70,12 +99,22 @@ _three_dimensional: list[Callable[[dict[str, Any]], Any]] = []
 
 
 def register_tools(make: Callable[[dict[str, Any]], Any]) -> None:
-    """Provide the function that makes a tool in three dimensions from its plain data."""
+    """Register the function that makes tools in three dimensions; the extension 'space' calls this function.
+
+    Args:
+        make: function that maps the plain data of a tool to the tool.
+    """
     _three_dimensional[:] = [make]
 
 
 def tool_of(shape: dict[str, Any]) -> Any:
-    """Return the tool of plain data (`description.describe`).
+    """Return the tool that is described by plain data.
+
+    Args:
+        shape: the tool, as `description.describe` returns it.
+
+    Returns:
+        The tool.
 
     Raises:
         InputError: the tool is three-dimensional, and the extension is not installed.
@@ -92,6 +131,7 @@ def tool_of(shape: dict[str, Any]) -> Any:
 
 
 def _contact(data: dict[str, Any]) -> Contact:
+    """Return the `Contact` that is described by plain data (`description.describe`)."""
     direction = data["direction"] and tuple(data["direction"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     more = {name: data[name] for name in names if name in data}
