@@ -136,7 +136,7 @@ class Approach:
             length: arc length of the step.
 
         Returns:
-            For each locally owned point, the arc length at which its gap closes, or `length` if it stays open, shape
+            For each locally owned point, the arc length at which its gap closes, or `length` for open and for closed points, shape
             (n,). The position of the point at this arc length, relative to the tool, shape (n, c), length.
         """
         face = self.face
@@ -315,7 +315,7 @@ class Approach:
         law, lengths = self.face.law, self.face.rule.lengths
         way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
         ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
-        between = (law.distance(a) + law.distance(b) + way) / 2            # no place of the way is deeper
+        between = (law.distance(a) + law.distance(b) + way) / 2            # bound of the depth on the path
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):
@@ -374,7 +374,7 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
         closed.
     """
     at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
-    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # none comes nearer by more
+    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
     near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
     if len(near):
         gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)

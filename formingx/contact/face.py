@@ -1,5 +1,4 @@
-"""Contact of one face: forces at its points, and their history variables (a `History`). No form is compiled per
-tool."""
+"""Contact of one face with a tool: forces at its points and their history variables. No form is compiled per tool."""
 
 from __future__ import annotations
 
@@ -17,14 +16,14 @@ from .increment import Increment
 from .rule import Gauss, Lobatto, Rule, Vertices
 
 _SAME_STIFFNESS = 1e-3
-"""Of the stiffness of a point: what it may differ by to count as the same in the tangent ahead."""
+"""Relative difference of the stiffness of a point below which the stored tangent serves for the next step."""
 
 
 class Memory(NamedTuple):
     """History variables of the points of a face at the last accepted state.
 
     Attributes:
-        touch: history variables of the law of friction.
+        touch: history variables of the contact law.
         arrived: mask of the points that came into contact in the step to this state, shape (n,).
         penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
             (`Contact.present_area`).
@@ -36,7 +35,10 @@ class Memory(NamedTuple):
 
 
 class FaceContact:
-    """Residual, tangent and history of one contact, at the n points of its face that are this rank's.
+    """Residual, tangent and history variables of one contact, at the n locally owned points of its face.
+
+    Positions are relative to the tool: position of the point minus travel of the tool. A state is given by `fields`,
+    the locally owned unknowns, and by `control`.
 
     Args:
         solid: the scene's formulation, such as `Solid`.
@@ -44,15 +46,15 @@ class FaceContact:
         assemble: function that returns the locally owned entries of a linear form.
 
     Attributes:
-        rule: quadrature points (`Rule`).
+        rule: quadrature rule, with the contact points (`Rule`).
         points: their reference positions, shape (n, components), length.
         law: contact law at the points.
         thickness: thickness of the body behind the face, length.
         increment: the present `Increment`.
         present: True if the contact is active in the stage.
         shift: reduction of the distances, shape (n,), length, or None.
-        unbalanced: contact forces less the reaction of the body at its nodes, shape (components,), stress length^2:
-            round-off of positions, given by the perturbed runs of a design sensitivity.
+        unbalanced: contact forces minus reaction of the body at its nodes, shape (components,), stress length^2. The
+            perturbed runs of a design sensitivity set this round-off of positions.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -70,27 +72,33 @@ class FaceContact:
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
         self._way = solid.length * contact.way
         self.enter(0.0, float(contact.driven), True)
-        self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the tangent last made
+        self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
         self._memory: Memory | None = None
         self.start()
 
     def enter(self, base: float, rate: float, present: bool) -> None:
-        """Take a stage: the travel is base + rate * control (`StepData`), if the contact takes part."""
+        """Set the step data of a stage.
+
+        Args:
+            base: travel of the tool at control 0, over the length scale of the forms.
+            rate: its derivative by the control.
+            present: True if the contact is active in the stage.
+        """
         self._base, self._rate, self.present = base, rate, present
 
     def shift_distances(self, by: np.ndarray) -> None:
-        """Reduce the distances from now on, by `by`, shape (n,), length: after remeshing in a run."""
+        """Reduce the signed distances of the points by `by`, shape (n,), length, from now on; called after remeshing in
+        a run."""
         self.shift = by
         self.law = self._law(self._penalty)
 
     def _temperatures(self) -> np.ndarray | None:
-        """Return the temperatures of the body at the points, shape (n,); None where friction does not depend on
-        them."""
+        """Return the temperatures at the points, shape (n,); None if friction does not depend on the temperature."""
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
     def take_temperature(self) -> None:
-        """Update the friction to a changed temperature.
+        """Update the coefficient of friction at the points to the present temperature of the body.
 
         Raises:
             InputError: friction has no finite value at a temperature.
@@ -100,31 +108,43 @@ class FaceContact:
             self.increment = Increment(self.law, self.touch)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """See `Rule`."""
+        """Return the displacement of the points, shape (n, c), from locally owned unknowns and in their units;
+        collective."""
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Points seen from the tool, shape (n, components), length; `fields`: owned unknowns."""
+        """Return the positions of the points relative to the tool, shape (n, components), length, in a state (`fields`:
+        locally owned unknowns).
+        """
         return self.points + self._length * self.displacement(fields) - self.travelled(control)
 
     def travelled(self, control: float) -> np.ndarray:
-        """Return the travel of the tool, shape (components,), length."""
+        """Return the displacement vector of the tool at a control, shape (components,), length."""
         return (self._base + self._rate * control) * self._way
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+        """Return the motion of the points relative to the tool, shape (n, components), length.
+
+        Args:
+            dx: change of the locally owned unknowns.
+            step: change of the control.
+        """
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the tractions of the contact law at a state."""
+        """Return the contact tractions in a state, given by the locally owned unknowns `fields` and the control."""
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return a mask of the points that touch or stick, shape (n,)."""
+        """Return a mask of the points in contact, shape (n,), in a state (`fields`: locally owned unknowns)."""
         return self.law.touching(self.positions(fields, control), self.touch)
 
     @property
     def area(self) -> np.ndarray:
-        """Area on which the forces act, shape (n,). (Lagged: 0 for points that touch since this step.)"""
+        """Reference area on which the contact forces act, shape (n,), length^2 (per depth: length).
+
+        With lagged contact it is 0 for points that closed their gap in the last step.
+        """
         if self._memory is None or not self.contact.lagged:
             return self.rule.area
         return np.where(self._memory.arrived, 0.0, self.rule.area)
@@ -133,49 +153,69 @@ class FaceContact:
 
     @property
     def scale(self) -> np.ndarray:
+        """Factor from contact tractions to the dimensionless forces in the residual F, shape (n,), 1/stress."""
         return self._scale
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Derivative of the forces in F by positions, as in the last tangent, shape (n, components, components),
+        """Derivative of the forces in F by the positions, as in the last tangent, shape (n, components, components),
         1/length."""
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add forces in F at the points, shape (n, components), to the owned residual."""
+        """Add forces at the points, in the scale of F, shape (n, components), to the locally owned residual
+        `values`."""
         self.rule.add(values, forces)
 
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
-        """Newton's method begins ahead of a state (owned unknowns; None: of none); collective."""
-        if self.contact.present_area and old is not None:   # of a sheet: the wall is thinner by as much as it is wider
+        """Begin an increment: Newton's method starts from an accepted state; collective.
+
+        Args:
+            old: locally owned unknowns of the accepted state; None: the increment only evaluates states.
+            control: control of the accepted state.
+        """
+        if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
             self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         start = None if old is None else self.positions(old, control)
         self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
 
     def leave_out(self, points: np.ndarray) -> None:
+        """Keep some points (a mask, shape (n,)) open until the next increment begins."""
         law: Any = self.law                                  # see `ContactLaw`
         self.increment = Increment(law.without(points), self.touch)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Add the forces to the owned residual."""
+        """Add the contact forces in a state to the locally owned residual `values` (`fields`: locally owned
+        unknowns)."""
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Linearise the law for an iteration at a state; add the change of the forces to the residual (`values`)."""
+        """Linearise the contact law for a Newton iteration at a state.
+
+        Add the difference between linearised and actual contact forces to the locally owned residual `values`.
+        """
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
     def tangent(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """Return and store `stiffness` for the tangent of the problem; `ahead`: see `Residual.tangent`."""
+        """Return the contact stiffness by the unknowns of each point (`Rule.dofs`), shape (n, m, m), and store it as
+        that used.
+
+        ahead: True for the derivative towards the next step at an accepted state, where just closed points are stiff.
+        """
         self._in_tangent = self._stiffness(fields, control, ahead)
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of the forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
+        """Return the derivative of the forces in F by the unknowns of each point (`Rule.dofs`), shape (n, m, m), in a
+        state."""
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the stiffness of circumferential forces against circumferential motions, shape (n, m/2, m/2), see
-        the law."""
+        """Return the derivative of circumferential contact forces by circumferential motions, shape (n, m/2, m/2), in a
+        state.
+
+        The second variation of non-axisymmetric modes uses it; see `ContactLaw.stiffness_round`.
+        """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
             radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
@@ -184,9 +224,10 @@ class FaceContact:
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Stiffness ahead of an accepted state, less that in the tangent last made, (n, c, c), stress/length.
+        """Return the stiffness towards the next step minus the stiffness in the last tangent, shape (n, c, c),
+        stress/length.
 
-        0 where they differ by less than `_SAME_STIFFNESS` of it.
+        Entries are 0 for points at which both differ by less than `_SAME_STIFFNESS`.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -194,7 +235,10 @@ class FaceContact:
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
                                ahead: bool = False) -> None:
-        """Add the derivative of the forces by the control: the tool moves; `ahead`: as in `tangent`."""
+        """Add the derivative of the contact forces by the control, through the travel of the tool, to `values`.
+
+        ahead: True for the derivative towards the next step, as in `tangent`.
+        """
         if self._rate:
             stiffness = self._stiffness(fields, control, ahead)
             self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._way)))
@@ -207,6 +251,8 @@ class FaceContact:
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+        """Return the derivative of the forces in F by the unknowns, shape (n, m, m), from a stiffness of shape (n, c,
+        c)."""
         return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
@@ -215,6 +261,7 @@ class FaceContact:
         return self.contact.penalty * self._solid.stress / self.thickness
 
     def _law(self, penalty: np.ndarray | float) -> Any:
+        """Return the contact law at the points for a penalty over the reference penalty, shape () or (n,)."""
         law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
                                     self._temperatures())
         if self.shift is not None:
@@ -230,49 +277,55 @@ class FaceContact:
 
     @property
     def remembers(self) -> bool:
-        """True if the forces depend on history variables."""
+        """True if the contact forces depend on history variables."""
         return self.law.remembers or self.contact.present_area
 
     @property
     def touch(self) -> Touch | None:
-        """Return the history variables of the law of friction; None without friction."""
+        """History variables of the contact law; None if it has none, as without friction."""
         return self._memory and self._memory.touch
 
     def start(self) -> None:
-        """See `History`: nothing has touched the tool yet, the body being in the reference configuration."""
+        """Set the history variables of the reference configuration, in which the points have not been in contact."""
         self._start_at(self.points)
 
     def come_in(self, fields: np.ndarray, control: float) -> None:
-        """Activate the tool: nothing has touched it yet."""
+        """Set the history variables when the tool becomes active in a state: the points have not been in contact with
+        it."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
+        """Set the history variables of points that begin at positions x relative to the tool, shape (n, c), length."""
         self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Store the positions at which points touch in the step ahead (`Touch.arrival`).
+        """Store the predicted positions of the points when their gaps close in the next step (`Touch.arrival`).
 
-        guessed: mask of the points whose first guess is predicted from their forces, shape (n,); None: no points.
+        Args:
+            arrival: positions relative to the tool, shape (n, c), length; NaN for no friction in the step.
+            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
         """
         self._guessed = guessed
         if self._memory is not None:
             self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """See `History`. (A tool that is away remembers nothing new.)"""
+        """Update the history variables to an accepted state (x: locally owned unknowns); unchanged if the tool is
+        inactive."""
         if self._memory is None or not self.present:
             return
         old, theta = self._memory.touch, self.law.theta
         touch = self.law.tractions(self.positions(x, control), old).touch
         penalty = self._penalty if self.contact.present_area else self._memory.penalty
         arrived = (old.distance <= -theta) & (touch.distance > -theta)
-        if self.contact.lagged:                             # where another stage begins nothing has moved
+        if self.contact.lagged:                             # no point has moved since a stage began here
             moved = np.abs(touch.arrival - old.arrival).max(1, initial=0.0)
             arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
         self._take(Memory(touch, arrived, penalty))
 
     def let_go(self, fields: np.ndarray, control: float) -> bool:
-        """Open points in tension at a tool in three dimensions at a state; return True if any opened. Collective."""
+        """Separate the points under tension at a tool in three dimensions in a state; return True if any separated.
+        Collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         touch, x = self._memory.touch, self.positions(fields, control)
@@ -285,9 +338,9 @@ class FaceContact:
         return found
 
     def hold_late(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Put points that penetrated a tool in three dimensions by more than `most` (length) into contact.
+        """Close the contact of points that penetrated a tool in three dimensions by more than `most` (length).
 
-        Each sticks or slides from the place where its path in the step met the tool. Collective.
+        Each point sticks or slides from the position where its path in the step met the tool. Collective.
 
         Returns:
             True if there are such points.
@@ -305,32 +358,36 @@ class FaceContact:
 
     @property
     def force_scale(self) -> float:
-        """Shear modulus times thickness times the largest extent of the body: a force of the size of the body's."""
+        """Force of the magnitude of the forces in the body: shear modulus times thickness times largest extent of the
+        body."""
         return float(self._solid.stress * self.thickness * self._length)
 
     def get(self) -> Memory | None:
-        """See `History`; None without friction."""
+        """Return the present history variables; None without history variables."""
         return self._memory
 
     def put(self, memory: Memory | None) -> None:
-        """See `History`."""
+        """Restore history variables that `get` returned."""
         if memory is not self._memory:
             self._take(memory)
 
     def _take(self, memory: Memory | None) -> None:
+        """Set the history variables, and begin an increment that evaluates states."""
         self._memory = memory
         if self.contact.present_area and memory is not None:
             self._harden(memory.penalty)
         self.increment = Increment(self.law, self.touch)
 
     def save(self, memory: Memory) -> dict[str, np.ndarray]:
-        """See `History`: point by point with its reference position."""
+        """Return history variables of all ranks as arrays, with the reference position of each point; for a
+        checkpoint."""
         parts = self.comm.allgather((self.points, *memory.touch, memory.arrived, memory.penalty))
         names = ("points", *memory.touch._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> Memory:
-        """See `History`.
+        """Return the history variables of the locally owned points from the arrays of `save`, matched by reference
+        position.
 
         Raises:
             InputError: a point of the face is not in the data.
@@ -347,7 +404,17 @@ class FaceContact:
 
     def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
-        """See `History`: a point touches if the nearest point of the source touched, and has the slip fitted there."""
+        """Return the history variables of a face of another mesh, transferred to this face.
+
+        A point is in contact if the nearest point of the source is. Its elastic slip is fitted to those of the source.
+
+        Args:
+            source: the same contact on the other mesh.
+            memory: its history variables, or None.
+            x: locally owned unknowns of the state on this mesh.
+            control: control of the state.
+            mapping: function that maps points of the other mesh to this mesh.
+        """
         if memory is None:
             return None
         carrier, touch, theta = Carrier(self.comm, mapping(source.points), self.points), memory.touch, self.law.theta

@@ -156,8 +156,8 @@ class StepLimit:
         self._predictor = make(self) if make else None
 
     make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
-    """Function that makes the predictor of a limit, set by an extension. Without it, steps end where sticking points
-    touch."""
+    """Function that makes the predictor of a limit, set by an extension. Without it, a step ends where the gap of a
+    sticking point closes."""
 
     @property
     def present(self) -> list[Approach]:
