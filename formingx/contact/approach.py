@@ -136,8 +136,8 @@ class Approach:
             length: arc length of the step.
 
         Returns:
-            For each locally owned point, the arc length at which its gap closes, or `length` for open and for closed points, shape
-            (n,). The position of the point at this arc length, relative to the tool, shape (n, c), length.
+            For each locally owned point, the arc length at which its gap closes, shape (n,); `length` for points that
+            are closed or stay open. Their positions at this arc length, relative to the tool, shape (n, c), length.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
