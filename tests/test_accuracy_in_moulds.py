@@ -58,6 +58,16 @@ def test_material_of_the_fillet_and_its_wall_are_estimated(standard_cup):
     assert 0.3 * fillet.area_ratio == pytest.approx(profile.wall_thickness[on_fillet].mean(), rel=0.1)
 
 
+def test_rounded_edges_are_met_before_the_film_bridges_them_and_plugs_anywhere_below():
+    disc = np.column_stack([np.linspace(0, 12, 500), np.full(500, 0.3)])
+    edged = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0, lip=0.8)
+    found = {round(fillet.radius, 2): fillet for fillet in fillets_in_sheet(edged, disc, True, moving=False)}
+    assert found[1.0].concave and not found[0.8].concave
+    plug = fx.tools.male(radius=4.0, height=60.0, base=-60.0, fillet=0.5)
+    nose, = (fillet for fillet in fillets_in_sheet(plug, disc, True, moving=True) if fillet.last < 6)
+    assert (nose.first, nose.last) == pytest.approx((2.4, 4.0), rel=0.01)
+
+
 def columns(mesh, **scene):
     """Return the reference ends of the columns of a scene of a disc under the cup, and the numbers through layers."""
     layers = {name: fx.NeoHookean(c10=1.0) for name in mesh.layers}
