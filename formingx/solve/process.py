@@ -1,9 +1,9 @@
-"""A process: stages in order, each with its own control, which go on where the one before ended.
+"""A process: stages in order, each with its own control. A stage starts from the last state of the stage before.
 
-Everything is created once. A stage sets how the items of the scene follow the control (`StepData`): its controls have
-the control as its amplitude; other controllable items keep the value that it has. Tables against time make the time
-the control, piece by piece between their knots. Inactive items (an open grip, a plug that
-is not there yet) leave unbalanced forces. They fade along one more path.
+Meshes, forms and solver are created once. The step data of a stage (`StepData`) state how the amplitudes of all items
+depend on the control. The controlled item has the control as its amplitude; other items keep their present values. With
+tables against time, the time is the control in each piece between two knots. An item that becomes inactive (an open
+grip, a plug that is not there yet) leaves unbalanced forces. They fade to zero along a path of their own.
 """
 
 from __future__ import annotations
@@ -29,28 +29,30 @@ from .state import State
 from .stepping import SAME_TIME, StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
-"""Step control of a material that relaxes: after the first steps the error in time sets their length."""
+"""Step control for a material that relaxes: after the first steps the time integration error sets the step length."""
 
 _HELD = replace(_IN_TIME, target=8)
-"""In contact while nothing is driven: points in contact hardly move; the error in time says how long steps may be."""
+"""Step control for a body in contact while only time passes: its contact points hardly move, so more Newton
+iterations per step are allowed. The time integration error sets the step length."""
 
 _Targets: TypeAlias = list[tuple[Target, Measure]]
 
 
 class Execution:
-    """One run of a process, stage by stage, from its last state on.
+    """One run of a process, stage by stage, from its last state to the end of the last stage.
 
-    Piece 0 of a stage changes the active items. In each later piece a control varies. Each piece has one `StepData`.
+    A stage consists of pieces, each with one `StepData`. Piece 0 changes the active items. In each later piece a
+    control varies.
 
     Args:
         record: record of the states.
         plans: plans of the stages.
         unsure: plans whose tools must be checked again at the start of their stage.
-        look: function that checks such a plan, given a function from the number of an item to its value in the user's
-            units.
+        look: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
+            its value in the user's units.
         step: step control of stages that have none of their own.
         balanced: out-of-balance forces, relative to the support forces, that are negligible.
-        accuracy: the error in time that is allowed, relative.
+        accuracy: tolerance of the relative time integration error.
     """
 
     def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan],
@@ -66,14 +68,23 @@ class Execution:
         problem.enter(self._still, self._rest, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
-        """Run the remaining stages."""
+        """Run the remaining stages of the process.
+
+        Args:
+            max_steps: largest number of steps of a piece, or None.
+            progress: show a progress bar.
+
+        Raises:
+            ConvergenceError: a stage does not reach its target.
+            InputError: a stage contradicts the present state of the process.
+        """
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
         if self.record.states:
             self.record.restore()
         for k, plan in enumerate(self.plans[last["stage"]:], last["stage"]):
             self.record.stage, self._stage, self._inactive, self._k = plan.stage.name, plan.stage, plan.inactive, k
-            piece = last["piece"] if k == last["stage"] else -1     # of this stage, that has begun already
+            piece = last["piece"] if k == last["stage"] else -1     # last piece of this stage that has begun
             if piece < 1:
                 self._change(piece == 0)
                 if self.record.ended:
@@ -92,7 +103,10 @@ class Execution:
                 break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
-        """Return the targets of a stage and their measures; where it drives one item, or waits, the last is `until`."""
+        """Return the targets of a stage with their output quantities, as pairs.
+
+        Where the stage controls one item, or lets time pass until a target is met, the last pair is the target `until`.
+        """
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
         self.problem.enter(replace(self._still, rate=rate, inactive=plan.inactive), self._rest, 0.0)
@@ -108,29 +122,33 @@ class Execution:
         return found
 
     def _left_to_meet(self) -> _Targets:
-        """Return the targets of the stage, but those on its way that were met on meshes before."""
+        """Return the targets of the present stage, without intermediate ones that were met on earlier meshes."""
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
         return [(target, bound) for target, bound in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
     def _standing(self) -> tuple[StepData, Array, float]:
-        """Return the setting, the unknowns and the control where the process stands now."""
+        """Return (step data, unknowns, control) of the last accepted state, or of the unloaded body; unknowns
+        locally owned."""
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
     def _stands(self, number: int) -> float:
-        """Value of an item now, in the user's units."""
+        """Return the present value of an item, in the user's units; `number` is its number in the scene."""
         setting, _, control = self._standing()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
+        """Set new step data in the problem for a piece of the present stage (`StepData`); `control`: at the present
+        state."""
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._standing()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the present state of the process, as the start of a piece."""
+        """Return the present state of the process as the first state of a piece; `control` is its value in the new
+        step data."""
         if not self.record.states:
             return begin(self.curve)
         try:
@@ -139,14 +157,15 @@ class Execution:
             raise ConvergenceError(f"{self._stage.who} cannot begin: {failure.reason}") from None
 
     def _take_up(self, state: State) -> None:
-        """Accept a state that needs no solving."""
+        """Accept a state that is known without an iteration, as a completed step."""
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
-        """Follow the path from a control (None: on from the last state); return the targets that are still open.
+        """Follow the path of the present piece until its last target is met; return the pairs with targets still open.
 
-        requested: another target that ends the path, as the last one does.
+        targets: pairs (target, output quantity). control: at the present state, where the piece starts; None: continue
+        a piece. requested: another target that ends the piece.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -158,7 +177,8 @@ class Execution:
         return run.aim.open
 
     def _change(self, begun: bool) -> None:
-        """Piece 0: the active items change. The unbalanced forces fade gradually."""
+        """Run piece 0 of the present stage: change the active items while the unbalanced forces fade; `begun`:
+        continue it."""
         before, x, control = self._standing()
         start: float | None = None
         if not begun:
@@ -175,34 +195,43 @@ class Execution:
             self._trace([(target, target.bind(self.problem))], start)
 
     def _out_of_balance(self, x: Array) -> bool:
+        """Return True if the unbalanced forces at the unknowns x, locally owned, are not negligible."""
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _drive(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one item is the control."""
+        """Run piece 1 of a stage in which one item is the control; `numbers`: see `Plan`; `begun`: continue the
+        piece."""
         before, _, control = self._standing()
         if not begun:
             control = self._enter_driving(numbers)
         self._trace(self._left_to_meet(), None if begun else control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
-        """Make the amplitude of one item the control; return its present value. `clocked`: time passes as it moves."""
+        """Make the amplitude of an item the control (`numbers`: see `Plan`); return the present value of the control.
+
+        clocked: process time passes while the control changes.
+        """
         base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control
 
     @property
     def _label(self) -> str:
+        """Text before the target beside a progress bar: the stage and its number."""
         return f"stage {self._stage.name!r} ({self._k + 1} of {len(self.plans)}), "
 
     def _amplitudes(self) -> list[float]:
-        """Return the present amplitudes of all items, and the time."""
+        """Return the present dimensionless amplitudes of all items, then the process time."""
         setting, _, control = self._standing()
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
-        """Piece 1: one item is adjusted so that a quantity follows an amplitude in time."""
+        """Run piece 1 of a stage in which the control is adjusted so that a quantity follows an amplitude in time.
+
+        numbers: see `Plan`; begun: continue the piece.
+        """
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
         run = Flow(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
@@ -210,8 +239,10 @@ class Execution:
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
-        """Return (a target of the measure, the measure at a time, the times of its corners) of a flow that begins
-        now."""
+        """Return (target of the prescribed quantity, function of time for its value, times to meet exactly) of a stage.
+
+        The stage begins at the process time `now`. The times are its start, the corners and the end of the amplitude.
+        """
         stage, end = self._stage, self._stage.until
         if stage.constant and stage.duration:
             value = stage.constant.value
@@ -230,7 +261,11 @@ class Execution:
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _follow(self, tables: list[tuple[int, Array]], piece: int) -> None:
-        """Pieces 1, 2, ...: from knot to knot of the tables, the time being the control."""
+        """Run pieces 1, 2, ... of a stage with tables, from knot to knot; the control is the time; `tables`: see
+        `Plan`.
+
+        piece: number of the piece to continue; 0 to begin with the first.
+        """
         before, _, control = self._standing()
         stage, through = self._stage, self._left_to_meet()
         now = before.base[-1] if piece else self.problem.time_at(control)
@@ -247,13 +282,19 @@ class Execution:
             now, begun = then, False
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
-        """All tables are straight between these times; the control is the time, scaled: no amplitude is faster."""
+        """Set the step data of a piece between the times `now` and `then`, in which all tables are straight lines.
+
+        The control is proportional to the time. Its scale makes the largest rate of a dimensionless amplitude 1.
+        """
         base, rate = straight(self._amplitudes(), self.problem.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
     def _line(self, then: float, through: _Targets, begun: bool) -> _Targets:
-        """Go to the end of a piece of the tables; returns the targets that are still open."""
-        if self.problem.setting.rests and not self.problem.relaxes:     # only time goes by, and nothing cares
+        """Run a piece of the tables to its end at time `then`; return the pairs (target, output quantity) still open.
+
+        through: the pairs to meet in the piece. begun: continue the piece.
+        """
+        if self.problem.setting.rests and not self.problem.relaxes:     # only time passes, without an effect
             if not begun:
                 self._take_up(self._resumed(0.0))
             if self.record.last.control < 1.0:
@@ -270,6 +311,8 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
+        """Raise an InputError if tables contradict the process time `now`, or the values of their items, at their
+        start."""
         caller = self._stage.who
         if end <= now:
             raise InputError(f"{caller}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
@@ -287,7 +330,7 @@ class Execution:
 
 
 def is_done(record: Record, plans: list[Plan]) -> bool:
-    """Return True if the last state is the end of the last stage."""
+    """Return True if the last state of a run is the end of the last stage; `plans`: the plans of all stages."""
     last, plan = record.last, plans[-1]
     if last.setting["stage"] < len(plans) - 1:
         return False
@@ -303,8 +346,15 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
 
 def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """Return (base, rate, control now) of a setting that makes the amplitude of one item, by its numbers, the
-    control."""
+    """Return (base, rate, present control) of step data in which the amplitude of one item is the control.
+
+    Args:
+        amplitudes: present amplitudes of all items, then the process time.
+        scales: for each item, its value in the user's units over its amplitude.
+        numbers: numbers of the controlled item and of the items that move with it.
+        stage: the stage, whose speed or duration relates the process time to the control.
+        clocked: True if process time passes while the control changes.
+    """
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
     for number in numbers:
@@ -323,14 +373,17 @@ def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int]
 
 def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
-    """Return (base, rate) of a setting between two times where tables are straight; the control is the time, scaled."""
+    """Return (base, rate) of step data between the times `now` and `then`, where the tables are straight lines.
+
+    The control is proportional to the time. The other arguments are as in `driving` and `Plan`.
+    """
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
         first, value = table[0]
-        if now < first - SAME_TIME * abs(first):            # still on the way from where it stands to its first knot
+        if now < first - SAME_TIME * abs(first):            # straight from the present value to the first knot
             part = min((then - now) / (first - now), 1.0)
             change[i] = part * (value / scales[i] - base[i])
-        else:                                               # a hold has no round-off of the ramp before it to drive
+        else:                                               # a constant piece inherits no round-off from before
             base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
             change[i] = ahead - base[i]
     most = max(map(abs, change))
@@ -339,23 +392,24 @@ def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tupl
 
 
 def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
-    """Return the time at which a stage that follows tables, or waits, ends."""
+    """Return the process time at which a stage with tables or with a duration ends; `now`: process time at its
+    start."""
     return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
         table[-1, 0] for _, table in tables)
 
 
 def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
-    """Return the first time after now at which tables have a corner, or the end."""
+    """Return the first time of a knot after `now` in any of the tables, but at most `end`."""
     return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])
 
 
 def begin(curve: Curve) -> State:
-    """Return the first state of a path: the body at control 0, in equilibrium with all other loads on it.
+    """Return the first state of a path: the body at control 0, in equilibrium with all other loads.
 
-    Fixed loads for which Newton's method finds no equilibrium from the unloaded state are brought in gradually.
+    Newton's method starts from the unloaded state. If it fails, the constant loads are increased gradually.
 
     Raises:
-        ConvergenceError: there is none.
+        ConvergenceError: no equilibrium was found.
     """
     problem = curve.problem
     try:
@@ -377,7 +431,7 @@ def begin(curve: Curve) -> State:
 
 
 def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
-    """Return the error of a body for which no first state was found."""
+    """Return the error for a body without a first state; `failure` is the end of Newton's method."""
     loads = curve.problem.fixed_loads
     words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
         "", "a tool touches the body at rest: give its Contact a smaller ramp")

@@ -1,4 +1,4 @@
-"""Progress of a run towards its targets: a bar, and now and then a line in the log."""
+"""Progress of a run towards its targets: a progress bar, and lines in the log."""
 
 from __future__ import annotations
 
@@ -19,14 +19,20 @@ log = logging.getLogger("formingx")
 
 
 class Aim:
-    """The open targets of a run, and the values of the last one, which ends it, in its states.
+    """Open targets of a run, and the values of the last target's quantity in its states. This target ends the run.
+
+    Args:
+        curve: solver of the path.
+        targets: pairs (target, output quantity).
+        requested: another target that ends the run, or None.
 
     Attributes:
-        open: [(target, its measure)].
-        until, measure: the last target and its measure.
-        values: values of this measure in the states so far, in the user's units.
-        patience: number of states after which a run gives up, if they gained less than a thousandth of the way to the
-            target.
+        open: pairs (target, output quantity) that are still to be met.
+        until: the last target.
+        measure: its output quantity.
+        values: values of this quantity in the states so far, in the user's units.
+        patience: number of states after which a run gives up, if they gained less than a thousandth of the distance
+            from the first value to the target.
     """
 
     patience = 500
@@ -39,7 +45,7 @@ class Aim:
 
     @property
     def of_control(self) -> bool:
-        """True if the target is the control, or something that follows it."""
+        """True if the last target is a value of the control, or of an amplitude that follows the control."""
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:
@@ -47,34 +53,47 @@ class Aim:
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
-        """Return the progress of a value, by default the last, from the first state (0) to the target (1)."""
+        """Return the progress of the run: 0 at the first value of the quantity of the last target, 1 at the target.
+
+        Args:
+            value: value of the quantity, in the user's units; default: its value in the last state.
+        """
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def look(self, state: State) -> None:
-        """Add the value of a state, and update the progress."""
+        """Append the value of a state to `values`, and update the largest progress so far."""
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
-        """Close the targets that an accepted state meets."""
+        """Append the value of an accepted state to `values`, and close the targets that the state meets."""
         self.values.append(self._curve.value(self.measure, state.x, state.control))
-        self.open = [(t, b) for t, b in self.open if t is not state.met     # another may hold there, too
+        self.open = [(t, b) for t, b in self.open if t is not state.met     # other targets may be met, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
 
     def met_by(self, state: State) -> Target | None:
-        """Return the first open target that holds at a state, to round-off."""
+        """Return the first open target that a state meets to round-off, or None."""
         return next((target for target, bound in self.open
                      if is_met(target, bound.size, self._curve.value(bound, state.x, state.control))), None)
 
     def close_met(self, start: State) -> None:
-        """Close the targets that hold at the start already."""
+        """Close the targets that the first state of the run meets already."""
         while (target := self.met_by(start)) is not None:
             start.met = start.met or target
             self.open = [(t, b) for t, b in self.open if t is not target]
 
     def within_reach(self, old: State, length: float) -> tuple[Target | None, Measure | None, float]:
-        """(target, its measure, distance) of the first open target that the tangent meets within a length."""
+        """Return the first open target that a step along the tangent of a state meets.
+
+        Args:
+            old: the state.
+            length: arc length of the step.
+
+        Returns:
+            (target, its output quantity, arc length to the target); (None, None, length) if no target is within this
+            length.
+        """
         best: tuple[Target | None, Measure | None, float] = (None, None, length)
         for target, bound in self.open:
             left, rate = self._curve.aim(bound, target.value, old)
@@ -83,9 +102,12 @@ class Aim:
         return best
 
     def facing(self, start: State, first: bool = False) -> State:
-        """Return the start, its tangent turned if the target lies the other way.
+        """Return the first state of a run, its tangent reversed if the last target lies in the opposite direction.
 
-        (At rest, `first`, a target that does not change sign with the control may be reached both ways.)
+        Args:
+            start: the state; it is changed in place.
+            first: True for the unloaded state. It keeps its tangent for a quantity that does not change its sign with
+                the control: such a target may be reached in both directions.
         """
         if self.until.signed or not first:
             left, rate = self._curve.aim(self.measure, self.until.value, start)
@@ -95,7 +117,12 @@ class Aim:
         return start
 
     def short_of_targets(self, old: State, by: float) -> float:
-        """Return a change of the control in a jump, or as much of it as does not pass a target."""
+        """Return the change of the control in a snap-through, reduced so that no open target of the control is passed.
+
+        Args:
+            old: state before the snap-through.
+            by: change of the control, dimensionless.
+        """
         for target, bound in self.open:
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self._curve.value(bound, old.x, c) - target.value
@@ -103,12 +130,12 @@ class Aim:
                 by *= now / (now - then) if now * then < 0 else 1.0
         return by
 
-    # why a run should give up, as text; "" if nothing speaks against going on
+    # reasons for a run to give up, as text; "" if there is none
 
     def turned_back(self) -> str:
-        """Return a text if the run has lost more than half of its progress to the target, else "".
+        """Return a text if the run has lost more than half of its progress to the last target, else "".
 
-        (A control may fall again after a limit point, but not below its first value.)
+        A control may decrease after a limit point, but not below its first value.
         """
         if not self.is_open():
             return ""
@@ -121,7 +148,7 @@ class Aim:
         return ""
 
     def jumped_past(self, state: State) -> str:
-        """Return a text if the body has snapped to a state beyond the target, else ""."""
+        """Return a text if the body has snapped to a state beyond the last target, else ""."""
         if state.kind == "jump" and self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
@@ -129,7 +156,7 @@ class Aim:
         return ""
 
     def stalled(self) -> str:
-        """Return a text if many states came no nearer to the target, else ""."""
+        """Return a text if the last `patience` states came no nearer to the last target, else ""."""
         if len(self.values) > self.patience:
             now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
             if abs(now - then) < 1e-3:
@@ -137,7 +164,11 @@ class Aim:
         return ""
 
     def pace(self, max_steps: int) -> str:
-        """Return the progress of a run at the end of its steps, as text."""
+        """Return as text how far a run came with all of its allowed steps, and how many steps are left at this pace.
+
+        Args:
+            max_steps: the number of allowed steps.
+        """
         aim, (before, now) = self.until.value, self.values[-2:]
         if not (aim - now) * (now - before) > 0:
             return f"max_steps = {max_steps} were used up, and the last step led away from the target"
@@ -147,15 +178,15 @@ class Aim:
 
 
 class Progress:
-    """Progress of a run to its target, on rank 0: a bar after two seconds, and a line after each `silence`.
+    """Display of the progress of a run, on rank 0: a bar after two seconds, and a log line after each `silence`.
 
     Args:
         comm: communicator of the run.
         words: text before the progress.
-        shown: False: no bar, and lines are of the level INFO.
+        shown: True for a bar and for log lines of the level WARNING; False for no bar and lines of the level INFO.
 
     Attributes:
-        silence: seconds of processor time after which a line says where a run stands.
+        silence: processor time after which a log line states the progress, s.
     """
 
     silence = 30.0
@@ -163,7 +194,7 @@ class Progress:
     def __init__(self, comm: MPI.Intracomm, words: str, shown: bool):
         from tqdm import tqdm
         self._words, self._here = words, comm.rank == 0
-        self._level = logging.WARNING if shown else logging.INFO          # INFO is not seen unless asked for
+        self._level = logging.WARNING if shown else logging.INFO          # INFO is hidden by default
         self._bar = tqdm(total=1.0, desc=words, delay=2, disable=not shown or comm.rank != 0, leave=False,
                          bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
         self._gained, self._states, self._length = 0.0, 0, 0.0
@@ -172,7 +203,13 @@ class Progress:
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
-        """Show a completed step: part of the way, from 0 to 1, in this number of states; length: of the next step."""
+        """Show a completed step.
+
+        Args:
+            gained: progress of the run, from 0 at the start to 1 at the target.
+            states: number of states so far.
+            length: length of the next step.
+        """
         self._gained, self._states, self._length = gained, states, length
         if not self._bar.disable:
             self._bar.n = min(max(gained, 0.0), 1.0)
@@ -181,16 +218,22 @@ class Progress:
         self._speak()
 
     def limited(self, by: str, length: float) -> None:
-        """Show a shortened or failed step and its reason; length: of the next attempt."""
+        """Show a shortened or failed step.
+
+        Args:
+            by: the reason, as text.
+            length: length of the next attempt.
+        """
         self._limits[by] += 1
         self._length = length
         self._speak()
 
     def close(self) -> None:
-        """Close the bar."""
+        """Close the progress bar."""
         self._bar.close()
 
     def _speak(self) -> None:
+        """Write a line to the log if the last one is more than `silence` ago."""
         now = time.process_time()
         if not self._here or now - self._said < self.silence:
             return
@@ -206,7 +249,7 @@ class Progress:
 
 
 def _in_words(seconds: float) -> str:
-    """Return a duration to two digits."""
+    """Return a duration in seconds as text with two digits and a suitable unit."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}"

@@ -1,4 +1,4 @@
-"""The record of a run: its accepted states."""
+"""Record of a run: its accepted states, and the cost of the run."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Counts:
     """Cost of a run.
 
     Attributes:
-        steps: accepted states without the start.
-        failures: failed attempts.
-        iterations: all Newton iterations, chord iterations included.
-        seconds: duration.
-        limits: {reason for a shorter or failed step: count}.
+        steps: number of accepted states without the start.
+        failures: number of failed attempts of steps.
+        iterations: number of all Newton iterations, chord iterations and failed attempts included.
+        seconds: duration of the run by the clock, s.
+        limits: {reason for a shorter or failed step: number of such steps}.
     """
 
     steps: int = 0
@@ -41,12 +41,12 @@ class Counts:
 
 @dataclass(eq=False)
 class Segment:
-    """States of one problem, in order; a run that changes its problem goes on in another segment.
+    """States of one problem, in order. A run that changes its problem (a remeshing) continues in a new segment.
 
     Attributes:
         problem: the `Equations`, with the full interface of its class (`Problem`).
-        curve: the `Curve` that solves for their states.
-        states: list of `State`.
+        curve: the solver of the states (`Curve`).
+        states: the accepted states, list of `State`.
     """
 
     problem: Any
@@ -55,18 +55,19 @@ class Segment:
 
 
 class Unusable(ConvergenceError):
-    """A state was found, but none that a body can have."""
+    """Error of a run that found a state which no body can have."""
 
 
 class RunHooks:
     """Functions that a run calls.
 
     Attributes:
-        on_state: called with every accepted state, while the problem stands there (they fill `measures`).
-        on_step: called whenever a step is complete.
-        on_end: called when the run ends, with the text of the failure, or "", and the findings of the run.
-        renew: `renew(part, done)` calls `part`, which continues the run from its last state; with new meshes again,
-            until done() is True.
+        on_state: functions called with every accepted state, while the problem is at this state. They fill
+            `State.measures`.
+        on_step: functions called whenever a step is complete.
+        on_end: functions called when the run ends, with the text of the failure, or "", and the findings of the run.
+        renew: `renew(part, done)` calls `part`, which continues the run from its last state. With remeshing it repeats
+            this on new meshes until done() is True.
     """
 
     def __init__(self) -> None:
@@ -77,17 +78,21 @@ class RunHooks:
 
 
 class Record:
-    """The accepted states of a run, in order.
+    """Record of a run: its accepted states, in order.
+
+    Args:
+        problem: the first problem of the run.
+        curve: solver of this problem.
 
     Attributes:
-        segments: list of `Segment`, the last of which grows.
+        segments: list of `Segment`; accepted states are added to the last one.
         counts: cost of the run (`Counts`).
-        stage: name of the stage of a process that is going on.
-        ended: why the run ended before its targets, as a result and not as an error; "" if it did not.
+        stage: name of the present stage of a process, or "".
+        ended: reason for which the run ended before its targets, as a result and not as an error; "" if it did not.
         hooks: functions that the run calls (`RunHooks`).
-        findings: of the checks before the run.
+        findings: findings of the checks before the run.
         judge: function that returns the reason for which no body can have a state with known measures, or "".
-        allow_inadmissible: keep such states, too.
+        allow_inadmissible: True if the run keeps states that no body can have.
     """
 
     def __init__(self, problem: Equations, curve: Curve):
@@ -100,36 +105,39 @@ class Record:
 
     @property
     def problem(self) -> Any:
-        """The present problem, with the full interface of its class."""
+        """Present problem, with the full interface of its class."""
         return self.segments[-1].problem
 
     @property
     def equations(self) -> Equations:
-        """The present problem through the interface of the solver."""
+        """Present problem, through the interface of the solver."""
         return self.curve.problem
 
     @property
     def curve(self) -> Curve:
-        """Solver of its states."""
+        """Solver of the present problem."""
         return self.segments[-1].curve
 
     @property
     def states(self) -> list[State]:
-        """All accepted states."""
+        """All accepted states of the run, in order."""
         if len(self.segments) == 1:
             return self.segments[0].states
         return [state for segment in self.segments for state in segment.states]
 
     @property
     def last(self) -> State:
-        """The last accepted state."""
+        """Last accepted state of the run."""
         return self.segments[-1].states[-1]
 
     def restore(self) -> int:
-        """Restore the last state in the problem; return the number of last states with the same step data.
+        """Restore the step data and history variables of the last accepted state in the problem.
 
-        (The first of these states is restored before: constrained unknowns and fading forces count from it, and would
-        else differ by round-off.)
+        The first state with the same step data is restored before. Constrained unknowns and fading forces refer to this
+        state, and would else differ by round-off.
+
+        Returns:
+            Number of states at the end of the record with the same step data as the last one.
         """
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
@@ -138,14 +146,14 @@ class Record:
         return len(states)
 
     def go_on_from(self, other: Record) -> None:
-        """Begin with the states of another record, which stays as it is."""
+        """Begin this record with the states and the costs of another record, which stays unchanged."""
         mine = self.segments[-1]
         *earlier, last = other.segments
         self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
         self.counts = replace(other.counts, limits=dict(other.counts.limits))
 
     def accept(self, state: State) -> None:
-        """Accept a state: the histories continue from it.
+        """Accept a state: update the history variables, append the state and call the functions in `hooks.on_state`.
 
         Raises:
             Unusable: no body can have this state. The record is then unchanged.
@@ -171,15 +179,23 @@ class Record:
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **more: Any) -> None:
-        """Complete a step: store in the last state the data with which the run continues."""
+        """Complete a step: store in the last state the data with which the run continues, and call `hooks.on_step`.
+
+        Args:
+            step: step control of the next step.
+            until: the target that ends the run.
+            more: further data to store in `State.stepping`.
+        """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
         for listener in self.hooks.on_step:
             listener()
 
     def describe(self, state: State) -> str:
-        """Return a state's main numbers in one line, without impossible ones (a pole stretch of a wall not
-        above 0)."""
+        """Return the main output quantities of a state as one line of text.
+
+        Values that no body can have are left out, such as the pole stretch of a wall whose thickness is not positive.
+        """
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)

@@ -151,8 +151,8 @@ class Cutback(Exception):
         why: the reason, as text.
         part: admissible part of the length of the step.
         lasts: True if later steps must be shorter, too.
-        control: control at the end of the repeated step, in place of its length, or None. Where the body moves at once
-            as a step begins, a short piece of the path may take a long time.
+        control: control at the end of the repeated step, in place of its length, or None. Arc length and time are far
+            from proportional where the body moves at once as a step begins.
     """
 
     def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
