@@ -1,4 +1,4 @@
-"""Newton's method at fixed control, by PETSc SNES, in load increments (Song 1993, section 3.2)."""
+"""Newton's method at a fixed control, by PETSc SNES, in increments of the control (Song 1993, section 3.2)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,15 @@ _prefixes = itertools.count()
 
 
 class FixedControl:
-    """F(x, control) = 0 at a given control.
+    """Solver of F(x, control) = 0 at a given control by full Newton steps, as a backtracking line search stalls for
+    thin sheets.
 
-    Full Newton steps: on a thin sheet a backtracking line search stalls.
+    Args:
+        problem: the equations.
+        tolerances: convergence criteria.
+
+    Attributes:
+        history: the iterations of the last solution.
     """
 
     def __init__(self, problem: Equations, tolerances: Tolerances):
@@ -40,13 +46,21 @@ class FixedControl:
         del options[prefix + "snes_linesearch_type"]
 
     def solve(self, x: PETSc.Vec, control: float) -> bool:
-        """Iterate x, in place, to the solution; False if there was no convergence (x is then worthless)."""
+        """Iterate from a guess to a solution of F(x, control) = 0.
+
+        Args:
+            x: the guess; changed in place to the solution.
+            control: the given control.
+
+        Returns:
+            False if the iteration did not converge; x is then meaningless.
+        """
         self._control, self._work, self.history = control, 0.0, []
         self._snes.solve(None, x)
         return bool(self._snes.getConvergedReason() > 0)
 
     def correction(self) -> Array:
-        """Return the last correction of x, locally owned entries, shape (n,)."""
+        """Return the last Newton correction of x, locally owned entries, shape (n,)."""
         return np.negative(self._snes.getSolutionUpdate().array_r)
 
     def destroy(self) -> None:
@@ -54,12 +68,18 @@ class FixedControl:
         self._snes.destroy()
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Compute the residual F in `out`, for SNES."""
         self._problem.residual(x, self._control, out)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
+        """Compute the tangent dF/dx in the matrix of the problem, for SNES."""
         self._problem.tangent(x, self._control)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        """Append the iteration to `history`; return the reason for which SNES stops, or continues.
+
+        norms: the norms of x, of its last correction and of the residual.
+        """
         size, step, residual = norms
         left = relative(self._problem, residual)
         correction = step / (size + 1e-8) if iteration else 1.0
@@ -74,9 +94,9 @@ class FixedControl:
 
 
 class FixedControlCurve(Curve):
-    """States at given values of the control, by PETSc SNES: for curves without limit point.
+    """Solver for states at given values of the control, by PETSc SNES, for paths without limit points.
 
-    Its steps and the tangents of its states are measured by the control.
+    The length of its steps is the change of the control. So is the length by which its tangents are normalised.
     """
 
     fixed_control = True
@@ -87,16 +107,33 @@ class FixedControlCurve(Curve):
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
              bend: Bend | None = None) -> State:
-        """One step to the control that the tangent predicts."""
+        """Return the state after a step of a length from `old`, at the control old.control + length old.slope.
+
+        The other arguments of `Curve.step` have no influence.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state at the control that the tangent predicts: there an equation for the control holds."""
+        """Return the state at which the control meets a target, from the state `old`, at the given length of the step.
+
+        The target must be a value of the control: then it is met at old.control + length old.slope. `equation` and the
+        other arguments of `Curve.step_to` have no influence, except `kind`, the kind of the new state.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
         return self._correct(old, length, kind)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """Return the state at a fraction of the way between two, by the control; raises `Failure`."""
+        """Return the state between two states at a fraction, from 0 to 1, of the change of the control from `a` to `b`.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
         control = a.control + fraction * (b.control - a.control)
         if self._at_rest(a):                                 # a slack body has no tangent there
             return self._correct(a, (control - a.control) / a.slope, "step")
@@ -108,20 +145,25 @@ class FixedControlCurve(Curve):
         self._fixed.destroy()
 
     def unit_slope(self, state: State) -> float:
-        """See `Curve`."""
+        """Return the derivative of the control with respect to arc length at a state."""
         self._a.array_w[:] = state.direction
         return state.slope / self.norm(self._a, state.slope)
 
     def plane_normal(self, state: State) -> Array:
+        """Return zeros, shape (n,): steps end at a fixed control, on a plane whose equation is independent of x."""
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
+        """Return the length of the tangent dx/dcontrol per unit of the control: 1, since the control measures
+        length."""
         return 1.0
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
+        """Return the inner product of two changes (x, control) and (y, other) in the metric of the control alone."""
         return control * other
 
     def _correct(self, old: State, length: float, kind: str) -> State:
+        """Return the state after a step of a length along the tangent of `old`; raise `Failure` if there is none."""
         control = old.control + length * old.slope
         self._x.array_w[:] = self.guess_from_rest(old, control) if self._at_rest(old) else (
             old.x + length * old.direction)
@@ -137,4 +179,5 @@ class FixedControlCurve(Curve):
 
     @staticmethod
     def _at_rest(state: State) -> bool:
+        """Return True for the first state of a path in the reference configuration, x = 0."""
         return state.kind == "start" and not np.any(state.x)

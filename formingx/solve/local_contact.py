@@ -1,14 +1,15 @@
-r"""Local solve of the few contact points whose gap closes, or whose status changes between iterations.
+r"""Local solve for the few contact points whose gap closes, or whose status changes between Newton iterations.
 
-An iteration of Newton's method linearises the contact law of every point at its status (open, stick, slip) of the
-iteration before. The iteration can cycle where the statuses of points depend on each other. Where gaps close, at the
-outer edge of the ramp of the contact law, it only halves the penetration. For these few points the body is a compliance
-C, the inverse tangent condensed to them. Their motions y satisfy, to first order,
+A Newton iteration linearises the contact law of each point at the status (open, stick, slip) of the iteration before.
+The iteration can cycle where the statuses of points depend on each other. Where gaps close, at the outer edge of the
+ramp of the contact law, an iteration only halves the penetration. The local solve replaces the body by its compliance C
+at these few points, the inverse tangent condensed to them. To first order their motions y satisfy
 
 .. math:: y - y_0 + C \, (f(y) - f_0 - S_0 \, y) = 0,
 
 with the contact law f and its linearisation f_0 + S_0 y in the iteration, which led to y_0. This small problem is
-solved by itself. For a linear f it is Woodbury's formula, which updates a tangent for a few changed stiffnesses.
+solved by itself. For a linear f the solution is Woodbury's formula, which updates a tangent for a few changed
+stiffnesses.
 """
 
 from __future__ import annotations
@@ -25,24 +26,27 @@ from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
 
 Border: TypeAlias = Callable[[Array], Array]
-"""Maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; returns changes of the control, (m,)."""
+"""Function that maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; it returns the changes of
+the control, shape (m,)."""
 
 @dataclass(frozen=True)
 class LocalContact:
-    """Settings of the local problem of a few contact points.
+    """Settings of the local solve for a few contact points.
+
+    The ramp is the range of gaps in which the contact stiffness grows from zero.
 
     Attributes:
-        most: largest number of points that are solved for together; with more points Newton's method goes on alone.
+        most: largest number of points in a local solve; with more points Newton's method continues without it.
         few: number of changed points up to which Woodbury's formula costs less than another factorisation.
-        iterations: largest number of local iterations.
+        iterations: largest number of iterations of the local solve.
         full: number of full corrections, which may cycle. Later corrections of sticking points stop near the outer edge
             of the ramp. Others are halved where they increase the residual.
-        halved: largest number of times that a correction is halved; at a kink it would stall.
-        stays: a point that would leave the ramp stops at this part of its depth.
-        least: depth over the width of the ramp from which on a point may leave.
-        behind: depth over the width at which a point that enters the ramp again stops.
+        halved: largest number of halvings of a correction, which would stall at a kink.
+        stays: part of its depth in the ramp at which a point stops that would leave the ramp.
+        least: depth over the width of the ramp below which a point may leave the ramp.
+        behind: depth over the width of the ramp at which a point stops that enters the ramp again.
         farther: factor of `behind` from one entry to the next.
-        accuracy: tolerance of positions over the half-width of the ramp.
+        accuracy: tolerance of the motions over the half-width of the ramp.
     """
 
     most: int = 40
@@ -61,10 +65,13 @@ _LOCAL = LocalContact()
 
 
 class LocalSolve:
-    """Local solve of the points whose gap closed, or whose status changed, in one run of Newton's method.
+    """Local solve for the contact points whose gap closed, or whose status changed, in one run of Newton's method.
+
+    Args:
+        problem: the equations.
 
     Attributes:
-        failed: number of corrections without a consistent state of these points.
+        failed: number of local solves that found no state consistent with the contact law.
     """
 
     def __init__(self, problem: Equations):
@@ -74,7 +81,7 @@ class LocalSolve:
         self.failed = 0
 
     def look(self) -> None:
-        """Mark the points of an iteration; call it once after each linearisation."""
+        """Mark the contact points whose status changed since the last call; call it once after each linearisation."""
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -88,7 +95,7 @@ class LocalSolve:
             solver: solver with the LU factors of the tangent K.
             dx: update of x, changed in place.
             step: update of the control.
-            border: see `Border`.
+            border: function that maps solutions with K to the bordered system (`Border`).
 
         Returns:
             The new update of the control.
@@ -110,7 +117,10 @@ class LocalSolve:
         return step + by
 
     def _others(self, dx: Array, step: float) -> bool:
-        """Mark more points whose status changes on the way; True if there are any."""
+        """Mark further points whose status changes in a Newton update, and return True if there are any on any rank.
+
+        dx: update of x, locally owned entries, shape (n,). step: update of the control.
+        """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
             law = contact.increment.foretold(contact.moved(dx, step))
@@ -122,21 +132,21 @@ class LocalSolve:
 
 
 Update: TypeAlias = Callable[[Array, float], "Array | None"]
-"""V = dx/dcontrol or K^-1 E, locally owned rows, shape (n, m), with change of the control, by another tangent than
-K."""
+"""Function (V, step) that returns V for another tangent than the factorised K, or None if this tangent is singular.
+V holds dx/dcontrol (then step is 1) or K^-1 E (then step is 0), locally owned rows, shape (n, m)."""
 
 
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
-    """Return the update of solutions for a tangent that differs from the factorised one at a few points (Woodbury).
+    """Return a function that updates solutions to a tangent that differs from the factorised one at a few contact
+    points.
 
     Args:
         problem: the equations.
-        changes: for each contact, changes of the stiffness per area of its points, shape (n, c, c).
-        solver: solver with the LU factors.
+        changes: for each contact, changes of the stiffness per area of its points, shape (n, c, c), stress/length.
+        solver: solver with the LU factors of the tangent.
 
     Returns:
-        The update, which gives None for a singular tangent. None if so many points change that another factorisation
-        costs less.
+        The function (`Update`). None if so many points change that another factorisation costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
@@ -150,15 +160,24 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
 
 def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
-    """Return the unit forces at locally owned points of contacts in F, locally owned rows, shape (n, m): point by
-    point of all ranks."""
+    """Return the contributions to F of unit forces at contact points, in each component, as columns.
+
+    Args:
+        problem: the equations.
+        contacts: the faces in contact.
+        chosen: for each face, local numbers of owned points.
+
+    Returns:
+        Locally owned rows, shape (n, m), 0 at constrained unknowns. The m columns run over the points and components of
+        all ranks.
+    """
     unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
     own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
     units = []
     for rank, count in enumerate(problem.comm.allgather(len(own))):
         for k in range(count):
             mine, point, way = own[k] if rank == problem.comm.rank else (None, 0, 0)
-            for contact in contacts:                        # on all ranks: the force may act on nodes of another
+            for contact in contacts:                        # on all ranks: the force may act on another rank's nodes
                 forces = np.zeros_like(contact.points)
                 if contact is mine:
                     forces[point, way] = 1.0
@@ -171,7 +190,17 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
 
 
 class _Points:
-    """A few contact points with the compliance of the body. Arrays are of all ranks, but for locally owned ones."""
+    """A few contact points with the compliance of the body at these points.
+
+    Arrays hold the points of all ranks, flat over points and components, shape (m,), unless called locally owned.
+
+    Args:
+        problem: the equations.
+        contacts: the faces in contact.
+        chosen: for each face, local numbers of owned points.
+        solver: solver with the LU factors of the tangent K.
+        border: function that maps solutions with K to the bordered system (`Border`).
+    """
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):
@@ -191,7 +220,15 @@ class _Points:
         self._C = self._gather(np.array(moved).T.reshape(counts[self._comm.rank], len(moved))) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
-        """Return the changes of a correction and of its step, locally owned; None if no consistent state was found."""
+        """Solve the local problem of the points for a Newton update.
+
+        Args:
+            dx: Newton update of x.
+            step: Newton update of the control.
+
+        Returns:
+            (change of dx, locally owned, shape (n,); change of step), or None if no consistent state was found.
+        """
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
@@ -221,13 +258,21 @@ class _Points:
         return None
 
     def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> tuple[Array, bool]:
-        """Return the motions `new`, after y, stopped at the outer edge of the ramp, and True if a point was stopped.
+        """Stop corrections of motions at the outer edge of the ramp.
 
-        `behind` grows where points enter.
+        The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero at its outer edge. A point
+        that is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot from
+        either side.
 
-        The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero next to its outer edge. A
-        point that is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot
-        from either side.
+        Args:
+            ramps: for each face, function of motions that returns depth and path in the ramp (`Increment.in_ramp`).
+            y: motions before the correction.
+            new: motions after it.
+            behind: depth at which each point stops that enters the ramp, shape (points,); it grows for points that
+                enter.
+
+        Returns:
+            (the stopped motions, True if a point was stopped).
         """
         (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
@@ -237,7 +282,16 @@ class _Points:
         return new + stops.ravel(), bool(stops.any())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Return solutions V, locally owned rows, shape (n, m), for changed stiffnesses per area; None: singular."""
+        """Return solutions V = K^-1 E, or dx/dcontrol, updated to changed stiffnesses of the points.
+
+        Args:
+            V: the solutions, locally owned rows, shape (n, m).
+            step: change of the control that belongs to V.
+            changes: for each face, changes of the stiffness per area of its points, shape (k, c, c), stress/length.
+
+        Returns:
+            The updated solutions, shape (n, m), or None if the changed tangent is singular.
+        """
         more = self._gather(np.concatenate(changes))
         y = self._within(more, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:
@@ -246,7 +300,11 @@ class _Points:
         return V - self._columns @ (self._scale[:, None] * forces)
 
     def _within(self, more: Array, y: Array) -> Array | None:
-        """Return the motions y with points stiffer by `more`, (1 + C more)^-1 y; None if there is no answer."""
+        """Return (1 + C more)^-1 y, the motions y changed by additional stiffnesses `more`, shape (k, c, c), of the
+        points.
+
+        None if this system is singular.
+        """
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), more).reshape(n, n)
         try:
@@ -256,30 +314,38 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: float) -> Array:
-        """Return the motion of owned points in a correction, seen from their tools, flat. Collective."""
+        """Return the motion of locally owned points relative to their tools in an update (dx, step), flat, length.
+        Collective."""
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _taken(self) -> tuple[Array, Array]:
-        """Return the forces, flat, and stiffnesses that the iteration has taken."""
+        """Return (forces, flat; stiffnesses, shape (k, c, c)) of the points in the last linearisation of the contact
+        law."""
         return self._forces([c.increment.taken(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return the forces, flat, and stiffnesses of the law, linearised where the points would be."""
+        """Return (forces, flat; stiffnesses, shape (k, c, c)) of the contact law after motions y; `laws`: a function
+        per face."""
         return self._forces([(there.force, there.stiffness) for there in self._each(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
+        """Gather pairs (forces, stiffnesses) of the faces from all ranks: flat forces, and stiffnesses, shape (k, c,
+        c)."""
         force, stiffness = self._all(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness
 
     def _each(self, functions: list[Any], y: Array) -> list[Any]:
-        """Return the values of the functions of each contact's points for motions y."""
+        """Return for each face the value of its function, from `functions`, at the motions y of its locally owned
+        points."""
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Gather values of all contacts and ranks, of pairs with these shapes a point. (A rank may have no points.)"""
+        """Gather pairs of values of all faces and ranks; `shapes`: shapes of both values at a point, as a rank may
+        have none."""
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]
 
     def _gather(self, values: Array) -> Array:
+        """Return locally owned values of all ranks, concatenated in the order of the ranks."""
         return values if self._comm.size == 1 else np.concatenate(self._comm.allgather(values))

@@ -1,7 +1,7 @@
-"""Control by a measure: the controlled quantity is the unknown, and a measure follows an amplitude in time.
+"""Control by an output quantity: the controlled load is an unknown, and the quantity follows an amplitude in time.
 
 Examples: a prescribed volume of air, a constant force. At each given time the state solves F(x, control) = 0 with the
-measure at its prescribed value. A pressure then passes its maximum as it does in practice.
+quantity at its prescribed value. A pressure then passes its maximum as it does in practice.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from .stepping import SAME_TIME, Cutback, StepControl
 
 @dataclass(frozen=True)
 class FlowSteps:
-    """Settings of steps along a prescribed amplitude in time.
+    """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
-        stretched: a step is stretched to the next prescribed time within this number of step lengths. The last step
-            is then never much shorter than the others.
-        cut: largest part of a too long step with which it is repeated.
-        still: relative change of the controlled quantity that is round-off.
-        located: error of the time of a limit point, over the duration of the step.
-        met: relative deviation from a target of the state that is solved for where the target was passed.
+        stretched: a step ends at the next prescribed time if this is within so many step lengths. The last step is then
+            never much shorter than the others.
+        cut: largest factor of the length of a step that is repeated because it was too long.
+        still: relative change of the control below which it counts as constant, up to round-off.
+        located: tolerance of the time of a limit point, over the duration of the step.
+        met: relative tolerance of a target whose state is solved for inside a step.
         contact: smallest admissible ratio of the step length that new contact allows to the length of the step.
     """
 
@@ -49,15 +49,17 @@ _STEPS = FlowSteps()
 
 
 class Flow(Run):
-    """States in time along the course of a measure.
+    """Run whose states follow the prescribed amplitude of an output quantity in time.
 
     Args:
-        record, accuracy, label: see `Run`.
-        measure: the prescribed measure (`Bound`).
+        record: record of the states.
+        measure: the prescribed output quantity (`Bound`).
         course: function of time that gives its prescribed value, in the user's units.
-        times: times that are met exactly: the beginning, the corners and the end of the course.
-        targets: (target, its measure) to meet on the way.
+        times: times that are met exactly: the start, the corners and the end of the amplitude.
+        targets: pairs (target, output quantity) to meet in between.
         step: step control whose lengths are parts of the duration.
+        accuracy: tolerance of the relative time integration error.
+        label: text before the target beside a progress bar.
     """
 
     def __init__(self, record: Record, measure: Measure, course: Callable[[float], float], times: Sequence[float],
@@ -68,11 +70,12 @@ class Flow(Run):
         self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
 
     def _accept(self, state: State) -> None:
+        """Accept a state, and set the process time of the problem to the time of the state."""
         self.problem.clock = state.time
         super()._accept(state)
 
     def _next(self, old: State) -> list[State]:
-        """Return the next state in time, or one before it that meets a target."""
+        """Return the next state in time, in a list: the end of the step, or a target or limit point inside it."""
         event = self._next_event(old.time)
         while True:
             left = event - old.time
@@ -99,12 +102,13 @@ class Flow(Run):
                                   f" {failure.reason}", failure.attempt)
 
     def _next_event(self, time: float) -> float:
-        """Return the next time that must be hit: a corner of the course, or a target."""
+        """Return the first time after `time` that must be met exactly: a corner or the end of the amplitude, or a
+        target."""
         times = [*self._times, *(t.value for t, _ in self.aim.open if t.name == "process_time")]
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
-        """Return the state at a time, one step from `old`.
+        """Return the state at a time, one step from the accepted state `old`.
 
         Raises:
             Failure: no such state was found.
@@ -125,16 +129,16 @@ class Flow(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """Return the state between two at which the controlled quantity has a maximum or a minimum, else the second.
+        """Return the state between two states in time at which the control has an extremum, or `new` if there is none.
 
-        A corner of the course is no such state, nor is a constant controlled quantity with round-off.
+        A corner of the amplitude is no extremum, nor is round-off of a constant control.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
         before, after = (
             _rate([*predictor.before(self.states[:-1], old.time, 2), old]),
             _rate([*predictor.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
-            old.slope, new.slope)                            # else a path, whose tangents say it
+            old.slope, new.slope)                            # else the tangents of the path show an extremum
         still = _STEPS.still * max(abs(old.control), abs(new.control)) / (new.time - old.time)
         if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STEPS.still:
             return new
@@ -144,7 +148,7 @@ class Flow(Run):
             tried.append(self._at(old, time))
             return -float(np.sign(before)) * tried[-1].control
         from scipy.optimize import minimize_scalar
-        with contextlib.suppress(Failure):                   # then there is no state of its own
+        with contextlib.suppress(Failure):                   # then the extremum gets no state
             error = _STEPS.located * (new.time - old.time)
             minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": error})
             new = max(tried, key=lambda state: np.sign(before) * state.control)
@@ -152,7 +156,11 @@ class Flow(Run):
         return new
 
     def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
-        """Return (x, control) at a time: on the polynomial through the last states, or on the tangent of the first."""
+        """Return a guess (x, control) of the state at a time, for a step from `old`.
+
+        It lies on the polynomial through the last states. If there is only one, it lies on its tangent where the
+        quantity has the prescribed value.
+        """
         past = predictor.before(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
@@ -160,8 +168,8 @@ class Flow(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[Array, float]:
-        """Return the point on the tangent of a state with a value of the quantity; the state itself if there is none
-        near."""
+        """Return the point (x, control) on the tangent of a state at which the quantity has a value; (x, control) of
+        the state itself if there is no such point nearby."""
         def deviation(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
         now = deviation(0.0)
@@ -175,7 +183,7 @@ class Flow(Run):
         return old.x, old.control
 
     def _met_before(self, old: State, new: State) -> State:
-        """Return the state between two in time that meets a target, the first if there are several; else the second."""
+        """Return the first state in time between two states that meets an open target, or `new` if there is none."""
         problem, best = self.problem, new
         for target, bound in self.aim.open:
             if target.name == "process_time":
@@ -193,7 +201,18 @@ class Flow(Run):
         return best
 
     def _meeting(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
-        """Return the state, one step from `old`, at the time between two when a measure has its target value."""
+        """Return the state, one step from `old`, at which an output quantity meets its target.
+
+        Args:
+            old: the accepted state.
+            target: the target.
+            bound: its output quantity.
+            low: time of `old`.
+            high: time at which the quantity has passed the target.
+
+        Raises:
+            Failure: no such state was found.
+        """
         found: dict[float, State] = {}
 
         def deviation(time: float) -> float:
@@ -209,12 +228,14 @@ class Flow(Run):
 
 
 def _rate(states: Sequence[State]) -> float:
-    """Return the rate of the control at the last of two or three states, on the polynomial through them."""
+    """Return the time derivative of the control at the last of two or three states, from the polynomial through
+    them."""
     t = np.array([state.time - states[-1].time for state in states])
     return float(np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(
         t, [state.control for state in states], len(t) - 1)).deriv()(0.0))
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return a root of a function between `low` and `high`, at which its signs differ."""
     from scipy.optimize import brentq
     return float(brentq(function, low, high, xtol=1e-14 * abs(high - low), rtol=1e-14, maxiter=100))
