@@ -1,4 +1,4 @@
-"""Diagnosis of a failed run, in numbers, text and a picture."""
+"""Diagnosis of a failed run: numbers, probable causes, advice, and a picture."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ from .state import State
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits from which on a number of the last good state counts as a cause.
+    """Limits above or below which a number of the last good state counts as a cause of the failure.
 
     Attributes:
-        before: number of states back to the one with which the condition number of the tangent is compared.
-        singular: growth of the condition number since then that indicates a singular tangent.
+        before: number of states between the last good state and the one with which its condition number is compared.
+        singular: growth of the condition number between them that indicates a singular tangent.
         round_off: condition number that leaves hardly any of 16 digits.
-        slowing: slope of the control over its largest, below which the last slopes may tell of a limit point ahead.
-        material: part of a material's limit of I1 - 3.
+        slowing: slope of the control over its largest value on the path. Below it a limit point is extrapolated from
+            the last slopes.
+        material: ratio of I1 - 3 to its limit in the material, above which the material counts as a cause.
         volume: J below which an element is about to turn inside out.
-        shape: shape of a deformed element over its shape in the reference configuration, likewise.
+        shape: shape quality of a deformed element, over its value in the reference configuration, below which the
+            element is about to turn inside out.
     """
 
     before: int = 10
@@ -52,8 +54,8 @@ class Failure:
         facts: {field of a `Diagnosis`: its value}.
         problem: the equations.
         last: the last good state, or None.
-        fixed_control: True if no limit point can be passed.
-        target: the target of the control, in the user's units, or None.
+        fixed_control: True if the solver of the run cannot pass a limit point.
+        target: target of the controlled quantity, in the user's units, or None.
     """
 
     facts: dict[str, Any]
@@ -68,29 +70,35 @@ class Diagnosis:
     """Diagnosis of a failed run. Numbers are None where they could not be computed; a membrane has no J.
 
     Attributes:
-        reason: how the last attempt ended.
+        reason: how the last attempt ended, as text.
         step: number of the state that could not be reached (1: the first after the start).
-        control, aimed: the driven pressure (stress) or travel (length) of the last good state, and where the failed
-            attempt had got to.
-        residual: {"displacement", "pressure", "multipliers": norm of the residual over the norm of
-            the support forces} in the failed attempt; inf where they were not finite.
-        worst: where the largest force was left over.
-        smallest_J, at_J: det F at the quadrature points of the last good state, its smallest, and where.
-        failed_J, at_failed_J: the same in the failed attempt.
-        shape: the worst shape of a deformed element of the last good state, over its shape in the reference
+        control: value of the controlled quantity in the last good state: pressure (stress), travel (length) or time.
+        aimed: value of the controlled quantity at the end of the failed attempt.
+        residual: {"displacement", "pressure", "multipliers": norm of this part of the residual over the norm of the
+            support forces} in the failed attempt; inf where it was not finite.
+        worst: place of the largest out-of-balance force in the failed attempt.
+        smallest_J: smallest det F at the quadrature points of the last good state.
+        at_J: place of `smallest_J`.
+        failed_J: smallest det F at the quadrature points in the failed attempt.
+        at_failed_J: place of `failed_J`.
+        shape: smallest shape quality of a deformed element of the last good state, over its value in the reference
             configuration.
-        shortened: (mean stretch, (R, Z) of both ends) of the longest piece of a sheet compressed along its section.
-        I1, limit: (I1 - 3) / (limit - 3) of the point nearest to its material's limit, and where; None: no limit.
-        turned: [(control before, after)] between which the determinant of the tangent changed its sign.
+        shortened: (mean stretch, (R, Z) of one end, (R, Z) of the other) of the longest piece of a sheet compressed
+            along its section.
+        I1: largest (I1 - 3) / (limit - 3) in the last good state, with the limit of the material at each point; None
+            without a limit.
+        limit: place of `I1`.
+        turned: pairs (control before, control after) between which the determinant of the tangent changed its sign
+            without a limit point.
         limit_points: controls of the limit points on the path.
-        limit_ahead: the control at which a limit point lies ahead, as the last slopes tell; or None.
-        flipped: nodes that came into contact, left it or changed between stick and slip in the last iteration.
-        touching: nodes in contact in the last good state.
-        condition, condition_before: 1-norm condition numbers (estimates) of the tangent of the last good state, and
-            some states before it.
+        limit_ahead: control of a limit point extrapolated from the slopes of the last states, or None.
+        flipped: number of nodes whose contact status (open, sticking, sliding) changed in the last iteration.
+        touching: number of nodes in contact in the last good state.
+        condition: estimate of the 1-norm condition number of the tangent of the last good state.
+        condition_before: the same estimate some states earlier.
         findings: causes that the numbers prove ("serious") or make likely ("warning"), with advice.
         what: name of the controlled quantity.
-        examined: examination of the body, which `picture` draws; None: there is no body.
+        examined: examination of the body, which `picture` draws; None without a body.
     """
 
     reason: str
@@ -120,12 +128,12 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """The causes as text, the strongest first."""
+        """Causes of the failure as text, the strongest first."""
         return tuple(finding.text for finding in self.findings)
 
     @property
     def advice(self) -> tuple[str, ...]:
-        """Advice on further attempts."""
+        """Advice on further attempts, as text."""
         return tuple(dict.fromkeys(finding.advice for finding in self.findings))
 
     def __str__(self) -> str:
@@ -152,9 +160,10 @@ class Diagnosis:
         return "\n".join(lines)
 
     def picture(self, file: Any) -> None:
-        """Draw the last good state, deformed, its elements coloured by J, the worst places marked, and the tools.
+        """Draw the last good state: the deformed elements coloured by J, the worst places marked, and the tools.
 
-        Rank 0 draws.
+        Args:
+            file: name of the image file; rank 0 writes it.
 
         Raises:
             InputError: a membrane has no elements to draw, nor has a run without a good state.
@@ -166,15 +175,15 @@ class Diagnosis:
 
 def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attempt | None = None, pace: str = "",
              target: float | None = None) -> Diagnosis:
-    """Return the diagnosis of the last good state and the failed attempt; collective.
+    """Return the diagnosis of a failed run, from its last good state and its failed attempt. Collective.
 
     Args:
-        curve: the solver.
+        curve: solver of the path.
         states: the accepted states; may be empty.
         reason: how the last attempt ended.
         attempt: end of the failed iteration; None: no iteration failed.
-        pace: progress of a run that ended without a failure, as text, or "".
-        target: target of the control, in the user's units, or None.
+        pace: progress of a run that used up its steps, as text; "" for other failures.
+        target: target of the controlled quantity, in the user's units, or None.
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),
@@ -194,8 +203,14 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 
 def limits_passed(problem: Equations, states: Sequence[State]) -> str:
-    """Return a sentence, with a space before it, that tells at which controls limit points were passed; "" without
-    any."""
+    """Return a sentence with the controls of the limit points among some states; "" if there are none.
+
+    The sentence begins with a space, to follow another one in a message.
+
+    Args:
+        problem: the equations.
+        states: the states.
+    """
     shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
     if not shown:
         return ""
@@ -205,12 +220,15 @@ def limits_passed(problem: Equations, states: Sequence[State]) -> str:
 
 def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagnosis: Diagnosis,
                 hint: str) -> ConvergenceError:
-    """Return the error of a run that ends before its target, with the advice of the diagnosis, or a hint.
+    """Return the error of a run that ends before its target.
 
     Args:
-        record: the run's states (`Record`); `states` are the ones since its stage began.
+        record: record of the run (`Record`).
+        states: states of the run since its stage began.
         aim: the open targets (`Aim`).
         why: the failure, a sentence.
+        diagnosis: diagnosis of the failure.
+        hint: advice as text, used if the diagnosis has none.
     """
     best = int(np.argmin([abs(value - aim.until.value) for value in aim.values]))
     at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
@@ -222,11 +240,12 @@ def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagno
 
 
 def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
-    """Return the condition number, the sign changes of the determinant, and the limit point that the slopes predict.
+    """Return the facts of a `Diagnosis` that follow from the tangents of the states.
 
-    A limit point is where the determinant of dF/dx changes its sign and the control is stationary; where it changes
-    without that, another branch starts. The sign at two states says whether there was an odd number of changes
-    between them; bisection finds one.
+    These are the condition numbers, the sign changes of the determinant, the limit points, and an extrapolated one. At
+    a limit point the determinant of dF/dx changes its sign and the control is stationary. Where only the determinant
+    changes its sign, another path branches off. The signs at two states show whether the number of changes between them
+    is odd; bisection then finds one.
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -253,7 +272,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
 
 @register("failure")
 def _of_material(failure: Failure) -> Iterator[Finding]:
-    """Yield a finding if a material is near the end of its domain."""
+    """Yield a finding if I1 at a point of the body is near the limit of its material (Gent, Arruda-Boyce)."""
     facts = failure.facts
     if (facts.get("I1") or 0) > _LIMITS.material:
         yield Finding("serious", "material",
@@ -265,7 +284,7 @@ def _of_material(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_elements(failure: Failure) -> Iterator[Finding]:
-    """Yield a finding if an element is about to turn inside out."""
+    """Yield a finding if an element of the last good state is about to turn inside out."""
     facts = failure.facts
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
@@ -283,7 +302,7 @@ def _of_elements(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_compression(failure: Failure) -> Iterator[Finding]:
-    """Yield a finding if a sheet in contact is compressed along its section: it buckles."""
+    """Yield a finding if a sheet in contact is compressed along its section, and so buckles."""
     if _buckles(failure.facts):
         stretch, first, last = failure.facts["shortened"]
         yield Finding("serious", "wall",
@@ -296,13 +315,13 @@ def _of_compression(failure: Failure) -> Iterator[Finding]:
 
 
 def _buckles(facts: dict[str, Any]) -> bool:
-    """Return True if a piece of a sheet in contact is compressed along its section."""
+    """Return True if, by the facts of a failed run, a piece of a sheet in contact is compressed along its section."""
     return bool(facts.get("shortened") and facts["touching"])
 
 
 @register("failure")
 def _of_limits(failure: Failure) -> Iterator[Finding]:
-    """Yield findings on limit points before the target."""
+    """Yield findings on limit points that the control reached, or is about to reach, before its target."""
     facts, target = failure.facts, failure.target
     if _buckles(facts):                                      # then the limit point is no more than its effect
         return
@@ -327,7 +346,7 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
 
 @register("failure")
 def _of_branches(failure: Failure) -> Iterator[Finding]:
-    """Yield findings on another branch, a singular tangent, and contact that does not settle."""
+    """Yield findings on a path that branches off, a singular tangent, and contact that does not settle."""
     facts = failure.facts
     what = facts["what"]
     for a, b in facts.get("turned", ()):
@@ -351,14 +370,15 @@ def _of_branches(failure: Failure) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """Return True if the tangent is near a singular one: its condition has grown from state to state."""
+    """Return True if the condition number of the tangent has grown over the last states so much that it counts as
+    singular."""
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
 
 
 @register("failure")
 def _of_numbers(failure: Failure) -> Iterator[Finding]:
-    """Yield a finding if the condition number leaves only round-off."""
+    """Yield a finding if the condition number of the tangent leaves hardly any correct digits."""
     facts = failure.facts
     if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
         yield Finding("warning", "round-off",

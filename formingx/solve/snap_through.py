@@ -9,7 +9,7 @@ from one x_k to the next, with the history variables updated at each. V is the m
 to dF, as in a Kelvin-Voigt solid. Such damping resists waves of all lengths in proportion to their stiffness. Damping
 in proportion to the mass resists short waves least. Points that separate at an edge then need 1e4 times the viscosity
 with which the body reaches equilibrium. eta falls while the body moves smoothly and grows otherwise. With eta = 0 the
-body is in equilibrium. The unbalanced force dissipates work on the way.
+body is in equilibrium. The unbalanced force dissipates work during the motion.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ log = logging.getLogger("formingx")
 
 @dataclass(frozen=True)
 class SnapThrough:
-    """Criteria for snap-through, and settings of the path to the next state.
+    """Criteria for snap-through, and settings of the viscous motion to the next equilibrium state.
 
     eta, over the shear modulus, begins low and grows to the smallest value that gives a solution. A little viscosity
     finds a state that is near. Much viscosity slows the body while contact separates, and slip meanwhile changes the
@@ -43,26 +43,31 @@ class SnapThrough:
 
     Attributes:
         lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also the
-            length of the predictor where a kink turns the path back, or where no shorter step is left.
-        ahead, furthest: the amount by which the control goes on, at first and at most.
+            length of the predictor where a kink reverses the path, or where no shorter step is left.
+        ahead: change of the control in a snap-through, at first.
+        furthest: largest change of the control in a snap-through.
         eta: first value of eta.
         least: value of eta below which it counts as 0.
-        most, most_moving: largest eta before and after the body has begun to move.
-        falls: factor of eta after a solution that took at most `few` iterations.
-        few: see `falls`.
-        grows, grows_moving: factor of eta after a failed solution, before and after the body has begun to move.
+        most: largest eta before the body has begun to move.
+        most_moving: largest eta after the body has begun to move.
+        falls: factor of eta after a viscous solution that took at most `few` iterations.
+        few: largest number of Newton iterations of a viscous solution after which eta falls.
+        grows: factor of eta after a failed viscous solution, before the body has begun to move.
+        grows_moving: the same factor after the body has begun to move.
         tolerances: tolerances of a viscous solution. If contact does not settle soon, more viscosity is cheaper than
             more iterations. With looser tolerances a nearly singular tangent looks like equilibrium too early.
-        nearest, farthest: smallest and largest distance for the body to move in a viscous solution.
-        share: this distance, within the bounds, over the distance moved so far.
+        nearest: smallest distance that the body should move in a viscous solution.
+        farthest: largest distance that the body should move in a viscous solution.
+        share: distance that the body should move in a viscous solution, over the distance moved so far.
         again: factor of this distance above which the first solution is repeated with more viscosity.
-        solutions, too_far: viscous solutions, and a distance, after which the body counts as never coming to rest.
-            (Where a sheet is drawn over an edge point by point hundreds of short ones are needed.)
-        iterations: Newton iterations of one step, failed tries and jumps included, after which it tries no jump and
-            halves its length.
-        near_rest: viscous forces below which equilibrium without them is tried.
-        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without them fails. It may
-            oscillate where a point is at a kink of its law of friction.
+        solutions: number of viscous solutions after which the body counts as never in equilibrium. Where a sheet is
+            drawn over an edge point by point, hundreds of short ones are needed.
+        too_far: distance moved after which the body counts as never in equilibrium.
+        iterations: Newton iterations of one step, failed attempts and snap-throughs included, after which the step
+            tries no further snap-through and halves its length.
+        near_rest: viscous forces below which a solution without viscosity is tried.
+        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without them fails. That
+            iteration may oscillate where a point is at a kink of its friction law.
     """
 
     lengths: tuple[float, ...] = (1e-2, 1e-3)
@@ -88,20 +93,37 @@ class SnapThrough:
     at_rest: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
-        """Return `lengths`; the last alone where contacts with friction stick, for there shorter steps succeed."""
+        """Return the step lengths below which a second failure triggers a snap-through.
+
+        Args:
+            limit: limits of a step by contact, or None. Where all contacts with friction stick, only the last length
+                counts, since shorter steps succeed.
+        """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def most_of_step(self, iterations: int) -> float:
-        """Return the largest part of a step that is tried next, after this number of Newton iterations of it."""
+        """Return the largest part of a failed step that is tried next.
+
+        Args:
+            iterations: Newton iterations of the step so far.
+        """
         return 0.5 if iterations > self.iterations else 1.0
 
 
 class NoEquilibrium(Failure):
-    """A body that moved on reached rest nowhere."""
+    """Failure of a snap-through: the body moved, but reached no equilibrium."""
 
 
 class ViscousDrag:
-    """Forces eta V (x - origin), locally owned entries; 0 at constrained unknowns."""
+    """Viscous forces eta V (x - origin) on the body, locally owned entries, shape (n,); 0 at constrained unknowns.
+
+    Args:
+        viscosity: the viscosity of the problem, with the matrix V.
+
+    Attributes:
+        eta: the viscosity over the shear modulus.
+        origin: unknowns from which the body moves, locally owned entries, shape (n,).
+    """
 
     def __init__(self, viscosity: Viscosity):
         self._viscosity = viscosity
@@ -109,11 +131,11 @@ class ViscousDrag:
         self.origin: Array = np.zeros(0)
 
     def forces(self, x: Array) -> Array:
-        """Return the forces at x, locally owned, shape (n,)."""
+        """Return the viscous forces at the unknowns x, locally owned entries, shape (n,)."""
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add eta V."""
+        """Add eta V, the derivative of the viscous forces, to a tangent matrix."""
         self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:
@@ -122,7 +144,24 @@ class ViscousDrag:
 
 
 class _Motion:
-    """Motion from a state to the next: the present position of the body, and the dissipated energy."""
+    """Viscous motion from an unstable state to the next equilibrium.
+
+    Args:
+        curve: solver of the path.
+        old: the state from which the body moves.
+        control: control during the motion.
+        settings: criteria and settings.
+        onward: 1 or -1, the sign that the work of the controlled load must have; 0: either.
+        passed: earlier states of the path, to which the body must not return.
+
+    Attributes:
+        at: present position of the body, as a state.
+        lost: energy dissipated so far, dimensionless.
+        solved: number of viscous solutions so far.
+        rest: unbalanced forces, relative to the support forces.
+        near: unbalanced forces below which equilibrium is tried.
+        settles: True if equilibrium should be tried next.
+    """
 
     def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, onward: float = 0.0,
                  passed: Sequence[State] = ()):
@@ -133,18 +172,26 @@ class _Motion:
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
         self.at, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.near = np.inf, settings.near_rest   # the unbalanced forces; little enough to look for rest
+        self.rest, self.near = np.inf, settings.near_rest   # unbalanced forces; their limit for trying equilibrium
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
 
     def goes_on(self, eta: float) -> bool:
-        """Return True while neither eta nor the body has left its bounds."""
+        """Return True while eta and the distance moved by the body are within their bounds."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
         return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
 
     def move(self, origin: Array, eta: float) -> float:
-        """Solve once with viscosity from `origin`; return the factor by which eta may change then."""
+        """Solve once with viscosity.
+
+        Args:
+            origin: unknowns from which the body moves, locally owned entries, shape (n,).
+            eta: the viscosity over the shear modulus.
+
+        Returns:
+            Factor of eta for the next solution.
+        """
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
         try:
@@ -157,7 +204,7 @@ class _Motion:
         last, new = self.at, replace(self.at, x=x, control=self.control)
         if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
             return self._hold_back()
-        if self._goes_back(last, new):                      # to the unstable state that it comes from
+        if self._goes_back(last, new):                      # to the unstable state where the motion began
             return self._hold_back()
         pull = self._drag.forces(x)
         most = np.clip(settings.share * self.curve.moved(self._old, last), settings.nearest, settings.farthest)
@@ -166,7 +213,7 @@ class _Motion:
             return self._hold_back(far)
         before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.rest < min(self.near, before)
-        self._lose(origin, x, pull)                         # from where the body was, or was predicted to be
+        self._lose(origin, x, pull)                         # from the last or the predicted position
         self._pull, self.at, by = pull, new, x - last.x
         self.problem.advance(x, self.control)
         if limit:
@@ -176,12 +223,18 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """Return the factor by which eta grows after a rejected solution; eta does not fall after the next one."""
+        """Return the factor of eta after a rejected solution, `grows` or by default as in the settings.
+
+        After the next solution eta does not fall.
+        """
         self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
     def end(self) -> State | None:
-        """Return the state in equilibrium near the present position without viscous forces, or None.
+        """Return the equilibrium state near the present position, solved for without viscous forces.
+
+        Returns:
+            The state, of kind "jump"; None if there is none near.
 
         Raises:
             Failure: the viscous forces vanish, but a body without a history has no equilibrium here.
@@ -206,19 +259,25 @@ class _Motion:
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """Return True if the driven load does negative work from a to b though it must not."""
+        """Return True if the work of the controlled load from state a to state b has the wrong sign (`onward`)."""
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
-        """Add the work of the unbalanced forces from a to x to the dissipated energy, by the trapezoidal rule.
+        """Add the work of the unbalanced forces in a motion to the dissipated energy, by the trapezoidal rule.
 
-        (The forces half way are not used, since the chord cuts into tools.) Negative work of the force at a is left
-        out: viscous forces do no negative work.
+        Forces halfway are not used, since the straight line between the positions may pass through tools. Negative work
+        of the force at the start is left out: viscous forces do no negative work.
+
+        Args:
+            a: unknowns at the start of the motion, locally owned entries, shape (n,).
+            x: unknowns at its end.
+            pull: unbalanced forces at its end.
         """
         by = x - a
         self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))
 
     def _sum(self, values: Array) -> float:
+        """Return the sum of locally owned values over all ranks."""
         return float(self.problem.comm.allreduce(values.sum()))
 
     def destroy(self) -> None:
@@ -231,21 +290,26 @@ class _Motion:
 def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
-    """Return the state that the body reaches from `old` when the control goes on; of kind "jump".
+    """Return the equilibrium state that the body reaches from a state when the control changes further.
 
     Args:
-        by: change of the control, dimensionless; its sign is the way that the process drives.
-        ahead: start at the end of the tangent, not at `old`.
+        curve: solver of the path.
+        old: the state from which the body snaps.
+        by: change of the control, dimensionless; its sign is the direction of the process.
+        ahead: True to start at the end of the tangent of `old`, False to start at `old`.
         settings: criteria and settings.
         solutions: largest number of viscous solutions; default `settings.solutions`.
-        listener: function that is called before each of them.
-        onward: 1 or -1, the sign of the work that the driven load does on the way, as where a volume has its maximum;
-            0: either.
-        passed: states before, to whose path the body does not go back.
+        listener: function that is called before each viscous solution.
+        onward: 1 or -1, the sign that the work of the controlled load must have, as where a volume has its maximum; 0:
+            either.
+        passed: earlier states of the path, to which the body must not return.
+
+    Returns:
+        The state, of kind "jump".
 
     Raises:
-        Failure: none was found, `NoEquilibrium` if the body reaches equilibrium nowhere. The problem's histories are
-            then those of `old`.
+        Failure: no state was found; `NoEquilibrium` if the body moved but reached no equilibrium. The problem then has
+            the history variables of `old` again.
     """
     problem, kept = curve.problem, curve.problem.memory
     motion = _Motion(curve, old, old.control + by, settings, onward, passed)
@@ -274,18 +338,18 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
 
 
 def at_limit_points(problem: Equations, falls: bool) -> str:
-    """Return the rule at limit points of the control: "continue", "snap_through", or "continue_volume".
+    """Return the default rule at limit points of the control: "continue", "snap_through", or "continue_volume".
 
-    The last follows the path while the volume of the air grows, as under volume control. The body snaps where this
-    volume has a maximum, too.
+    "continue_volume" follows the path while the volume of the air grows, as under volume control. The body snaps where
+    this volume has a maximum, too.
 
-    Time goes one way. With a history so does the controlled quantity, as continuing past a limit point would reverse
-    it. Beyond the maximum of an applied pressure, however, the volume of the air goes on growing. The same holds for a
-    pressure on a body in contact, with a history or without, as a path may end where contact changes.
+    Time increases only. With a history the controlled quantity must not reverse either, as it would beyond a limit
+    point. Beyond the maximum of an applied pressure, however, the volume of the air continues to grow. The same holds
+    for a pressure on a body in contact, with a history or without, as a path may end where contact changes.
 
     Args:
         problem: the equations.
-        falls: True if the controlled quantity is released.
+        falls: True if the controlled quantity decreases towards 0, as a pressure that is released.
     """
     if problem.drives == "time":
         return "snap_through"
@@ -296,15 +360,15 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
 
 
 def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """Return True if the body snaps from a state, as its path leads back.
+    """Return True if the body snaps at a state, since its path leads back from there.
 
     The maximum of the volume may follow right after the maximum of the pressure.
 
     Args:
-        curve: the solver.
+        curve: solver of the path.
         old: the state.
-        at_limit_point: the rule, see `at_limit_points`.
-        sense: 1 or -1, initial direction of the control.
+        at_limit_point: the rule at limit points, as `at_limit_points` returns.
+        sense: 1 or -1, direction of the control at the start of the run.
     """
     if at_limit_point not in ("snap_through",
                               "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
@@ -313,9 +377,15 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
-    """Return True if a state found from `old` lies on a piece of the path passed earlier, to which it never comes back.
+    """Return True if a new state lies on a piece of the path that was passed earlier, which a step must not reach.
 
-    (After a jump it may: then the body is another.)
+    After a snap-through such a state is admissible, since the history variables differ.
+
+    Args:
+        curve: solver of the path.
+        passed: earlier states of the path, in order.
+        old: the state from which the step started.
+        new: the new state.
     """
     near = 0.1 * curve.distance(old, new)
     states = [] if old.kind == "jump" else passed[::-1]
@@ -330,8 +400,14 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 
 
 def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """Return a new state at the same control, without points in tension at tools in three dimensions; by `jump`
-    where the body snaps off.
+    """Return a new state at the same control, without contact points in tension at tools in three dimensions.
+
+    Args:
+        curve: solver of the path.
+        limit: limits of a step by contact.
+        old: the state from which the step started.
+        new: the state found by the step.
+        jump: function that returns the state after a snap-through from a state, where the body snaps off its tool.
 
     Raises:
         Failure: no such state was found.
