@@ -11,9 +11,9 @@ the tangential traction for stick and for Coulomb's law
 .. math:: T_{stick} = k F'(d)\, g, \qquad T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g.
 
 The elastic slip g is the tangential motion since gap closure, minus the sliding. Stick is mu = inf, frictionless
-contact mu = 0. A point that was open at the last accepted state slips from its gap closure on. The tangent of the path
-predicts the closure. A point whose gap closes at the end of the step, or later, carries no shear
-until then.
+contact mu = 0. For a point that was open at the last accepted state, the slip counts from the position of its gap
+closure. The tangent of the path predicts this position. A point whose gap closes at the end of the step, or later,
+carries no shear until then.
 
 Coulomb's law is regularised: points slide after the same small elastic slip g_s at every pressure. Their stiffness
 therefore grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic stick of the Abaqus
@@ -43,14 +43,15 @@ from .part import Part
 from .penalty import RAMP_EDGE, STICKS, Law
 
 _ROUGH = 1000.0
-"""T/N above which a sticking point slides if it may separate: without pressure it carries no shear traction."""
+"""Ratio T/N above which a sticking point that may separate slides: it carries no shear traction without pressure."""
 
 _ELASTIC_SLIP = 1e-3
-"""g_s over thickness: small enough for the forces (tests/test_compression.py), large enough for Newton's method."""
+"""Elastic slip g_s over thickness: small for accurate forces (tests/test_compression.py), large for Newton's method."""
 
 _SLIDES, _STICK, _BONDED = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
-"""Penalty and ramp of sliding points, of sticking points until pulled off, and of what never separates, where
-stiffer costs iterations."""
+"""Default (penalty, ramp) of sliding points, of sticking points that separate, and of points that never separate.
+
+A stiffer penalty of the last costs iterations."""
 
 
 class Contact(Part):
@@ -60,22 +61,23 @@ class Contact(Part):
         on: name of the boundary that faces the tool.
         tool: a `Tool`, see `formingx.tools`; for a sheet in three dimensions `solid`, `box`, `revolved` or `extruded`.
         friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), 0 or larger. A coefficient
-            that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`. Its
-            value is taken at the last accepted state.
-        penalty: k over shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
-        ramp: theta over thickness of the sheet; default 1e-7 where points slide, 1e-5 where they stick.
-        elastic_slip: g_s over thickness of the sheet: elastic motion of a point before it slides.
+            that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`. The
+            temperature is that at the last accepted state.
+        penalty: penalty k divided by shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
+        ramp: half-width theta of the ramp over thickness of the sheet; default 1e-7 where points slide, 1e-5 where
+            they stick.
+        elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, over thickness of the sheet.
         separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
-            "stick" is False: a point stays in contact until a stage makes the tool inactive. There True lets points in
-            tension separate, for materials that do not relax.
-        nodes_per_step: number of nodes that come into contact in one step (an element edge has two); in three
+            "stick" is False: a point stays in contact until a stage makes the tool inactive. With True, points under
+            tension separate there, for materials that do not relax.
+        nodes_per_step: largest number of nodes that come into contact in one step (an element edge has two); in three
             dimensions a percentage of all nodes, default 1. The results of stick, friction and heat exchange depend on
-            the time of gap closure. None: up to 5 % of the nodes where points stick, and on faces that slide beside
-            them. Their gap closures are predicted in order. Elsewhere one node with friction or heat.
-        present_area: True: the penalty refers to area and wall at the beginning of a step instead of the reference
-            configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed one. Only
-            without friction. The penetration then depends on the steps.
+            the time of gap closure. None: if any face sticks, up to 5 % of the nodes of each face with stick or
+            friction, with gap closures predicted in order. Otherwise one node, if there is friction or heat exchange.
+        present_area: True: the penalty refers to area and wall thickness at the beginning of a step, instead of the
+            reference configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed
+            one. Only without friction. The penetration then depends on the steps.
         points: "nodes" of the face, or the number of Gauss points of each facet. Gauss points separate one by one,
             which is smoother where a sheet slides over an edge.
         direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z); the travel is a control
@@ -140,22 +142,22 @@ class Contact(Part):
 
     @property
     def sticks(self) -> bool:
-        """True if points never slide, under "stick" and for mu of 100 or larger."""
+        """True if points in contact never slide: with "stick", and for mu of 100 or larger."""
         return not self.friction_by_temperature and self.mu >= STICKS
 
     @property
     def way(self) -> np.ndarray:
-        """Motion of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
+        """Displacement vector of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
         return np.array(self.direction or (0.0,) * self.tool.components)
 
     @property
     def symmetric(self) -> bool:
-        """True for contact without friction and history, which has an energy."""
+        """True if the contact stiffness is symmetric: contact without friction and history, which has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates
 
     @property
     def lagged(self) -> bool:
-        """True if points stick from the step after their gap closure (`LaggedStick`), on tools in three dimensions."""
+        """True for tools in three dimensions, on which points stick only from the step after their gap closure."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
@@ -163,8 +165,8 @@ class Contact(Part):
 
         .. math:: \tau_{max} = \mu p
 
-        A subclass can return another law, which must vanish without pressure and must not decrease with the pressure.
-        It is not used for stick.
+        A subclass can return another shear stress. It must vanish without pressure and must not decrease with the
+        pressure. With "stick" this method is not used.
 
         Args:
             pressure: pressure p, shape (n,), stress.
@@ -176,11 +178,11 @@ class Contact(Part):
         return mu * pressure, mu
 
     def friction_at(self, temperature: np.ndarray | None, clamped: bool = False) -> Any:
-        """Return the coefficient of friction at temperatures.
+        """Return the coefficient of friction mu at given temperatures of the body.
 
         Args:
             temperature: temperatures at n points, shape (n,); not used for a constant coefficient.
-            clamped: True to take, beyond an end of a table, the value at that end, as in a run.
+            clamped: True: beyond an end of a table mu has the value at that end, as in a run. False: this is an error.
 
         Returns:
             mu, a number, or the values at the points, shape (n,).
@@ -203,16 +205,16 @@ class Contact(Part):
 
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
-        """Return the contact law at points of the face.
+        """Return the contact law, the function that gives the tractions, at points of the face.
 
         Args:
             k: penalty, shape () or (n,), stress/length.
             thickness: thickness of the sheet, length.
-            points: reference positions, shape (n, 2), length.
-            temperature: temperature of the body at the points, shape (n,), if friction depends on it.
+            points: reference positions of the points, shape (n, 2), length.
+            temperature: temperature of the body at the points, shape (n,), if friction depends on the temperature.
 
         Returns:
-            The law.
+            The contact law of this friction, with penalty, ramp and elastic slip in units of length and stress.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:

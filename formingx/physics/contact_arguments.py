@@ -1,4 +1,4 @@
-"""Checks of the arguments of a contact."""
+"""Checks of the arguments `friction` and `points` of a `Contact`."""
 
 import math
 from typing import Any
@@ -12,17 +12,17 @@ _MOST_POINTS = 100
 
 
 def coefficient(name: str, friction: Any) -> Any:
-    """Check a coefficient of friction.
+    """Check a coefficient of friction and return it in the form that the contact law uses.
 
     Args:
         name: name of the argument, for messages.
         friction: "stick", "none", a number, a `Table` or a `FunctionOfTemperature`.
 
     Returns:
-        mu, infinite for sticking points, or a function of the temperature.
+        mu as a number, infinite for "stick" and 0 for "none"; or mu as a function of the temperature.
 
     Raises:
-        InputError: another value, or a negative coefficient.
+        InputError: `friction` is none of these, or negative.
     """
     words = {"none": 0.0, "stick": math.inf}
     if isinstance(friction, str) and friction in words:
@@ -39,17 +39,17 @@ def coefficient(name: str, friction: Any) -> Any:
 
 
 def contact_points(name: str, points: Any) -> str | int:
-    """Check the choice of contact points.
+    """Check the choice of contact points of a face.
 
     Args:
         name: name of the argument, for messages.
-        points: "nodes", or a number of Gauss points of each facet.
+        points: "nodes", or the number of Gauss points of each facet.
 
     Returns:
         The same value.
 
     Raises:
-        InputError: another value.
+        InputError: `points` is neither "nodes" nor a number from 1 to 100.
     """
     if isinstance(points, str) and points == "nodes":
         return points

@@ -1,6 +1,7 @@
-"""Interface of a law of contact between points of a face and a rigid tool, and its history variables.
+"""Interface of a contact law, the relation of tractions to motion at points of a face and a rigid tool.
 
-Positions, motions and tractions of n points have c components each, 2 in the plane of a section: shape (n, c).
+Positions, motions and tractions of n points have c components each, 2 in the plane of a section: shape (n, c). They are
+relative to the tool. A signed distance is positive inside the tool.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
 
 FAR = 1e30
-"""A number larger than all others, but finite: its product with 0 is 0."""
+"""A number that stands for infinity, finite so that its product with 0 is 0."""
 
 
 class ContactStatus(IntEnum):
-    """Status of a contact point; of a sliding one also the sense, along the tangent of the tool."""
+    """Status of a contact point: open (FREE), sticking, or sliding.
+
+    SLIDES is sliding along the positive tangent of the tool, SLIDES_BACK along the negative tangent.
+    """
 
     SLIDES_BACK = -1
     STICKS = 0
@@ -29,14 +33,14 @@ class ContactStatus(IntEnum):
 
 
 class Touch(NamedTuple):
-    """History variables of n points at the last accepted state, relative to the tool.
+    """History variables of n contact points at the last accepted state, relative to the tool.
 
     Attributes:
-        position: shape (n, c), length.
-        distance: signed distance, shape (n,), length.
-        slip: elastic slip g, shape (n,), length.
-        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length; NaN if
-            the point has no friction before the end of that step.
+        position: positions, shape (n, c), length.
+        distance: signed distances from the tool, shape (n,), length.
+        slip: elastic slips g, shape (n,), length.
+        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length; NaN for
+            no friction in that step.
     """
 
     position: np.ndarray
@@ -46,13 +50,15 @@ class Touch(NamedTuple):
 
 
 class Tractions:
-    """Tractions at n points per unit reference area, with the sign of the residual (of the body on the tool).
+    """Contact tractions at n points per unit reference area, of the body on the tool.
 
     Args:
-        force: shape (n, c), stress.
-        normal, tangential: N and T, shape (n,), stress.
-        sense: sense of sliding, 1 or -1 along the tangent, 0 for a sticking point, shape (n,).
-        stiffness, touch: functions that compute these properties when they are first used.
+        force: traction vectors, shape (n, c), stress. Their sign is that of the contact forces in the residual.
+        normal: normal tractions N, shape (n,), stress, positive in compression.
+        tangential: tangential tractions T, shape (n,), stress.
+        sense: sense of sliding, 1 or -1 along the tangent of the tool, 0 for a sticking point, shape (n,).
+        stiffness: function that computes the property `stiffness` when it is first used.
+        touch: function that computes the property `touch` when it is first used.
     """
 
     def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
@@ -62,24 +68,29 @@ class Tractions:
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """Derivative of the force, shape (n, c, c), stress/length."""
+        """Derivative of the traction vectors by the positions, shape (n, c, c), stress/length."""
         return self._stiffness()
 
     @cached_property
     def touch(self) -> Touch:
-        """History variables after the state."""
+        """History variables that hold after the state with these tractions is accepted."""
         return self._touch()
 
     @property
     def status(self) -> np.ndarray:
-        """The `ContactStatus` of each point, shape (n,)."""
+        """`ContactStatus` of each point, shape (n,): a point without normal traction is open."""
         return np.where(self.normal != 0, self.sense, ContactStatus.FREE).astype(np.int8)
 
 
 class Motion(NamedTuple):
-    """Position of n points relative to a tool, to first order.
+    """Distance and elastic slip of n points at a tool, with their gradients, for a first-order prediction.
 
-    position: shape (n, c), length; distance, slip: shape (n,), length; normal, along: their gradients, shape (n, c).
+    Attributes:
+        position: positions relative to the tool at which the other values hold, shape (n, c), length.
+        distance: signed distances from the tool, shape (n,), length.
+        normal: gradients of the distance, shape (n, c).
+        slip: elastic slips, shape (n,), length.
+        along: gradients of the slip, shape (n, c).
     """
 
     position: np.ndarray
@@ -89,36 +100,50 @@ class Motion(NamedTuple):
     along: np.ndarray
 
     def to(self, x: np.ndarray) -> Motion:
-        """Return the predicted values for the points moved to x, shape (n, c)."""
+        """Predict distances and slips to first order at other positions.
+
+        Args:
+            x: new positions of the points relative to the tool, shape (n, c), length.
+
+        Returns:
+            Predicted distances and slips at x, with the gradients unchanged.
+        """
         slip = self.slip + np.einsum("ni,ni->n", self.along, x - self.position)
         return Motion(x, self.distance_at(x), self.normal, slip, self.along)
 
     def distance_at(self, x: np.ndarray) -> np.ndarray:
-        """Return the predicted distances of the points moved to x, shape (n, c), shape (n,), length."""
+        """Predict the signed distances from the tool to first order at other positions.
+
+        Args:
+            x: new positions of the points relative to the tool, shape (n, c), length.
+
+        Returns:
+            Signed distances, shape (n,), length.
+        """
         return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
 
 
 class ContactLaw:
-    """Tractions at n points, a function of their positions x and of their history variables (`None`: there are none).
+    """Contact law at n points: tractions as a function of the positions x of the points and of their history variables.
 
-    For each increment, in this order:
+    In each increment a contact calls these methods in this order:
 
-    * `motion`, `touching`, at its beginning: distance and slip of each point to first order; the points that touch;
-    * `tractions`, in each iteration, linearised at the `Motion` that the iteration before predicts: forces, their
-      derivative (the tangent) and, for an accepted state, the new history variables;
-    * `stiffness_ahead`, at an accepted state: the tangent of the path, with the points that have just touched;
-    * `distance`, `nearest`, `ramp`, for limits of the next step: when gaps close, and whether that was predicted.
+    * `motion` and `touching` at its beginning, for distances, slips and points in contact;
+    * `tractions` in each Newton iteration, linearised at the `Motion` that the iteration before predicts. It returns
+      tractions and stiffness, and the new history variables of an accepted state;
+    * `stiffness_ahead` at an accepted state, for the tangent towards the next step;
+    * `distance`, `nearest` and `ramp` for the limits of the next step.
 
-    A law derives from it and gives `theta`, `start`, `touching`, `tractions`, `distance` and `part`. The other members
-    have defaults, or are needed for friction, in a section or where a contact is left out.
+    A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. The
+    other members have defaults, or are needed for friction, in a section, or where a contact is left out.
 
     Attributes:
-        theta: half-width of the ramp, length: contact begins at the distance -theta.
-        elastic_slip: slip of a point before it slides, length.
-        shift: reduction of the distances, length, a number or one for each point, shape (n,).
+        theta: half-width of the ramp, length: contact begins at the signed distance -theta.
+        elastic_slip: elastic slip at which a point begins to slide, length.
+        shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
         has_friction: True if tractions depend on the slip.
         remembers: True if tractions depend on the history variables (`Touch`).
-        pulls: True if the body may pull at the tool; `energy` is then the energy of the bond (`Path.work`).
+        pulls: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
         predictable: True if the law has `friction` and `depth`, as `formingx.physics.penalty.Law`; several gaps may
             then close in one step.
     """
@@ -137,78 +162,167 @@ class ContactLaw:
         return False
 
     def start(self, x: np.ndarray) -> Touch:
-        """Return the initial history variables of points at x."""
+        """Return the history variables of points that begin at positions x relative to the tool, shape (n, c),
+        length."""
         raise NotImplementedError
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """Return a mask of the points at x that touch or stick, shape (n,)."""
+        """Return a mask of the points that are in contact with the tool.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the last accepted state; None: there are none.
+
+        Returns:
+            Mask, shape (n,).
+        """
         raise NotImplementedError
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """Return the distance and the slip of points at x, and their gradients; default: zero, for a linear law."""
+        """Return distances and elastic slips of the points with their gradients; by default 0, for a linear law.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the last accepted state; None: there are none.
+
+        Returns:
+            Distances, slips and gradients at x.
+        """
         return Motion(x, np.zeros(len(x)), np.zeros_like(x), np.zeros(len(x)), np.zeros_like(x))
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions at points x; `expected`: where to linearise (at x if None); `sense`: of the
-        iteration before."""
+        """Compute the contact tractions at the points.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the last accepted state; None: there are none.
+            sense: sense of sliding in the previous Newton iteration, shape (n,); None in the first.
+            expected: distances and slips at which the law is linearised; None: those at x.
+
+        Returns:
+            Tractions with their stiffness and the new history variables.
+        """
         raise NotImplementedError
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """Return the derivative of the tractions beyond a state, shape (n, c, c), stress/length; `arrived`: just
-        now."""
+        """Return the derivative of the tractions by the positions at an accepted state, towards the next step.
+
+        A law with a ramp gives points that have just closed the stiffness that they have further inside the ramp.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the accepted state; None: there are none.
+            arrived: mask of the points whose gap closed in the last step, shape (n,).
+
+        Returns:
+            Stiffness, shape (n, c, c), stress/length.
+        """
         return self.tractions(x, old).stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """Return the derivative of the circumferential traction by the circumferential motion, shape (n,),
-        stress/length."""
+        """Return the derivative of the circumferential traction by the circumferential motion, in axisymmetric
+        problems.
+
+        The second variation of non-axisymmetric modes uses this stiffness.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the last accepted state; None: there are none.
+            radius: radius of the points, shape (n,), length; infinite in plane strain.
+
+        Returns:
+            Stiffness, shape (n,), stress/length.
+        """
         raise NotImplementedError
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distance, length, of points x, shape (n, c), or of m positions of each point, (m, n, c)."""
+        """Return the signed distances of points from the tool, positive inside, less `shift`.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), or m positions of each point, shape (m, n, c), length.
+
+        Returns:
+            Signed distances, shape (n,) or (m, n), length.
+        """
         raise NotImplementedError
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """`PlaneTool.nearest`, with these distances."""
+        """Return the geometry of the tool at the points nearest to the contact points (`PlaneTool.nearest`).
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+
+        Returns:
+            Signed distances as in `distance`, normals and curvatures.
+        """
         raise NotImplementedError
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal traction over the penalty at distances d, and its derivative; default: no ramp."""
+        """Return the normal traction over the penalty as a function F(d) of the distance, and its derivative; by
+        default 0.
+
+        Args:
+            d: signed distances from the tool, shape (n,), length.
+            held: mask of the points that cannot separate, shape (n,), or False.
+
+        Returns:
+            F, shape (n,), length; dF/dd, shape (n,).
+        """
         return np.zeros(len(d)), np.zeros(len(d))
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
-        """Return the energy of the normal tractions per unit reference area, shape (n,), stress length; default: 0."""
+        """Return the energy of the normal tractions per unit reference area; by default 0.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+            old: history variables of the last accepted state; None: there are none.
+
+        Returns:
+            Energy per area, shape (n,), stress times length.
+        """
         return np.zeros(len(x))
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
-        """Return the law of some of the points."""
+        """Return the contact law of some of the points (indices, shape (m,), or a slice)."""
         raise NotImplementedError
 
     def without(self, points: np.ndarray) -> ContactLaw:
-        """Return the same law, of which some points (a mask, shape (n,)) touch nothing."""
+        """Return the same law in which some points (a mask, shape (n,)) stay open."""
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> Self:
-        """Return the same law with other coefficients of friction; default: it has none."""
+        """Return the same law with other coefficients of friction mu, shape () or (n,); by default unchanged: without
+        friction."""
         return self
 
 
 class NormalLaw(ContactLaw):
-    """A law without friction or memory: subclasses give `ramp` and `stored`.
+    """Contact law without friction and history: the normal traction is a function of the distance.
+
+    A subclass defines `ramp`, the traction over the penalty, and `stored`, its integral.
 
     Args:
         tool: the tool, which gives the signed distance.
-        k: the penalty, stress/length, a number or one for each point, shape (n,).
-        theta, shift: see `ContactLaw`. With a shift a point that touches from the start begins at the outer edge of
-            the ramp, free of stress.
+        k: penalty, stress/length, a number or one for each point, shape (n,).
+        theta: half-width of the ramp, length: contact begins at the signed distance -theta.
+        shift: reduction of the signed distances, length, a number or one for each point, shape (n,). With a shift a
+            point that touches in the reference configuration begins at the outer edge of the ramp, free of stress.
     """
 
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
-        self._near: tuple[bytes, Nearest] | None = None     # positions last asked for, and the result
+        self._near: tuple[bytes, Nearest] | None = None     # last positions, and their result
 
     def stored(self, d: np.ndarray) -> np.ndarray:
-        """Return the integral of the ramp over the distance, 0 where there is no contact, shape (n,), length^2."""
+        """Return the energy of the normal traction over the penalty, the integral of `ramp` over the distance.
+
+        Args:
+            d: signed distances from the tool, shape (n,), length.
+
+        Returns:
+            Integral, shape (n,), length^2; 0 for open points.
+        """
         raise NotImplementedError
 
     def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
@@ -220,7 +334,8 @@ class NormalLaw(ContactLaw):
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """See `ContactLaw`; found once for the same points."""
+        """Return the geometry of the tool nearest to positions x, shape (n, c), with shifted distances; stored for
+        equal x."""
         positions = x.tobytes()
         if self._near is None or positions != self._near[0]:
             near = self.tool.nearest(x)
@@ -247,7 +362,16 @@ class NormalLaw(ContactLaw):
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """See `ContactLaw`: N n_r/r, r being `radius`, infinite in plane strain."""
+        """Return the derivative N n_r/r of the circumferential traction by the circumferential motion.
+
+        Args:
+            x: positions relative to the tool, shape (n, 2), length.
+            old: not used.
+            radius: radius r of the points, shape (n,), length; infinite in plane strain.
+
+        Returns:
+            Stiffness, shape (n,), stress/length.
+        """
         turned = self.tractions(x, old).normal * self.nearest(x).normal[:, 0]
         return np.divide(turned, radius, out=np.zeros(len(x)), where=radius > 0)
 
@@ -259,12 +383,20 @@ class NormalLaw(ContactLaw):
         return self._with(shift=self.shift + np.where(points, FAR, 0.0))
 
     def _with(self, **other: Any) -> Self:
-        """Return the same law with other attributes."""
+        """Return a copy of the law with other values of some attributes."""
         law = object.__new__(type(self))
         vars(law).update(vars(self), **other, _near=None)
         return law
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a b^T of n vectors, shape (n, c, c)."""
+    """Return the outer products a b^T of n pairs of vectors.
+
+    Args:
+        a: vectors, shape (n, c).
+        b: vectors, shape (n, c).
+
+    Returns:
+        Matrices, shape (n, c, c).
+    """
     return a[:, :, None] * b[:, None, :]

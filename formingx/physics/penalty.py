@@ -1,4 +1,4 @@
-"""Contact law of a penalty with a regularised ramp and friction; `contact` states its equations."""
+"""Contact law of a penalty with a regularised ramp and friction; the module `contact` states its equations."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from ..tools.tool import PlaneTool
 from .contact_law import Motion, NormalLaw, Touch, Tractions, outer
 
 STICKS = 100.0
-"""Coefficient of friction above which a point counts as sticking."""
+"""Coefficient of friction from which on a point counts as sticking."""
 
 RAMP_EDGE = 1e-7
 """Distance from the outer edge of the ramp, over theta, that is negligible."""
 
 
 class Law(NormalLaw):
-    """Contact law of this module: a penalty with a ramp, and friction.
+    """Contact law with a penalty, a regularised ramp and friction, eqs. (5.7) to (5.14) of Song (1993).
 
     Args:
-        tool: see `NormalLaw`.
-        mu: coefficient of friction, shape () or (n,).
+        tool: the tool, which gives the signed distance.
+        mu: coefficient of friction, shape () or (n,); infinite for stick.
         k: penalty, shape () or (n,), stress/length.
-        theta: see `NormalLaw`.
-        elastic_slip: g_s, length, not used by stick.
-        shift: see `NormalLaw`.
+        theta: half-width of the ramp, length: contact begins at the signed distance -theta.
+        elastic_slip: elastic slip g_s at which a point begins to slide, length; not used by stick.
+        shift: reduction of the signed distances, length, shape () or (n,).
         pulls: True if points in contact never separate.
-        shear_limit: see `Contact.shear_limit`; None for Coulomb's mu p.
+        shear_limit: function of pressure and mu that returns the shear stress at which points slide and its derivative,
+            see `Contact.shear_limit`; None for Coulomb's mu p.
     """
 
     predictable = True
@@ -40,10 +41,10 @@ class Law(NormalLaw):
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.elastic_slip, self.pulls = elastic_slip, pulls
         self._set_friction(mu)
-        self._slid: tuple[Nearest, Touch, tuple] | None = None      # slip of the last nearest points and history
+        self._slid: tuple[Nearest, Touch, tuple] | None = None      # last geometry and history, and their slip
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
-        """Return the law with other coefficients of friction.
+        """Return a copy of the law with other coefficients of friction.
 
         Args:
             mu: coefficient of friction, shape () or (n,).
@@ -62,11 +63,11 @@ class Law(NormalLaw):
         self.remembers = self.has_friction or self.pulls
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
-        """Return the mask of the points that are in contact or stick.
+        """Return the mask of the points in contact with the tool, including bonded points.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables, or None.
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state, or None.
 
         Returns:
             Mask, shape (n,).
@@ -74,14 +75,17 @@ class Law(NormalLaw):
         return (self.distance(x) > -self.theta) | self._bonded(old)
 
     def _bonded(self, old: Touch | None) -> np.ndarray | bool:
-        """Return the mask of the points that cannot separate, shape (n,)."""
+        """Return the mask of the points that were in contact and cannot separate, shape (n,); False if all points
+        can."""
         return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Evaluate the ramp F(d) of eq. (5.13), or max(d + theta, 0) if points do not separate.
+        """Evaluate the ramp F(d) of eq. (5.13), or max(d + theta, 0) for contact that does not separate.
+
+        F times the penalty k is the normal traction.
 
         Args:
-            d: distances, shape (n,), length.
+            d: signed distances from the tool, shape (n,), length.
             bonded: mask of the points that cannot separate: F = d + theta of either sign.
 
         Returns:
@@ -94,13 +98,13 @@ class Law(NormalLaw):
         return np.where(d < self.theta, self.theta * slope**2, d), slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
-        """Return the distance at which the normal traction has a given value.
+        """Return the signed distance from the tool at which the normal traction has a given value.
 
         Args:
             pressure: normal traction, shape (n,), stress.
 
         Returns:
-            Signed distance, shape (n,), length.
+            Signed distance, positive inside the tool, shape (n,), length.
         """
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
@@ -112,7 +116,8 @@ class Law(NormalLaw):
 
     @property
     def friction(self) -> np.ndarray:
-        """T/N of a point that slides under a vanishing pressure, shape () or (n,); infinite for a sticking point."""
+        """Ratio T/N of a point that slides under a vanishing pressure, shape () or (n,); infinite for a sticking
+        point."""
         sticks = np.asarray(self.mu >= STICKS)
         grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
         return np.where(sticks, np.inf, grows)
@@ -121,11 +126,11 @@ class Law(NormalLaw):
         """Return the energy of the normal traction, the integral of N over the distance.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables, or None.
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state, or None.
 
         Returns:
-            Energy per reference area, shape (n,), stress times length.
+            Energy per unit reference area, shape (n,), stress times length.
         """
         d, theta = self.distance(x), self.theta
         if self.pulls:
@@ -134,10 +139,10 @@ class Law(NormalLaw):
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
     def start(self, x: np.ndarray) -> Touch:
-        """Return the initial history variables.
+        """Return the history variables of points that have not slipped.
 
         Args:
-            x: initial positions, shape (n, 2), length.
+            x: initial positions relative to the tool, shape (n, 2), length.
 
         Returns:
             The history variables.
@@ -149,19 +154,20 @@ class Law(NormalLaw):
 
     def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions at points.
+        """Compute the contact tractions at points.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables; not used without friction.
-            sense: sense of sliding in the previous iteration, shape (n,). A point whose sense would reverse sticks for
-                this one iteration; otherwise Newton's method would alternate across the narrow range of stick.
-            expected: distances and slips at which to linearise the law, those predicted by the previous iteration;
-                None: at x. Tractions as independent unknowns would have these values. Taken at x, the curvature of tool
-                and motion times a stiff penalty would dominate.
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state; not used without friction.
+            sense: sense of sliding in the previous Newton iteration, shape (n,). A point whose sense would reverse
+                sticks for this one iteration; otherwise Newton's method would alternate across the narrow range of
+                stick.
+            expected: distances and slips at which the law is linearised, those predicted by the previous iteration;
+                None: those at x. With values at x, the curvature of tool and motion, times a stiff penalty, would
+                dominate.
 
         Returns:
-            Tractions, with their stiffness and history variables.
+            Tractions, with their stiffness and the new history variables.
         """
         near, k = self.nearest(x), self.k
         d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
@@ -175,7 +181,7 @@ class Law(NormalLaw):
         pressed, ahead = k * F, d - centre
         N = pressed + k * slope * ahead
         force = N[:, None] * n
-        kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.remembers else d            # it stays in contact
+        kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.remembers else d            # stays in contact
         if not self.has_friction:
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
                              + outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
@@ -207,7 +213,13 @@ class Law(NormalLaw):
         return Tractions(force, N, T, sense_now, stiffness, touch)
 
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the stiffness T/g of elastic slip at distances d, and its derivative by them, shape (n,) each."""
+        """Return the tangential stiffness T/g of elastic slip, and its derivative by the distance, shape (n,) each.
+
+        Args:
+            d: signed distances, shape (n,), length.
+            pressed: normal tractions at d, shape (n,), stress.
+            slope: derivatives of the ramp at d, shape (n,).
+        """
         sticks, k = self.sticks, self.k
         if np.ndim(sticks) == 0 and not sticks:
             limit, grows = self.shear_limit(pressed, self.mu)
@@ -220,15 +232,15 @@ class Law(NormalLaw):
                 np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        r"""Return the derivative of the hoop traction with respect to the hoop motion.
+        r"""Return the derivative of the circumferential traction with respect to the circumferential motion.
 
         .. math:: \frac{N n_r}{r}
 
         For a sticking point the stiffness of the elastic slip is added.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables, or None.
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state, or None.
             radius: radius r of the points, shape (n,), length; infinite in plane strain.
 
         Returns:
@@ -241,29 +253,29 @@ class Law(NormalLaw):
         return turned + np.where(found.sense == 0, self._resistance(near.distance, self.k * F, slope)[0], 0.0)
 
     def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
-        """Return distances and slips of points, and their gradients.
+        """Return distances and elastic slips of points, with their gradients.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables, or None.
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state, or None: slips are 0.
 
         Returns:
-            Distance, normal, slip, and gradient of the slip.
+            Distances, normals, slips and gradients of the slip at x.
         """
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, near.tangent, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
-        """Return the stiffness in which closing points are pressed halfway into the ramp.
+        """Return the stiffness at an accepted state towards the next step, in which points that just closed are stiff.
 
-        At the outer edge of the ramp points have no stiffness, and the tangent of the path would let them slip where
-        they will stick.
+        At the outer edge of the ramp a point has no stiffness. The tangent of the path would let such a point slip
+        where it will stick. Its stiffness is therefore evaluated halfway between the outer edge and distance 0.
 
         Args:
-            x: positions, shape (n, 2), length.
-            old: history variables, or None.
-            arrived: mask of the points that have just closed, shape (n,).
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the accepted state, or None.
+            arrived: mask of the points whose gap closed in the last step, shape (n,).
 
         Returns:
             Stiffness, shape (n, 2, 2), stress/length.
@@ -280,7 +292,10 @@ class Law(NormalLaw):
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray, old: Touch) -> tuple[np.ndarray, np.ndarray]:
-        """Return the elastic slip g of sticking points, shape (n,), and its gradient, shape (n, 2); computed once."""
+        """Return the elastic slip g that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
+
+        The result is stored for repeated calls with the same arguments.
+        """
         if self._slid is not None and self._slid[0] is near and self._slid[1] is old:
             return self._slid[2]
         touched = old.distance > -self.theta
@@ -295,5 +310,5 @@ class Law(NormalLaw):
 
 
 def _touch(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> Touch:
-    """Return history variables whose point of gap closure is the present position."""
+    """Return history variables with position x, distance d and elastic slip; a later gap closure is expected at x."""
     return Touch(x, d, slip, x)

@@ -3,11 +3,10 @@
 Symbols: x are the unknowns, s is the arc length along the tangent of an accepted state.
 
 1. Predictor: along the tangent, an open point moves with the constant velocity w0.
-2. Event: a point meets its tool where its gap closes. The earliest event, over all points and ranks, is taken.
+2. Event: the gap of a point closes where the point meets its tool. The earliest event of all points and ranks counts.
 3. Status: from this event on the point sticks, slides against mu N, or opens. The contact forces F of all closed points
    follow from Coulomb's law on the condensed system (`reduced_contact`). Changes of status are events too.
-4. Equilibrium: at each event, modified Newton iterations return the prediction to the curved path. They use the stored
-   LU factors and Anderson acceleration (1965).
+4. Equilibrium: at each event, modified Newton iterations (Anderson acceleration, 1965) return to the curved path.
 
 The path is piecewise linear between the events. A point sticks where its gap closed, so the order of events matters.
 """
@@ -33,17 +32,16 @@ class EventSettings:
 
     Attributes:
         iterations: maximum number of equilibrium iterations per event.
-        to_tools: contact iterations that project closed points onto curved tools.
-        to_surface: largest number of Newton iterations that locate a closure on its surface.
+        to_tools: number of contact iterations that project closed points onto curved tools.
+        to_surface: maximum number of Newton iterations that locate a gap closure on the surface of the tool.
         changes: maximum number of status changes (slip, opening) between two gap closures.
-        taken_over: sliding points of the start state get their own forces only up to this number of points.
+        taken_over: maximum number of sliding points at the start of the step that get contact forces of their own.
         same_place: convergence tolerance of a sticking point: its motion over its tributary length.
-        about_there: convergence tolerance of a point that may slide, likewise.
-        soon: part of the step within which two closures are simultaneous.
+        about_there: the same tolerance for a point that may slide.
+        soon: fraction of the step within which two closures are simultaneous.
         earlier: maximum number of times that an earlier closure replaces the one being located.
         late: largest change of an event's arc length in an iteration, relative to that arc length.
-        work: maximum number of equilibrium iterations and status changes for all events of a step. Beyond it the
-            step takes one gap closure.
+        work: maximum number of equilibrium iterations and status changes in a step; then the step takes one closure.
     """
 
     iterations: int = 8
@@ -63,14 +61,14 @@ _SETTINGS = EventSettings()
 
 
 class GapClosure(NamedTuple):
-    """Contact event: an open point reaches the ramp of its tool. All ranks store the same value.
+    """Contact event: an open point reaches the outer edge of the ramp of its tool. All ranks store the same value.
 
     Attributes:
         time: arc length of the event.
         rank: rank that owns the point.
         face: number of the contact face.
         point: local number of the point.
-        place: position at the event, shape (2,), length.
+        place: position of the point relative to the tool at the event, shape (2,), length.
         length: tributary length of the point, length.
         sticks: True if the point sticks under any force.
     """
@@ -93,13 +91,16 @@ class _Segment(NamedTuple):
     """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
 
     Attributes:
-        begins: arc length at its start.
-        at, speed: positions and velocities of all points, list over faces.
-        status: contact status, shape (m,).
+        begins: arc length at the start of the segment.
+        at: positions of all points relative to the tools at this start, for each face.
+        speed: their derivatives by arc length.
+        status: contact statuses, shape (m,).
         place: sticking positions, shape (m, 2), length.
-        force, rate: contact forces and their derivatives by arc length, shape (m, 2).
-        extra, growth: part of the force outside the factorised tangent, and its derivative, shape (m, 2).
-        off: further correction of (x, control) off the tangent.
+        force: contact forces at the start, shape (m, 2).
+        rate: their derivatives by arc length, shape (m, 2).
+        extra: part of the force outside the factorised tangent, shape (m, 2).
+        growth: its derivative by arc length, shape (m, 2).
+        off: correction of (x, control) from equilibrium iterations.
     """
 
     begins: float
@@ -114,13 +115,13 @@ class _Segment(NamedTuple):
     off: tuple[np.ndarray, float]
 
     def after(self, time: float) -> _Segment:
-        """Return the segment with its start moved along itself to another arc length."""
+        """Return the segment with its start moved along the segment to an arc length `time`."""
         by = time - self.begins
         return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
                              force=self.force + by * self.rate, extra=self.extra + by * self.growth)
 
     def of(self, m: int) -> _Segment:
-        """Return the segment for m known points."""
+        """Return the segment extended to m points of known compliance; added points are open."""
         more = m - len(self.status)
         if not more:
             return self
@@ -131,20 +132,20 @@ class _Segment(NamedTuple):
 
 
 class ContactEventSequence:
-    """Gap closures ahead of an accepted state, in order, and the piecewise-linear path through them.
+    """Gap closures after an accepted state, in order, and the piecewise-linear path through them.
 
     Args:
         faces: the active `FaceContact` objects.
         n: number of locally owned field unknowns.
-        x, control: the state; x is the locally owned part.
+        x, control: unknowns (locally owned entries) and control of the state.
         direction, slope: derivatives of x and control by arc length.
         response: linearised response of the body to contact forces.
         batch: number of points whose compliance is solved for at a time.
 
     Attributes:
-        touching: number of closed points of each face.
+        touching: number of closed points of each face at the state, on all ranks.
         ends: arc length up to which the prediction holds.
-        stops: True if no path continues there.
+        stops: True if no admissible contact statuses were found at `ends`.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -169,11 +170,12 @@ class ContactEventSequence:
 
     @property
     def exhausted(self) -> bool:
-        """True if the events of this step reached the limit `EventSettings.work`."""
+        """True if the prediction of this step has reached the limit `EventSettings.work`."""
         return self._work >= _SETTINGS.work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """Return gap closure number k (from 0) within an arc length, or None; the forces of earlier closures act."""
+        """Return gap closure number k (from 0) if it lies within an arc length, else None; forces of earlier closures
+        act."""
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
                 return None
@@ -187,11 +189,11 @@ class ContactEventSequence:
         return self._closures[k] if self._closures[k].time < length else None
 
     def closures(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-        """Return the closures within an arc length for each face.
+        """Return the gap closures within an arc length for each face.
 
         Returns:
-            Arc lengths at which locally owned points close (`length` if they stay open), their positions there, and the
-            mask of points in agreement with their forces at the end.
+            Arc lengths at which gaps of locally owned points close; `length` for other points. Their positions at these
+            lengths, relative to the tool. Mask of the points that carry a predicted contact force at the end.
         """
         piece = self._piece(length)
         times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
@@ -204,11 +206,12 @@ class ContactEventSequence:
         return times, at, sure
 
     def positions(self, length: float) -> list[np.ndarray]:
-        """Return the positions of locally owned points of each face at an arc length, linear from the last event."""
+        """Return the positions of locally owned points of each face at an arc length, relative to the tool."""
         return self._piece(length).after(length).at
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the change of (x, control) at a length along the tangent by the events; None: zero."""
+        """Return the deviation of the predicted path from the tangent at an arc length: change of (x, control); None:
+        zero."""
         piece, m = self._piece(length), len(self._points.who)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
@@ -223,9 +226,9 @@ class ContactEventSequence:
                 piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
 
     def _held(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
-        """Return the start of a segment with its points on their tools and sticking positions.
+        """Return a segment whose closed points are projected onto their tools or sticking positions at its start.
 
-        Curved tools need a few iterations. `moved` is a first motion of the points of each face.
+        Curved tools need a few iterations. `moved` is a first motion of the points of each face, (n, 2), length.
         """
         points, near = self._points, self._points.near(piece.at, piece.force)
         u = points.at(moved) if moved else np.zeros_like(piece.force)
@@ -240,7 +243,8 @@ class ContactEventSequence:
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _take_over(self) -> bool:
-        """Apply contact forces to the sliding points of the state; return False without a prediction."""
+        """Give sliding points of the accepted state contact forces of their own; return False if the prediction
+        fails."""
         x, control = self._way[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
@@ -260,7 +264,8 @@ class ContactEventSequence:
         return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
 
     def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
-        """Return the next segment from the start of another, with new statuses; False without a prediction."""
+        """Append the segment that starts at the start of `piece` with new statuses, (m,); return False if none is
+        admissible."""
         points, near = self._points, self._points.near(piece.at, piece.force)
         self._work += 1
         found = points.rates(points.at(self._along), status, near, piece.force)
@@ -278,7 +283,7 @@ class ContactEventSequence:
         return True
 
     def _hold(self, length: float) -> bool:
-        """Apply the contact force of the last closure and add the next segment; return False without a prediction."""
+        """Append the segment after the last closure, with a contact force at its point; return False if that fails."""
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or closure.who not in self._points.who and not self._learn(length):
             return False
@@ -291,7 +296,7 @@ class ContactEventSequence:
         return self._turn(end._replace(status=status, place=place), status)
 
     def _find(self, length: float) -> bool:
-        """Find the next closure within an arc length, on the last segment or at its end."""
+        """Find the next gap closure within an arc length; return False if there is none."""
         for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
@@ -312,7 +317,8 @@ class ContactEventSequence:
         return self._end is not None and self._first(self._back(self._end, last), length, last)
 
     def _first(self, times: list[np.ndarray], length: float, at: _Segment) -> bool:
-        """Add the earliest of several closures if it lies within an arc length; `at` is a segment of the path there."""
+        """Store the earliest of predicted closures (`times`) if it lies before `length`; `at` gives the positions of
+        points."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
@@ -322,7 +328,7 @@ class ContactEventSequence:
         return True
 
     def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
-        """Return the closure of a point near an arc length, from the positions `at` of the points."""
+        """Return the gap closure of point i of face f near an arc length, from the positions `at` of the points."""
         closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
@@ -338,7 +344,7 @@ class ContactEventSequence:
         return self._comm.bcast(closure, root=rank)
 
     def _settle(self, length: float) -> bool:
-        """Equilibrate the path at the last closure, and relocate the closure; return False on failure."""
+        """Equilibrate the path at the last closure and locate the closure again; return False without convergence."""
         last, closure = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(closure.time)
         if closure.time - last.begins < _SETTINGS.soon * length:
@@ -370,7 +376,11 @@ class ContactEventSequence:
         return False
 
     def _back(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return the arc lengths at which points inside their tools passed the surface, else the end of the segment."""
+        """Return the arc lengths at which open points that are inside a tool passed its surface, else the end of the
+        segment.
+
+        `but` is a closure whose point is left out.
+        """
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
             near = face.law.nearest(x)
@@ -383,9 +393,9 @@ class ContactEventSequence:
         return times
 
     def _mixed(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
-        """Return the combination of iterates, (before, after) each, closest to a fixed point (Anderson 1965).
+        """Return the Anderson (1965) combination of equilibrium iterates, (before, after) each; None if they diverge.
 
-        Return None if they diverge. Without acceleration the stored factors make the iterates oscillate.
+        The stored LU factors make iterates without acceleration oscillate.
         """
         by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
                        for before, after in tried])
@@ -405,7 +415,7 @@ class ContactEventSequence:
             off=(mean([p.off[0] for p in after]), float(mean([p.off[1] for p in after]))))
 
     def _moved(self, time: float, piece: _Segment) -> _Segment | None:
-        """Return a segment moved by one equilibrium iteration at its start; None without factors."""
+        """Return a segment corrected by one equilibrium iteration at an arc length; None without valid LU factors."""
         piece, points = piece.of(len(self._points.who)).after(time), self._points
         x, control, direction, slope = self._way
         self._work += 1
@@ -425,7 +435,8 @@ class ContactEventSequence:
         return piece._replace(off=(piece.off[0] + by[0], piece.off[1] + by[1]))
 
     def _learn(self, length: float) -> bool:
-        """Solve for the compliance of the last closure and of the expected next ones; return False without factors."""
+        """Solve for the compliance of the last closure and of the expected next ones; return False without valid LU
+        factors."""
         last, closure, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):

@@ -1,4 +1,4 @@
-"""Length of a step that closes several gaps, and the positions of the closures."""
+"""Prediction of steps that close several gaps: step length, and positions of the points when their gaps close."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ SHARE = 0.05
 
 
 class ContactEventPredictor:
-    """Predictor of the contact events of a `StepLimit`, see `step_limit.EventPredictor`."""
+    """Predictor of the contact events of a `StepLimit`, which creates the predictor and calls `active` and
+    `predict`."""
 
     def __init__(self, limit: StepLimit):
         self._limit, self._vectors = limit, list[Any]()
@@ -27,7 +28,13 @@ class ContactEventPredictor:
     def allowed(self, approach: Approach) -> int:
         """Return the number of points of a face that may close their gaps in one step.
 
-        It exceeds `Approach.at_once` where points stick or slide and their contact leaves `nodes_per_step` open.
+        The number exceeds `Approach.at_once` on faces with stick or friction whose contact has `nodes_per_step=None`.
+
+        Args:
+            approach: the contact of the face.
+
+        Returns:
+            Number of points on all ranks.
         """
         face, most = approach.face, approach.at_once
         if not self._limit.several or not face.law.has_friction or face.contact.nodes_per_step or face.contact.lagged:
@@ -36,13 +43,23 @@ class ContactEventPredictor:
 
     @property
     def active(self) -> bool:
-        """True if a face sticks, so that its result depends on the order of the events."""
+        """True if a face sticks, so that the result depends on the order of gap closures, and all contact laws are
+        predictable."""
         present = self._limit.present
         return any(c.face.contact.sticks and self.allowed(c) > c.at_once for c in present) and all(
             c.face.law.predictable for c in present)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
-        """Return the events ahead of an accepted state; None at the start of a path where no point touches yet."""
+        """Return the contact events after an accepted state.
+
+        Args:
+            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
+            state: the accepted state.
+
+        Returns:
+            The prediction. None if the predictor is not active, if the tangent is singular, or at the start of a path
+            on which no point is in contact yet.
+        """
         n, present = curve.problem.n_owned, self._limit.present
         if not self.active or state.kind == "start" and not any(
                 [c.touches(state.x[:n], state.control) for c in present]) or not curve.factorise_ahead(state):
@@ -53,14 +70,14 @@ class ContactEventPredictor:
 
 
 class ContactEventPrediction:
-    """Events ahead of one state, see `step_limit.EventPrediction`.
+    """Predicted contact events after one accepted state; `StepLimit` calls the methods for a step of a given length.
 
     Args:
         present: active contacts.
         allowed: number of points of each contact that may close their gaps in one step.
-        n: number of locally owned unknowns.
+        n: number of locally owned unknowns of the fields.
         state: the accepted state.
-        response: linearised response of the body there.
+        response: linearised response of the body to contact forces at this state.
     """
 
     def __init__(self, present: list[Approach], allowed: list[int], n: int, state: Any, response: Response):
@@ -69,7 +86,15 @@ class ContactEventPrediction:
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
-        """Return the length to where enough gaps have closed, and no point passes through a tool."""
+        """Return the arc length at which the allowed number of gaps has closed, reduced if a point would pass through a
+        tool.
+
+        Args:
+            length: largest arc length of the step.
+
+        Returns:
+            Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
+        """
         found, sequence = self._to_enough_closures(length) if self._known else None, self._sequence
         while found is not None and found > LIMITS.shortest and any(
                 [c.cuts(a, b) for c, a, b in zip(self._present, sequence.positions(0.0), sequence.positions(found))]):
@@ -78,6 +103,8 @@ class ContactEventPrediction:
         return found
 
     def _to_enough_closures(self, length: float) -> float | None:
+        """Return the arc length, at most `length`, at which the allowed number of gaps has closed; None if the
+        prediction fails."""
         sequence = self._sequence
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
         for k in range(2 * sum(allowed)):
@@ -97,9 +124,24 @@ class ContactEventPrediction:
         return min(LIMITS.beyond * sequence.ends, length)
 
     def closures(self, length: float) -> list[tuple] | None:
-        """See `step_limit.EventPrediction`."""
+        """Return the gap closures predicted within a step.
+
+        Args:
+            length: arc length of the step.
+
+        Returns:
+            For each active contact the arguments times, places and guessed of `Approach.prepare`; None if the
+            prediction failed.
+        """
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """See `step_limit.EventPrediction`."""
+        """Return the deviation of the predicted path from the tangent of the state.
+
+        Args:
+            length: arc length along the tangent.
+
+        Returns:
+            Change of x, locally owned entries, shape (n,), and of the control; None if it is zero or unknown.
+        """
         return self._sequence.bend(length) if self._known else None

@@ -29,14 +29,14 @@ from .response import Response
 
 @dataclass(frozen=True)
 class StatusSearch:
-    """Limits and tolerances of the active-set search.
+    """Limits and tolerances of the active-set search for contact statuses that satisfy Coulomb's law.
 
     Attributes:
         all_at_once: number of trials in which all violating statuses change; later only one changes at a time.
-        tries: maximum number of status sets.
-        none: part of the largest rate below which a rate is negligible.
-        soon: arc length over which force rates are compared with forces.
-        limit: relative distance from the Coulomb cone, or from zero pressure, that counts as on it.
+        tries: maximum number of status sets that are tried.
+        none: fraction of the largest rate of force or motion below which a rate is negligible.
+        soon: arc length over which rates of forces are compared with forces.
+        limit: relative distance from the Coulomb cone, or from zero pressure, below which a force counts as on it.
     """
 
     all_at_once: int = 6
@@ -50,12 +50,13 @@ _SEARCH = StatusSearch()
 
 
 class ToolFrame(NamedTuple):
-    """Local geometry of the tools at m points.
+    """Geometry of the tools at m contact points.
 
     Attributes:
-        normal, tangent: unit vectors, normal into the tool, shape (m, 2).
-        curvature: shape (m,), 1/length.
-        beyond: penetration that gives the present force, less the actual penetration, shape (m,), length.
+        normal: unit normals, pointing into the tool, shape (m, 2).
+        tangent: unit tangents of the tool, shape (m, 2).
+        curvature: curvatures of the tool, shape (m,), 1/length.
+        beyond: penetration that gives the present contact force, less the actual penetration, shape (m,), length.
     """
 
     normal: np.ndarray
@@ -65,12 +66,13 @@ class ToolFrame(NamedTuple):
 
 
 class ReducedSystem(NamedTuple):
-    """Motion of m points without contact stiffness.
+    """Motion dx of m contact points as a linear function of the contact forces, without contact stiffness in the
+    tangent.
 
     Attributes:
         free: dx without contact forces, shape (2 m,).
-        by: derivative of dx by the forces, shape (2 m, 2 m).
-        turn: derivative of rotating forces by dx, shape (m, 2, 2).
+        by: derivative of dx by forces of sign -1 (compliance), shape (2 m, 2 m).
+        turn: derivative by dx of contact forces that rotate with a curved tool, shape (m, 2, 2).
     """
 
     free: np.ndarray
@@ -79,20 +81,21 @@ class ReducedSystem(NamedTuple):
 
 
 class Points:
-    """Contact points of all ranks with a known compliance.
+    """Contact points of all ranks whose compliance is known: the motion of the body due to unit forces at them.
 
     Args:
         faces: the active `FaceContact` objects.
-        n: number of locally owned field unknowns.
-        size: number of locally owned entries of (x, control).
-        response: response of the body.
+        n: number of locally owned unknowns of the fields.
+        size: number of locally owned entries of x.
+        response: linearised response of the body to contact forces.
 
     Attributes:
         who: (rank, face, point) of each of the m points.
-        columns, steps: changes of x (locally owned rows), shape (n, 2 m), and control, shape (2 m,), by forces -1.
-        by: motion of all points of each face by these forces, shape (points, 2, 2 m).
+        columns: changes of x by forces -1 at the points, locally owned rows, shape (size, 2 m).
+        steps: changes of the control by these forces, shape (2 m,).
+        by: motion of all locally owned points of each face by these forces, shape (points, 2, 2 m).
         friction: coefficient of friction, infinite for stick, shape (m,).
-        elastic_slip: tangential motion before sliding, shape (m,), length.
+        elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
@@ -107,11 +110,14 @@ class Points:
         self._owned: list[tuple[int, np.ndarray, np.ndarray, Any]] = []
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
-        """Add points and solve for their compliance; return False without factors.
+        """Add contact points, and solve for their compliance with the stored LU factors.
 
         Args:
-            chosen: for each face, local numbers of locally owned points.
-            touched: True if the factorised tangent contains their contact stiffness.
+            chosen: for each face, local numbers of the locally owned points to add.
+            touched: True if the factorised tangent contains the contact stiffness of these points.
+
+        Returns:
+            True; False if the stored factors no longer belong to the state.
         """
         found = self._response.to_points(chosen)
         if found is None:
@@ -138,11 +144,14 @@ class Points:
         return True
 
     def at(self, values: Sequence[np.ndarray], point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
-        """Return values at points, by default at all these points, on all ranks, shape (m, ...).
+        """Return values at contact points of all ranks, shape (m, ...).
 
         Args:
             values: for each face, values at its locally owned points.
-            point_ids: (rank, face, point) of each point.
+            point_ids: (rank, face, point) of each point; None: all m points with known compliance.
+
+        Returns:
+            Values in the order of the points, the same on all ranks.
         """
         located = self._owned if point_ids is None else self._of_faces(point_ids)
         found = np.zeros((len(self.who if point_ids is None else point_ids), *values[0].shape[1:]))
@@ -151,23 +160,47 @@ class Points:
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
 
     def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
-        """Write values of these points, shape (m, ...), into the values at each face's owned points."""
+        """Write values at the m points into the arrays of the faces.
+
+        Args:
+            values: values at the points, shape (m, ...).
+            among: for each face, values at its locally owned points, changed in place.
+        """
         for f, k, i, _ in self._owned:
             among[f][i] = values[k]
 
     def _of_faces(self, point_ids: Sequence[tuple[int, int, int]]) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """Return for each face with owned points its number, their places in the list, and their numbers."""
+        """Return for each face with listed points of this rank: face number, indices in the list, and local point
+        numbers."""
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
         return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
 
     def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion of points to `place` along their tools and to their depth normal to them, shape (m, 2)."""
+        """Return the motion that brings points to given positions along their tools and to the depth of their contact
+        forces.
+
+        Args:
+            at: for each face, present positions of its locally owned points relative to the tool, shape (n, 2), length.
+            place: tangential target positions of the m points, shape (m, 2), length.
+            near: geometry of the tools at the m points.
+
+        Returns:
+            Motion, shape (m, 2), length.
+        """
         along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
     def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> ToolFrame:
-        """Return the geometry of the tools at all points, with forces F, shape (m, 2), at these points."""
+        """Return the geometry of the tools at the m points.
+
+        Args:
+            at: for each face, positions of its locally owned points relative to the tool, shape (n, 2), length.
+            force: present contact forces in F at the m points, shape (m, 2), which give the depth `ToolFrame.beyond`.
+
+        Returns:
+            Normals, tangents, curvatures and missing penetrations.
+        """
         c = self._components
         found = np.zeros((len(self.who), c + c + 2))
         for f, k, i, law in self._owned:
@@ -180,27 +213,44 @@ class Points:
         return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal and tangential components N and T of forces, shape (m,) each."""
+        """Return the components of vectors normal and tangential to the tools.
+
+        Args:
+            force: vectors at the m points (forces, their rates or motions), shape (m, 2).
+            near: geometry of the tools.
+
+        Returns:
+            Normal and tangential components, N and T for forces, shape (m,) each.
+        """
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def moved_by(self, by: np.ndarray, f: int) -> np.ndarray:
-        """Return the motion of all locally owned points of a face by forces -1 times `by`, shape (m, 2)."""
+        """Return the motion of all locally owned points of a face due to contact forces at the m points.
+
+        Args:
+            by: contact forces of sign -1, shape (m, 2).
+            f: number of the face.
+
+        Returns:
+            Motion relative to the tool, shape (n, 2), length.
+        """
         return self.by[f] @ by.ravel()
 
     def held(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
              to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return new forces F of points that the body would move by u, and dF - S dx, shape (m, 2) each.
+        """Compute the contact forces F at the end of a given motion, for given contact statuses.
 
         Args:
-            u: motion of the points without new forces.
-            status: contact statuses.
+            u: motion dx of the points if the contact forces did not change, shape (m, 2), length.
+            status: contact statuses, shape (m,).
             near: geometry of the tools.
-            force: present forces.
-            to: motion of the sticking points before their elastic slip g_s T/(mu N), shape (m, 2). Sliding points go to
-                their tools.
+            force: present contact forces, shape (m, 2).
+            to: motion to the target positions of sticking points before their elastic slip g_s T/(mu N), shape (m, 2),
+                length. Sliding points are moved to the surface of their tools.
 
         Returns:
-            F and dF - S dx. If no such forces exist, the second is NaN and F is `force`.
+            New forces F, and the change of force outside the factorised tangent, dF - S dx, shape (m, 2) each. If no
+            such forces exist, the second is NaN and F is `force`.
         """
         N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
@@ -214,9 +264,19 @@ class Points:
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return the rates of forces and of dF - S dx, and the statuses that satisfy Coulomb's law.
+        """Compute the rates of the contact forces along the path, with contact statuses that satisfy Coulomb's law.
 
-        Statuses that violate it are changed. None: no statuses were found that satisfy it.
+        Statuses that violate the law are changed by an active-set search.
+
+        Args:
+            u: velocity of the points along the tangent of the path, shape (m, 2), length per arc length.
+            status: first statuses, shape (m,).
+            near: geometry of the tools.
+            force: present contact forces, shape (m, 2).
+
+        Returns:
+            Rates of the forces F, shape (m, 2); rates outside the factorised tangent, dF - S dx, shape (m, 2);
+            statuses, shape (m,). None if no admissible statuses were found.
         """
         (N, T), here = self.parts(force, near), status != ContactStatus.FREE
         try:
@@ -233,7 +293,20 @@ class Points:
 
     def _agreed(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame, N: np.ndarray,
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return consistent rates of forces and positions, and statuses; `here` is the mask of closed points."""
+        """Search for contact statuses for which the rates of force and motion satisfy Coulomb's law (active-set
+        search).
+
+        Args:
+            small: condensed motion of the points.
+            status: first statuses, shape (m,), changed in place.
+            near: geometry of the tools.
+            N: normal forces, shape (m,).
+            T: tangential forces, shape (m,).
+            here: mask of the closed points, shape (m,).
+
+        Returns:
+            Rates of the forces and of the positions, shape (m, 2) each, and statuses; None if the search failed.
+        """
         seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
         gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
         for k in range(_SEARCH.tries):
@@ -272,7 +345,18 @@ class Points:
 
     def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
                                                                                                         np.ndarray]:
-        """Return the arc length at which the first point opens or slides, and the statuses then; infinite: none."""
+        """Return the arc length after which a contact status changes first, with forces linear in the arc length.
+
+        Args:
+            status: contact statuses, shape (m,).
+            near: geometry of the tools.
+            force: present contact forces, shape (m, 2).
+            rate: their derivatives by arc length, shape (m, 2).
+
+        Returns:
+            Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
+            change.
+        """
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
         none = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
@@ -294,7 +378,15 @@ class Points:
         return float(times[first]), after
 
     def _small(self, u: np.ndarray, near: ToolFrame, force: np.ndarray) -> ReducedSystem:
-        """Return the motion by u and by each force without the stiffness of points, except for forces that turn."""
+        """Return the condensed motion of the points by u and by contact forces, with the contact stiffness S removed.
+
+        The stiffness of forces that rotate with a curved tool is included.
+
+        Args:
+            u: motion along the tangent of the path, shape (m, 2).
+            near: geometry of the tools.
+            force: present contact forces, shape (m, 2).
+        """
         N, T = self.parts(force, near)
         n, t = near.normal, near.tangent
         turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
@@ -307,13 +399,24 @@ class Points:
 
     def _solved(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame,
                 to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces (or, without `to`, their rates) and motions, shape (m, 2); `slips` are elastic slips."""
+        """Solve the condensed equations for the contact forces at given statuses.
+
+        Args:
+            small: condensed motion of the points.
+            status: contact statuses, shape (m,).
+            near: geometry of the tools.
+            to: target motion of sticking points, shape (m, 2), length; None: solve for rates.
+            slips: compliance of elastic slip of the points, shape (m,), or None.
+
+        Returns:
+            Forces, or their rates without `to`, and motions of the points, shape (m, 2) each.
+        """
         free, by, turn = small
         held, m, c = status != ContactStatus.FREE, len(status), self._components
         stuck = held & (status == ContactStatus.STICKS) & (self.friction > 0)
         sticks, slides = np.flatnonzero(stuck), np.flatnonzero(held & ~stuck)
         mu = np.where(self.friction < np.inf, self.friction, 0.0)
-        # one unknown force along each way: normal and tangent of sticking points, the slip line of sliding points
+        # one unknown force per direction: normal and tangent of sticking points, Coulomb's cone edge of sliding points
         point = np.concatenate([sticks, sticks, slides])
         into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
         along = (mu * status)[slides, None] * near.tangent[slides]
@@ -325,7 +428,7 @@ class Points:
         largest = np.abs(gives).max(1, initial=0.0)
         most = largest.max(initial=0.0)
         stiff = np.flatnonzero(largest < _SEARCH.none * most)
-        gives[stiff, stiff] = most                          # along a support, or across the axis, nothing moves
+        gives[stiff, stiff] = most                          # no motion along a support or across the axis
         if to is not None:
             n = 2 * len(sticks)
             a[:n], a[n:] = np.einsum("ni,ni->n", to[point[:n]], into[:n]), near.beyond[slides]

@@ -1,4 +1,4 @@
-"""First-order response of the body ahead of an accepted state, with the LU factors of its tangent."""
+"""First-order response of the body to contact forces at an accepted state, from the LU factors of its tangent."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from ...solve.state import State
 
 
 class Response:
-    """Changes of (x, control) by forces, in the plane in which a step from a state ends.
+    """Changes of the unknowns x and the control due to contact forces, orthogonal to the path at an accepted state.
 
-    The methods return None once the LU factors of the state are replaced.
+    The changes lie in the plane, normal to the tangent of the path, in which an arc-length step ends. The methods
+    return None once the stored LU factors belong to another tangent.
 
     Args:
-        curve: the `Curve`, with the tangent at the state just factorised.
-        x, F: work vectors.
+        curve: path solver (`solve.arc_length.Curve`) that has just factorised the tangent at the state.
+        state: the accepted state.
+        x: work vector for the unknowns.
+        F: work vector for the residual.
     """
 
     def __init__(self, curve: Curve, state: State, x: PETSc.Vec, F: PETSc.Vec):
@@ -29,30 +32,33 @@ class Response:
 
     @property
     def at_hand(self) -> bool:
-        """True if the stored LU factors belong to the state."""
+        """True if the stored LU factors still belong to the tangent at the state."""
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return the response to unit forces of sign -1 at points.
+        """Return the response to forces -1 at contact points, one for each component of each point.
 
         Args:
             chosen: for each face, local numbers of locally owned points.
 
         Returns:
-            Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). Columns run over points and
-            components of all ranks.
+            Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). The m columns run over the
+            points of all ranks and their components. None without valid factors.
         """
         return self._by(unit_forces(self._problem, self._problem.present, chosen)) if self.at_hand else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
-        """Return the modified Newton correction at (x, control) for given contact forces.
+        """Return one modified Newton correction of (x, control) towards equilibrium with given contact forces.
 
         Args:
-            x, control: the point, locally owned entries.
-            forces: for each face, shape (n, 2); NaN where the contact law gives the force.
+            x: unknowns at the present iterate, locally owned entries, shape (n,).
+            control: control at the present iterate.
+            forces: for each face, contact forces at its points in the residual F, shape (n, 2). NaN where the contact
+                law gives the force.
 
         Returns:
-            Changes of x, locally owned entries, and of the control.
+            Changes of x, locally owned entries, shape (n,), and of the control. None without valid factors or a finite
+            result.
         """
         if not self.at_hand:
             return None
@@ -72,6 +78,8 @@ class Response:
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
     def _by(self, E: Array) -> tuple[Array, Array] | None:
+        """Return the changes of x, shape (n, m), and of the control, shape (m,), for right-hand sides E, shape (n,
+        m)."""
         V = self._newton.solve_ahead(E)
         if V is None:
             return None
