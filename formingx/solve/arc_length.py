@@ -1,4 +1,4 @@
-"""The curve of solutions (x, control): its metric, its tangents, and solving for single states on it."""
+"""The curve of solutions (x, control): its metric, its tangents, and the solver for single states on it."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relat
 from .state import State
 
 Predictor: TypeAlias = Callable[[float], Array | None]
-"""x at a control, locally owned entries, or None where the tangent is the better guess."""
+"""Function from a control to a guess of x, locally owned entries, or to None where the tangent gives the better
+guess."""
 
 Bend: TypeAlias = tuple[Array, float]
-"""Deviation of a guess from the tangent: of x, locally owned entries, and of the control."""
+"""Correction of a guess on the tangent: (change of x, locally owned entries; change of the control)."""
 
 
 class Curve:
@@ -29,10 +30,14 @@ class Curve:
 
     with the mean squared displacement over the size of the body and the weight w of the control.
 
+    Args:
+        problem: the equations.
+        tolerances: convergence criteria of a state.
+
     Attributes:
-        fixed_control: True if it cannot pass a limit point.
-        sweeps: largest number of solutions of a step in three dimensions, until no more points penetrate a tool.
-        control_weight: of the squared control against the mean squared displacement in arc length (dimensionless).
+        fixed_control: True if the solver cannot pass a limit point.
+        sweeps: largest number of solutions of one step in three dimensions, each with more points put into contact.
+        control_weight: weight w of the squared control in arc length (dimensionless).
     """
 
     fixed_control = False
@@ -43,19 +48,19 @@ class Curve:
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
-        self._found: State | None = None                    # the state of the present factors
-        self._ahead_of: tuple[State | None, int] = None, 0  # state of the tangent ahead; factorisations until then
+        self._found: State | None = None                    # state whose tangent was factorised last
+        self._ahead_of: tuple[State | None, int] = None, 0  # state of the factors ahead; factorisations until then
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
-        """Arc length of a straight piece (x, control) of path."""
+        """Return the arc length of a change (x, control) along a straight line."""
         return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
     def start(self) -> State:
-        """Return the body at control 0, in equilibrium with all other loads on it, and the tangent there.
+        """Return the state at control 0, in equilibrium with all other loads on the body, with its tangent.
 
         Raises:
-            Failure: Newton's method does not find it from the unloaded state.
+            Failure: Newton's method does not converge from the unloaded state.
             ConvergenceError: the body has no stiffness.
         """
         history: list[Iteration] = []
@@ -78,26 +83,27 @@ class Curve:
         return self._state(0.0, history, "start", None)
 
     def spend(self, iterations: int) -> None:
-        """Count Newton iterations of another solver, such as a viscous one, in this step."""
+        """Count the Newton iterations of another solver, such as a viscous one, for the present step."""
         self._iterations += iterations
 
     @property
     def iterations(self) -> int:
-        """Newton iterations of the step so far (since the last call of `spent`)."""
+        """Number of Newton iterations of the present step (since the last call of `spent`)."""
         return self._iterations
 
     def moved(self, a: State, b: State) -> float:
-        """Return the mean motion of the body from a to b (dimensionless)."""
+        """Return the mean displacement of the body from state a to state b, over the size of the body."""
         self._x.array_w[:] = b.x - a.x
         return self.norm(self._x, 0.0)
 
     def spent(self) -> int:
-        """Return the number of Newton iterations since the last call, failed attempts included."""
+        """Return the number of Newton iterations since the last call, failed attempts included, and reset it."""
         spent, self._iterations = self._iterations, 0
         return spent
 
     def resume(self, x: Array, control: float) -> State:
-        """Return a state once more, with the tangent under the present step data of the problem.
+        """Return a known solution (x, control) as a first state, with its tangent under the present step data of the
+        problem.
 
         Raises:
             Failure: the tangent is singular.
@@ -110,7 +116,13 @@ class Curve:
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
-        """Return the solution of F = 0 and of the constraint, from a guess. chords: see `BorderedNewton.correct`.
+        """Return the state that satisfies F = 0 and a constraint; (x, control) is the guess, x locally owned, shape
+        (n,).
+
+        Args:
+            kind: kind of the new state.
+            before: accepted state before the guess; the tangent of the new state points away from it.
+            chords: allow tangents of earlier iterations, see `BorderedNewton.correct`.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -124,13 +136,13 @@ class Curve:
             failure.attempt = self._attempt()
             raise
         self._iterations += len(history) - 1
-        if self.problem.folded(self._x, control):               # forces of 1/J know no sign
+        if self.problem.folded(self._x, control):               # forces of 1/J do not show the sign of J
             raise Failure("an element turned inside out", history)
         self._found = self._state(control, history, kind, before)
         return self._found
 
     def look_ahead(self, state: State) -> None:
-        """Make the tangent of an accepted state again: the history variables include it now.
+        """Compute the path tangent of an accepted state again, under its history variables, for the next step.
 
         The factors of its last iteration are used, unless many contact points differ or materials have advanced.
         Predicted contact events need new factors, so that a run from a checkpoint finds the same ones.
@@ -147,7 +159,8 @@ class Curve:
             self._ahead_of = state, self.newton.solver.count
 
     def factorise_ahead(self, state: State) -> bool:
-        """Make the tangent ahead of an accepted state, unless it is at hand; False if it is singular."""
+        """Factorise the tangent matrix ahead of an accepted state, unless the present factors are these; False if
+        singular."""
         if self._ahead_of != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
             if not self.newton.tangent(self._x, state.control, ahead=True):
@@ -156,16 +169,17 @@ class Curve:
         return True
 
     def plane_normal(self, state: State) -> Array:
-        """Return the derivative by x, locally owned entries, of the plane in which steps from a state end."""
+        """Return the derivative with respect to x of the constraint plane in which a step from a state ends, locally
+        owned."""
         self._a.array_w[:] = state.direction
         self.problem.metric_times(self._a, self._b)
         return self._b.array_r.copy()
 
     def guess_from_rest(self, rest: State, control: float) -> Array:
-        """Return a guess of the state at a control: the unloaded state `rest` with the constraints of the control.
+        """Return a guess of x at a control: the unloaded state with the prescribed displacements of this control.
 
-        If the unloaded body has no stiffness (a flat membrane), the guess is the state along its first tangent at which
-        F does no work.
+        If the unloaded body has no stiffness (a flat membrane), the guess is the point along the first tangent at which
+        F does no work. `rest`: the unloaded state, with this tangent.
         """
         if not self.problem.slack_at_rest or control == 0:
             return self.problem.motion(control)
@@ -186,23 +200,30 @@ class Curve:
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
              bend: Bend | None = None) -> State:
-        """One step: predict along the tangent, correct in the plane normal to it at that distance (4.14 to 4.31).
+        """Return the state after a step of arc length `length` from the state `old` (Song 1993, eqs. 4.14 to 4.31).
 
-        predictor: of a step in time: x at a control, or None if the tangent is the better guess. behind: an earlier
-        state, the path smooth from there on: the guess is on the parabola through it, the old one and its tangent.
-        bend: deviation of the guess from the tangent, in the plane normal to it.
+        The predictor follows the tangent; Newton's method corrects in the plane normal to it at this length.
+
+        Args:
+            predictor: guess of x in a step in time, or None.
+            behind: earlier state on the same smooth path, or None. The guess lies on the parabola through it and `old`.
+            bend: correction of the guess, in the plane normal to the tangent, or None.
         """
         plane = self._plane(old, *self._ahead(old, length))
         return self._solve_from(*self._ahead(old, length, behind, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Predict as `step` does, correct to where an equation such as "measure = target" holds."""
+        """Return the state near a step of arc length `length` at which a constraint holds, such as "quantity = target".
+
+        The predictor and the other arguments are the same as in `step`. `kind`: kind of the new state.
+        """
         return self._solve_from(*self._ahead(old, length, behind, bend), equation, kind, old, predictor)
 
     def _ahead(self, old: State, length: float, behind: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
-        """Return (x, control) at a length along the tangent, or along the parabola from a state behind, plus a bend."""
+        """Return a guess (x, control) on the tangent of `old`, or on the parabola through `behind`, plus the
+        correction `bend`."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if behind is not None:
             h = self.distance(behind, old)
@@ -216,9 +237,9 @@ class Curve:
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
                     predictor: Predictor | None) -> State:
-        """Solve from a guess; with a predictor, from its guess and with kept tangents, unless a limit point is near.
+        """Solve from a guess (x, control). A predictor replaces x, with kept tangents, unless a limit point is near.
 
-        Limit points are located by tangents.
+        Limit points are located by the tangents of their neighbours, which must be new.
         """
         if predictor is None or not self._runs_along_control(old.slope):
             return self.solve(x, control, constraint, kind, old)
@@ -233,17 +254,17 @@ class Curve:
         return slope**2 * self.control_weight > 0.5
 
     def unit_slope(self, state: State) -> float:
-        """dcontrol by arc length at a state."""
+        """Return the derivative of the control with respect to arc length at a state."""
         return state.slope
 
     def progress(self, old: State, new: State) -> float:
-        """Distance from old to new along the tangent of old."""
+        """Return the distance from `old` to `new`, projected on the tangent of `old`, arc length."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
     def work_ahead(self, state: State) -> float:
-        """Work of the driven load along the tangent of a state, per unit of control and of arc length.
+        """Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
 
-        Of a pressure that is the growth of the enclosed volume (dimensionless).
+        For a pressure it is the growth of the enclosed volume over arc length (dimensionless).
         """
         self._x.array_w[:] = state.x
         self._b.array_w[:] = state.direction
@@ -251,10 +272,8 @@ class Curve:
         return -float(self.newton.F_control.dot(self._b))
 
     def work(self, a: State, b: State) -> float:
-        """Work of the driven load from a to b, per unit of control, by the trapezoidal rule.
-
-        Of a pressure that is the growth of the enclosed volume (dimensionless).
-        """
+        """Return the work of the controlled load from state a to b, per unit of control, as in `work_ahead`
+        (trapezoidal rule)."""
         done = 0.0
         for state in (a, b):
             self._x.array_w[:] = state.x
@@ -264,21 +283,23 @@ class Curve:
         return done
 
     def value(self, bound: Measure, x: Array, control: float) -> float:
-        """Return a bound measure at (x, control)."""
+        """Return the value of the output quantity `bound` at (x, control), in the user's units; x: locally owned
+        entries."""
         self._b.array_w[:] = x
         return float(bound.value(self._b, control))
 
     def aim(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
-        """Return the residual of "measure = target" at a state, and its derivative by arc length along the tangent.
+        """Return (c, dc/ds): the residual of "quantity = target" at a state, and its derivative along the tangent.
 
-        The measure may be stiff (a force of contact): its values a step ahead along the tangent tell nothing.
+        The values of a stiff quantity, such as a contact force, a step ahead along the tangent are meaningless.
         """
         self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
         left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
         return left, self.newton.gradient.dot(self._b) + by_control * state.slope
 
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[Array, float]:
-        """(x, control) on the cubic through two states and their tangents."""
+        """Return (x, control) on the cubic through two states and their tangents, at a fraction of the distance from
+        a to b."""
         s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
         x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction
@@ -286,8 +307,8 @@ class Curve:
         return x, control
 
     def between(self, a: State, b: State, bound: Measure, target: float) -> State:
-        """Return the state between two where a measure has a target value that lies between theirs; raises
-        `Failure`."""
+        """Return the state between two states at which an output quantity has a target value; raise `Failure` if
+        there is none."""
         low, high = 0.0, 1.0
         sign = self.value(bound, a.x, a.control) - target
         for _ in range(40):
@@ -299,15 +320,16 @@ class Curve:
         return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """Return the state at a fraction of the way between two, in the plane normal to the tangent of the first."""
+        """Return the state at a fraction of the distance from a to b, in the plane normal to the tangent of a."""
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
-        """Return the state at a target that lies between two states (see `between`).
+        """Return the state between a and b that meets a target; `bound`: the output quantity of the target (see
+        `between`).
 
         Raises:
-            ConvergenceError: no state was found there.
+            ConvergenceError: no such state was found.
         """
         try:
             return self.between(a, b, bound, target.value)
@@ -316,10 +338,13 @@ class Curve:
                                    f" {failure.reason}; run with intermediate=[...] to have one") from None
 
     def limit_point(self, a: State, b: State) -> State:
-        """Return the state between two where the control is stationary; raises `Failure`.
+        """Return the state between two states at which the control is stationary.
 
         The cubic through both ends gives the guess, and each state found replaces an end. This is repeated until the
         control is within 1e-12 of its extremum, relative, as estimated from slope and curvature.
+
+        Raises:
+            Failure: no such state was found.
         """
         for _ in range(8):
             chord = self.distance(a, b)
@@ -332,20 +357,21 @@ class Curve:
         return found
 
     def solve_again(self, new: State, equation: Constraint, old: State) -> State:
-        """Return the solution of another equation from a state, with the sense, the target and the jump of the state.
+        """Return the solution of another constraint, with the state `new` as guess, for a step from `old`.
 
-        Points may have gone back, not the control: the tangent keeps its sense. Raises `Failure`.
+        The tangent keeps the direction along the path; target and jump are copied. Raises `Failure`.
         """
         found = self.solve(new.x, new.control, equation, new.kind, old)
         sense = float(np.sign(found.slope * new.slope)) or 1.0
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """Solve again for the first of the states after `old`, with the points that penetrated a tool in contact.
+        """Solve again for the first of the states of a step from `old`, with the points that penetrated a tool in
+        contact.
 
-        For tools in three dimensions. A point stays in contact from the place where it met the tool. If the state meets
-        one of `targets`, pairs (target, its measure), the points of all tools count, and the target is met again. Else
-        the control stays, and only points on tools with friction count.
+        For tools in three dimensions. A point stays in contact where it met the tool. If the state meets one of
+        `targets`, pairs (target, output quantity), the points of all tools count, and the target is met again. Else the
+        control stays constant, and only points on tools with friction count. Returns all states of the step.
 
         Raises:
             Failure: no such state was found.
@@ -368,11 +394,12 @@ class Curve:
             vector.destroy()
 
     def _attempt(self) -> Attempt:
+        """Return the end of the failed run of Newton's method."""
         control, step = self.newton.reached
         return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
 
     def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
-        """Return the state at (self._x, control); its tangent, from the last factorisation, points away from
+        """Return the state at (self._x, control), with the tangent of the last factorisation, directed away from
         `before`."""
         b = self.newton.b
         size = self._length_of(b)
@@ -386,20 +413,21 @@ class Curve:
         return state
 
     def _length_of(self, b: PETSc.Vec) -> float:
-        """Arc length per control along a tangent dx/dcontrol."""
+        """Return the arc length per unit of the control along a tangent b = dx/dcontrol."""
         return self.norm(b, 1.0)
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
+        """Return the inner product of two changes (x, control) and (y, other), by which arc length is measured."""
         self._a.array_w[:] = x
         self._b.array_w[:] = y
         return self.problem.inner(self._a, self._b) + self.control_weight * control * other
 
     def distance(self, a: State, b: State) -> float:
-        """Length of the straight line between two states."""
+        """Return the arc length of the straight line between two states."""
         return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
-        """Return the plane through (x0, control0) normal to the tangent of `old`, as a constraint."""
+        """Return the constraint of the plane through (x0, control0) normal to the tangent of `old`."""
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
             self._a.array_w[:] = old.direction
             self.problem.metric_times(self._a, gradient)
@@ -410,7 +438,7 @@ class Curve:
 
 
 def _stationary(a: State, b: State, chord: float) -> float:
-    """Fraction of the way from a to b at which the cubic of the control has no slope (slopes of opposite sign)."""
+    """Return the fraction of the distance `chord` from a to b at which the cubic of the control is stationary."""
     jump = (b.control - a.control) / chord
     c2, c1, c0 = 3 * (a.slope + b.slope - 2 * jump), 6 * jump - 4 * a.slope - 2 * b.slope, a.slope
     roots = np.roots([c2, c1, c0])

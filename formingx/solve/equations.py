@@ -1,21 +1,21 @@
-"""Interfaces through which the solver sees a problem, F(x, control) = 0; it uses nothing else.
+"""Interfaces of a problem F(x, control) = 0 for the solver, which uses nothing else of the problem.
 
 In all members x is the vector of unknowns, and the control a number; both are dimensionless. The rows of x are
 distributed over the ranks; an array holds the locally owned entries, shape (n,). `out` is a vector that receives the
-result. The calls of a step, in order:
+result. In each step the solver calls these methods, in this order:
 
-    limit.length, limit.prepare         Limit the step length. Prepare the contacts.
+    limit.length, limit.prepare         Limit the step length. Prepare the contacts for the step.
     begin                               Start Newton's method at the predicted state.
-    residual                            Compute F. This and the next two lines: in each iteration.
+    residual                            Compute F. This and the next two lines are called in each iteration.
     linearise                           Compute F and its active set for the linearisation.
     tangent, control_derivative         Compute dF/dx and dF/dcontrol, at the (x, control) of the residual.
-    folded, limit.check, step_error     Check the state.
+    folded, limit.check, step_error     Check the converged state.
     advance                             Accept the state and update the history variables.
     tangent(ahead=True)                 Compute the tangent of the next step, which differs if F has a kink.
 
-`state_context` and `restore` return to another state. `enter` changes the step data between the stages of a process.
-The defaults here suit equations without contact, history, time or units. A class derived from `Equations` then only
-defines F.
+`state_context` and `restore` return to an earlier state. `enter` changes the step data between the stages of a process.
+The defaults in this module suit equations without contact, history, time or units. A class derived from `Equations`
+then only defines F.
 """
 
 from __future__ import annotations
@@ -37,30 +37,34 @@ from ..forms.schedule import StepData
 Array: TypeAlias = npt.NDArray[Any]
 
 Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
-"""c(x, control, gradient) -> (c, dc/dcontrol), having put dc/dx into `gradient`: zero where it holds."""
+"""Function (x, control, gradient) -> (c, dc/dcontrol) of a constraint c = 0; it sets the vector `gradient` to dc/dx."""
 
 
 class Measure(Protocol):
-    """A number of every state. size: its unit, in the user's units, of which 1e-12 is negligible."""
+    """Output quantity: a number of every state, such as a pole height.
+
+    Attributes:
+        size: scale of the quantity, in the user's units: differences below 1e-12 of it are round-off.
+    """
 
     size: float
 
     def value(self, x: PETSc.Vec, control: float) -> float:
-        """Return the value at a state, in the user's units."""
+        """Return the value of the quantity at (x, control), in the user's units."""
 
     def equation(self, target: float) -> Constraint:
-        """Return the constraint measure = target."""
+        """Return the constraint that the quantity equals `target`, a value in the user's units."""
 
 
 class Standing(Protocol):
-    """A state of a problem.
+    """State of a problem, as the problem needs it.
 
     Attributes:
-        x: the unknowns, locally owned entries, shape (n,).
-        control: the control.
+        x: the unknowns, locally owned entries, shape (n,), dimensionless.
+        control: the dimensionless control.
         time: process time.
-        memory: the history variables from here on.
-        setting: plain data of a `StepData`, or empty.
+        memory: history variables of the problem after this state.
+        setting: step data as plain data (`StepData`), or empty.
     """
 
     x: Array
@@ -71,12 +75,12 @@ class Standing(Protocol):
 
 
 class Tractions(Protocol):
-    """Tractions of the contact law at n points in c components.
+    """Tractions of the contact law at n points with c components.
 
     Attributes:
-        force: shape (n, c), stress.
-        sense: sense of sliding, shape (n,).
-        stiffness: derivative of the force by the position, shape (n, c, c), stress/length.
+        force: tractions, shape (n, c), stress.
+        sense: direction of sliding, 1 or -1, 0 for sticking points, shape (n,).
+        stiffness: derivative of `force` with respect to the position of its point, shape (n, c, c), stress/length.
         status: `ContactStatus` of each point, shape (n,).
     """
 
@@ -91,80 +95,96 @@ class Tractions(Protocol):
 
 
 class Increment(Protocol):
-    """Newton's method at n locally owned points of a face in contact, as the iteration that was linearised last sees
-    them."""
+    """Contact law at n locally owned points of a face, from the start of Newton's method to its last linearised
+    iteration."""
 
     @property
     def ramp(self) -> float:
-        """Half-width of the distances over which contact begins, length."""
+        """Half-width of the range of gaps in which the contact stiffness grows from zero, length."""
 
     @property
     def status(self) -> Array:
-        """Status of the points: hashable as bytes, shape (n,)."""
+        """Contact status of each point in the last linearisation, shape (n,), hashable as bytes."""
 
     @property
     def arrivals(self) -> Array:
-        """Mask of points that touch now but did not where Newton's method began, shape (n,)."""
+        """Mask of points that touch now but did not touch at the start of Newton's method, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:
-        """Return the forces and stiffnesses that `linearise` has taken, of some points, shapes (m, c), (m, c, c)."""
+        """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c), (m, c, c)."""
 
     def foretold(self, by: Array) -> Tractions:
-        """Return the law at the points after a motion, shape (n, c), length."""
+        """Return the tractions at all points after a motion `by` relative to their tool, shape (n, c), length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
-        """Return a function that maps a motion of some of the points to their tractions."""
+        """Return a function from a motion of `points` relative to their tool, shape (m, c), length, to their
+        tractions."""
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function that maps motions of m points to their depth and path in the ramp.
+        """Return a function that maps motions of m points, shape (m, c), length, to (depth, path) in the ramp.
 
-        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape
-        (m, c), length; 0 for points that slide, adhere or have no friction.
+        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape (m,
+        c), length; 0 for points that slide, adhere or have no friction.
         """
 
     def expect(self, points: Array, sense: Array) -> None:
-        """Set this sense of sliding in the next iteration for the points in a mask, shape (n,)."""
+        """Set the direction of sliding in the next iteration: `sense`, shape (n,), at the points of a mask, shape
+        (n,)."""
 
 
 class ContactFace(Protocol):
-    """A face in contact: n locally owned points, and the increment that goes on."""
+    """Face of the body in contact, with n locally owned points.
+
+    Attributes:
+        points: reference positions of the contact points, shape (n, c).
+    """
 
     points: Array
 
     @property
     def increment(self) -> Increment:
-        """Increment of the present run of Newton's method: another after each `begin`."""
+        """Contact law in the present run of Newton's method; `begin` of the equations starts a new one."""
 
     @property
     def scale(self) -> Array:
-        """Factor of the tractions in the forces of F, shape (n,)."""
+        """Factors of the tractions in the forces of F, shape (n,)."""
 
     def add(self, values: Array, forces: Array) -> None:
-        """Add forces at the points, shape (n, c), to locally owned rows of F."""
+        """Add forces at the points, shape (n, c), to `values`, the locally owned entries of F."""
 
     def leave_out(self, points: Array) -> None:
-        """Keep some points (a mask, shape (n,)) open until another increment begins."""
+        """Keep points open until the next increment begins; `points`: a mask, shape (n,)."""
 
     def moved(self, dx: Array, step: float) -> Array:
-        """Return the motion of the points relative to the tool by a correction of x (locally owned) and the control;
-        (n, c), length."""
+        """Return the motion of the points relative to their tool in an update of x and of the control.
+
+        dx: locally owned entries, shape (n,). step: update of the control. The motion has the shape (points, c),
+        length.
+        """
 
 
 class Viscosity(Protocol):
-    """Forces eta V dx of a body that moves through a viscous stress."""
+    """Viscous forces eta V dx of a body, with the matrix V of a viscous stress and the viscosity eta."""
 
     def forces(self, change: Array, eta: float) -> Array:
-        """eta V dx, locally owned entries, shape (n,)."""
+        """Return the viscous forces eta V dx for a change dx of the unknowns, locally owned entries, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent."""
+        """Add eta V to a tangent matrix."""
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
 
 
 class Attempt(NamedTuple):
-    """End of a failed Newton iteration: x (locally owned) and control, and the last correction of both."""
+    """End of a failed run of Newton's method.
+
+    Attributes:
+        x: the unknowns, locally owned entries, shape (n,).
+        control: the control.
+        dx: last correction of x.
+        dcontrol: last correction of the control.
+    """
 
     x: Array
     control: float
@@ -173,12 +193,16 @@ class Attempt(NamedTuple):
 
 
 class Examined(Protocol):
-    """Examination of a failed attempt: `facts` are fields of a `Diagnosis`."""
+    """Examination of a body in its last good state and in a failed attempt.
+
+    Attributes:
+        facts: {field of a `Diagnosis`: its value}.
+    """
 
     facts: dict[str, Any]
 
     def draw(self, file: str | PathLike[str], title: str) -> None:
-        """Draw the last good state (on rank 0).
+        """Draw the last good state to an image file, on rank 0.
 
         Raises:
             InputError: there is nothing to draw.
@@ -186,13 +210,13 @@ class Examined(Protocol):
 
 
 class Residual(Protocol):
-    """F and its derivatives.
+    """Residual F(x, control) and its derivatives.
 
     Attributes:
-        comm: communicator.
-        x: vector of unknowns; inside `state_context` it holds the state.
-        matrix: tangent, refilled by `tangent`.
-        force_scale: norm of the forces that balance in the residual last computed.
+        comm: MPI communicator.
+        x: vector of unknowns; inside `state_context` it holds the unknowns of the state.
+        matrix: tangent matrix, filled by `tangent`.
+        force_scale: norm of the support forces at the residual last computed.
     """
 
     comm: MPI.Intracomm
@@ -206,30 +230,31 @@ class Residual(Protocol):
         return False
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        """out = F(x, control); sets `force_scale`."""
+        """Compute F(x, control) in `out`, and set `force_scale`."""
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """Compute dF/dx in `matrix`, and return it.
+        """Compute dF/dx at (x, control) in `matrix`, and return this matrix.
 
         Args:
-            ahead: True for the derivative towards the next step, where F has a kink at an accepted state.
+            ahead: True for the one-sided derivative towards the next step, where F has a kink at an accepted state.
         """
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
-        """out = dF/dcontrol; `ahead`: see `tangent`."""
+        """Compute dF/dcontrol at (x, control) in `out`; `ahead`: as in `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Product of two changes of x in a metric that knows neither mesh nor units: it measures arc length."""
+        """Return the inner product of two changes of x, by which arc length is measured, independent of mesh and
+        units."""
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
-        """out with inner(a, b) = out . b."""
+        """Compute in `out` the vector for which out . b = inner(a, b) for every b."""
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if (x, control) is no state though F may vanish there: an element is inside out."""
+        """Return True if an element is inverted at (x, control), which F alone may not show."""
         return False
 
     def viscosity(self) -> Viscosity:
-        """Return the viscosity of a snap-through; the caller destroys it."""
+        """Return the viscous forces for a snap-through; the caller destroys them."""
 
     @property
     def slack_at_rest(self) -> bool:
@@ -237,29 +262,30 @@ class Residual(Protocol):
         return False
 
     def stiff_state(self, out: PETSc.Vec) -> None:
-        """out = a state near rest where dF/dx is regular, for the first direction of a path."""
+        """Compute in `out` a state near x = 0 with a regular dF/dx, which gives the first direction of a path."""
 
     def motion(self, control: float) -> Array:
-        """Unloaded state with the constraints of a control, the first guess from there; locally owned entries."""
+        """Return the unloaded state with the prescribed displacements of a control, a first guess; locally owned,
+        shape (n,)."""
         return np.zeros(self.x.getLocalSize())
 
 
 class ActiveSet(Protocol):
-    """Kinks of F, by contact, and how Newton's method deals with them."""
+    """Active set of contact: kinks of F where points touch, separate, stick or slide."""
 
     @property
     def has_kinks(self) -> bool:
-        """True if the tangent ahead of a state may differ from that behind it."""
+        """True if F may have kinks: one-sided derivatives of F at a state may differ."""
         return False
 
     @property
     def present(self) -> Sequence[ContactFace]:
-        """The faces in contact that take part now."""
+        """Faces in contact that are active in the present stage."""
         return []
 
     @property
     def active_set(self) -> Hashable:
-        """Status of all points at the residual last computed, the same on all ranks; None: there are none."""
+        """Contact status of all points at the residual last computed, the same on all ranks; None without contact."""
         return None
 
     @property
@@ -269,25 +295,30 @@ class ActiveSet(Protocol):
 
     @property
     def limit(self) -> StepLimit | None:
-        """Limits of a step; None: there are none."""
+        """Limits that contact sets to a step; None without limits."""
         return None
 
     def begin(self, old: Standing | None = None) -> None:
-        """Prepare the contacts for Newton's method from a guess ahead of a state (None: of no state)."""
+        """Prepare the contacts for Newton's method; `old`: the accepted state before the guess, or None."""
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Prepare an iteration: linearise the contacts, and adapt the residual F at (x, control), in place."""
+        """Linearise the contact law for an iteration, and change the residual F at (x, control) accordingly, in
+        place."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the stiffness `ahead` less that in the last tangent, shape (n, c, c), stress/length."""
+        """Return for each face the difference of the point stiffnesses between the tangent `ahead` and the last
+        tangent.
+
+        Shape (n, c, c) each, stress/length.
+        """
         return []
 
 
 class Histories(Protocol):
-    """History variables: arguments of F besides x and control, and time.
+    """History variables and process time, on which F may depend besides x and the control.
 
     Attributes:
-        memory: the history variables of the last accepted state.
+        memory: history variables after the last accepted state.
         clock: process time at control 0.
     """
 
@@ -296,29 +327,29 @@ class Histories(Protocol):
 
     @property
     def has_history(self) -> bool:
-        """True if F depends on the states before."""
+        """True if F depends on earlier states, by a material, the temperature or friction."""
         return False
 
     @property
     def materials(self) -> Sequence[ConstitutiveHistory]:
-        """Histories of the materials of a body."""
+        """Constitutive histories of the materials of the body."""
         return []
 
     @property
     def body_has_history(self) -> bool:
-        """True if F depends on the states before by more than contact."""
+        """True if F depends on earlier states by a material or the temperature, not only by contact."""
         return False
 
     @property
     def relaxes(self) -> bool:
-        """True if F depends on time."""
+        """True if F depends on process time."""
         return False
 
     def advance(self, x: Array, control: float) -> None:
-        """Update the history variables to an accepted state."""
+        """Update the history variables to the accepted state (x, control); x: locally owned entries, shape (n,)."""
 
     def time_at(self, control: float) -> float:
-        """Process time at a control."""
+        """Return the process time at a value of the control."""
         return self.clock
 
     def step_error(self, past: Sequence[Standing], share: Array, x: Array,
@@ -338,27 +369,27 @@ class Histories(Protocol):
 
 
 class Stages(Protocol):
-    """Step data between two changes of the problem."""
+    """Step data of the problem, which change between the stages of a process."""
 
     @property
     def setting(self) -> StepData:
-        """Step data: amplitudes of the controls, and inactive items."""
+        """Present step data: amplitudes as functions of the control, and inactive items."""
 
     def enter(self, setting: StepData, x: Array, control: float) -> None:
-        """Set the step data: the equations then have (x, control) on their path.
+        """Set new step data, for a path that begins at (x, control); x: locally owned entries, shape (n,).
 
-        Constrained unknowns keep their values in x; driven ones have these values at this control. Fading removes the
-        unbalanced forces at (x, control).
+        Constrained unknowns keep their values in x. Prescribed displacements have these values at this control. With
+        `StepData.fading` the unbalanced forces at (x, control) fade to zero.
         """
 
     def restore(self, state: Standing) -> None:
-        """Restore the stage data and history variables of an accepted state, to start a step from it."""
+        """Restore the step data and history variables of an accepted state, to start a step from it."""
 
     def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
-        """Return a context in which the problem, with its x and control, is at a state."""
+        """Return a context in which x, step data and history variables of the problem are those of a state."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
-        """Activate an item (its number in the step data) without history.
+        """Activate an item without history, at (x, control); `number`: its number in the scene.
 
         Raises:
             InputError: a tool would be activated inside the body.
@@ -366,11 +397,12 @@ class Stages(Protocol):
 
 
 class Units(Protocol):
-    """Meaning of the dimensionless numbers."""
+    """Meaning of the dimensionless numbers of a problem."""
 
     @property
     def scales(self) -> Sequence[float]:
-        """The user's value over the amplitude of each item that a `StepData` counts; last, 1.0 for the time."""
+        """For each item of the step data, its value in the user's units over its amplitude; last, 1.0 for process
+        time."""
 
     @property
     def units(self) -> tuple[float, float]:
@@ -379,17 +411,17 @@ class Units(Protocol):
 
     @property
     def drives(self) -> str | None:
-        """Kind of the control: "pressure", "travel", "time" or, if it is none of them, None."""
+        """Kind of the controlled quantity: "pressure", "travel", "time" or, if it is none of them, None."""
         return None
 
     @property
     def fixed_loads(self) -> list[str]:
-        """Loads that act already before anything is controlled, as text."""
+        """Loads that act already at control 0, as text."""
         return []
 
     @property
     def main_columns(self) -> Sequence[str]:
-        """The measures that tell one state from another in a line."""
+        """Names of the output quantities that describe a state in one line."""
         return []
 
     def shown(self, control: float) -> tuple[str, float]:
@@ -397,18 +429,18 @@ class Units(Protocol):
         return "control", control
 
     def absurd(self, control: float) -> str | None:
-        """Return the reason for which no process reaches a control, as text, or None."""
+        """Return the reason for which no process reaches a value of the control, as text, or None."""
         return None
 
     @property
     def why_not_finite(self) -> str:
-        """Reason for which a residual is infinite or not a number."""
+        """Reason for which the residual last computed is infinite or not a number, as text."""
         return "the equations are not defined there"
 
     def examine(self, last: Standing | None, attempt: Attempt | None) -> Examined | None:
-        """Examine the last good state and a failed attempt, for a `Diagnosis`; collective."""
+        """Examine the last good state and a failed attempt, for a `Diagnosis`; None without a body. Collective."""
         return None
 
 
 class Equations(Residual, ActiveSet, Histories, Stages, Units, Protocol):
-    """All that the solver sees."""
+    """Interface of a problem F(x, control) = 0: everything that the solver uses."""
