@@ -59,8 +59,9 @@ LIMITS = StepLimits()
 
 
 class Approach:
-    """One contact during a step: `reach`, `along` and `prepare` are called before the solve, the other methods after
-    it.
+    """Contact of one face during a step: prediction of gap closures before the solve, checks after it.
+
+    `StepLimit` calls `reach`, `along` and `prepare` before the solve of a step, and the other methods after it.
 
     Args:
         face: the contact.
@@ -193,8 +194,7 @@ class Approach:
 
     @property
     def lags(self) -> bool:
-        """True if friction in a step is limited by a fixed pressure, taken from the last accepted state (lagged
-        friction)."""
+        """True if friction is lagged: the pressure of the last accepted state limits the friction in the step."""
         return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
 
     def change_of_pressure(self, new: np.ndarray, control: float) -> float:
@@ -229,11 +229,15 @@ class Approach:
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length, at most `length`, at which the pressure of lagged friction has changed by
-        `StepLimits.lag`.
+        """Return the arc length, at most `length`, at which the pressure has changed by the fraction `StepLimits.lag`.
 
-        The pressure is extrapolated linearly from `start` (positions, shape (n, c), length) with `velocity` (their
-        derivative by arc length). Without lagged friction the result is `length`.
+        The pressure that limits lagged friction is extrapolated linearly. Without lagged friction the result is
+        `length`.
+
+        Args:
+            start: positions of the points relative to the tool, shape (n, c), length.
+            velocity: their derivatives by arc length, shape (n, c), length.
+            length: largest arc length.
         """
         if not self.lags:
             return length
@@ -262,8 +266,7 @@ class Approach:
         return float(change / (pressure + LIMITS.weak * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
-        """Return True if some sticking points lifted off and moved back along the tool in a step while other gaps
-        closed.
+        """Return True if sticking points lifted off and moved back along the tool while other gaps closed.
 
         The positions at which gaps close depend on the points that still stick. A long step gets these positions wrong.
 

@@ -88,8 +88,7 @@ class FaceContact:
         self._base, self._rate, self.present = base, rate, present
 
     def shift_distances(self, by: np.ndarray) -> None:
-        """Reduce the signed distances of the points by `by`, shape (n,), length, from now on; called after remeshing in
-        a run."""
+        """Reduce the signed distances of the points by `by`, shape (n,), length; called after remeshing."""
         self.shift = by
         self.law = self._law(self._penalty)
 
@@ -108,13 +107,18 @@ class FaceContact:
             self.increment = Increment(self.law, self.touch)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, c), from locally owned unknowns and in their units;
-        collective."""
+        """Return the displacement of the points, shape (n, components), in the units of the unknowns `values`."""
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the positions of the points relative to the tool, shape (n, components), length, in a state (`fields`:
-        locally owned unknowns).
+        """Return the positions of the points relative to the tool in a state.
+
+        Args:
+            fields: locally owned unknowns of the state.
+            control: control of the state.
+
+        Returns:
+            Reference position plus displacement minus travel of the tool, shape (n, components), length.
         """
         return self.points + self._length * self.displacement(fields) - self.travelled(control)
 
@@ -132,11 +136,16 @@ class FaceContact:
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the contact tractions in a state, given by the locally owned unknowns `fields` and the control."""
+        """Return the contact tractions at the points in a state; after `linearise`, those of the linearised law.
+
+        Args:
+            fields: locally owned unknowns of the state.
+            control: control of the state.
+        """
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return a mask of the points in contact, shape (n,), in a state (`fields`: locally owned unknowns)."""
+        """Return a mask of the points in contact in a state, shape (n,); `fields`: locally owned unknowns."""
         return self.law.touching(self.positions(fields, control), self.touch)
 
     @property
@@ -158,13 +167,11 @@ class FaceContact:
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Derivative of the forces in F by the positions, as in the last tangent, shape (n, components, components),
-        1/length."""
+        """Derivative of the forces in F by the positions in the last tangent, shape (n, c, c), 1/length."""
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add forces at the points, in the scale of F, shape (n, components), to the locally owned residual
-        `values`."""
+        """Add forces at the points, shape (n, components), to the locally owned entries `values` of the residual F."""
         self.rule.add(values, forces)
 
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
@@ -185,36 +192,45 @@ class FaceContact:
         self.increment = Increment(law.without(points), self.touch)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Add the contact forces in a state to the locally owned residual `values` (`fields`: locally owned
-        unknowns)."""
+        """Add the contact forces in a state to the residual.
+
+        Args:
+            values: locally owned entries of the residual F, changed in place.
+            fields: locally owned unknowns of the state.
+            control: control of the state.
+        """
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the contact law for a Newton iteration at a state.
 
-        Add the difference between linearised and actual contact forces to the locally owned residual `values`.
+        The difference between linearised and actual contact forces is added to `values`, the locally owned residual F.
         """
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
     def tangent(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
-        """Return the contact stiffness by the unknowns of each point (`Rule.dofs`), shape (n, m, m), and store it as
-        that used.
+        """Return the derivative of the contact forces by the unknowns, and store it as the last tangent.
 
-        ahead: True for the derivative towards the next step at an accepted state, where just closed points are stiff.
+        Args:
+            fields: locally owned unknowns of the state.
+            control: control of the state.
+            ahead: True for the derivative towards the next step at an accepted state, where just closed points are
+                stiff.
+
+        Returns:
+            For each point the stiffness by its unknowns (`Rule.dofs`), shape (n, m, m).
         """
         self._in_tangent = self._stiffness(fields, control, ahead)
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of the forces in F by the unknowns of each point (`Rule.dofs`), shape (n, m, m), in a
-        state."""
+        """Return the derivative of the contact forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of circumferential contact forces by circumferential motions, shape (n, m/2, m/2), in a
-        state.
+        """Return the derivative of circumferential contact forces by circumferential motions, shape (n, m/2, m/2).
 
-        The second variation of non-axisymmetric modes uses it; see `ContactLaw.stiffness_round`.
+        The second variation of non-axisymmetric modes uses this stiffness; see `ContactLaw.stiffness_round`.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
@@ -224,10 +240,9 @@ class FaceContact:
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the stiffness towards the next step minus the stiffness in the last tangent, shape (n, c, c),
-        stress/length.
+        """Return the contact stiffness towards the next step minus that in the last tangent, (n, c, c), stress/length.
 
-        Entries are 0 for points at which both differ by less than `_SAME_STIFFNESS`.
+        The state is accepted. Entries are 0 for points at which the relative difference is below `_SAME_STIFFNESS`.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -251,8 +266,7 @@ class FaceContact:
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return the derivative of the forces in F by the unknowns, shape (n, m, m), from a stiffness of shape (n, c,
-        c)."""
+        """Return the stiffness by the unknowns, (n, m, m), from the stiffness by the positions, (n, c, c)."""
         return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
@@ -290,8 +304,7 @@ class FaceContact:
         self._start_at(self.points)
 
     def come_in(self, fields: np.ndarray, control: float) -> None:
-        """Set the history variables when the tool becomes active in a state: the points have not been in contact with
-        it."""
+        """Set the history variables in the state in which the tool becomes active, before any contact."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
@@ -310,8 +323,13 @@ class FaceContact:
             self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to an accepted state (x: locally owned unknowns); unchanged if the tool is
-        inactive."""
+        """Update the history variables to an accepted state; they do not change while the tool is inactive.
+
+        Args:
+            x: locally owned unknowns of the state.
+            control: control of the state.
+            start: not used.
+        """
         if self._memory is None or not self.present:
             return
         old, theta = self._memory.touch, self.law.theta
@@ -324,8 +342,7 @@ class FaceContact:
         self._take(Memory(touch, arrived, penalty))
 
     def let_go(self, fields: np.ndarray, control: float) -> bool:
-        """Separate the points under tension at a tool in three dimensions in a state; return True if any separated.
-        Collective."""
+        """Separate the points under tension from a tool in three dimensions; return True if any did. Collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         touch, x = self._memory.touch, self.positions(fields, control)
@@ -358,8 +375,7 @@ class FaceContact:
 
     @property
     def force_scale(self) -> float:
-        """Force of the magnitude of the forces in the body: shear modulus times thickness times largest extent of the
-        body."""
+        """Magnitude of the forces in the body: shear modulus times thickness times largest extent of the body."""
         return float(self._solid.stress * self.thickness * self._length)
 
     def get(self) -> Memory | None:
@@ -379,18 +395,16 @@ class FaceContact:
         self.increment = Increment(self.law, self.touch)
 
     def save(self, memory: Memory) -> dict[str, np.ndarray]:
-        """Return history variables of all ranks as arrays, with the reference position of each point; for a
-        checkpoint."""
+        """Return the history variables of all ranks as arrays, with the reference position of each point."""
         parts = self.comm.allgather((self.points, *memory.touch, memory.arrived, memory.penalty))
         names = ("points", *memory.touch._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> Memory:
-        """Return the history variables of the locally owned points from the arrays of `save`, matched by reference
-        position.
+        """Return the history variables of the locally owned points from the arrays of `save`.
 
         Raises:
-            InputError: a point of the face is not in the data.
+            InputError: no saved point has the reference position of a point of the face.
         """
         from scipy.spatial import cKDTree
         away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)

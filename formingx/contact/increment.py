@@ -10,8 +10,7 @@ from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
 
 
 class Increment:
-    """Tractions at n contact points during one increment, computed from the history variables of the last accepted
-    state.
+    """Tractions at n contact points during one increment, starting from the last accepted state.
 
     An increment begins with each run of Newton's method, and with each evaluation of a state. It ends when the state is
     accepted. In each iteration the contact calls `tractions(x)` for the residual, with x the positions of the points

@@ -39,8 +39,7 @@ class Rule(Protocol):
 
     @property
     def extent(self) -> np.ndarray:
-        """Share of each point in the contact length of the face, shape (n,), length; in three dimensions its area,
-        length^2.
+        """Share of each point in the contact length of the face, shape (n,), length; in three dimensions an area.
 
         The shares are taken in the reference configuration.
         """
@@ -134,16 +133,16 @@ class Lobatto(_Nodes):
         self._facets = _own_facets(solid.scene.mesh, on)
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the area ratio at each node, the mean over the edges on both sides of the node, shape (n,);
-        collective.
+        """Return the ratio of deformed to reference area at each node; collective.
 
-        On the axis the circumferential stretch equals the stretch along the edge.
+        It is the mean over the edges on both sides of the node. On the axis the circumferential stretch equals the
+        stretch along the edge.
 
         Args:
             fields: locally owned unknowns of the state.
 
         Returns:
-            Ratio of deformed to reference area, shape (n,).
+            Area ratio, shape (n,).
         """
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
@@ -284,8 +283,10 @@ class Gauss:
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values at the nodes, shape (n, 3), to the points, shape (n,); a uniform field stays uniform to
-        the last bit."""
+        """Interpolate values at the nodes, shape (n, 3), to the points, shape (n,).
+
+        A uniform field stays uniform to the last bit.
+        """
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
@@ -295,8 +296,7 @@ class Gauss:
         return grown * weight(now.T) / weight(self.points.T)
 
     def _at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the three nodes of each point, shape (n, 3, components), from locally owned
-        unknowns."""
+        """Return the displacement of the nodes of each point, shape (n, 3, components), from locally owned unknowns."""
         unknowns, n = self._unknowns, self._owned
         unknowns.array[:n] = values[:n]
         unknowns.scatter_forward()
@@ -309,8 +309,7 @@ class Gauss:
 
 
 def _along(edges: np.ndarray) -> np.ndarray:
-    """Return dx/ds, s being the edge coordinate from 0 to 1, at the ends and the middle of edges, shape (m, 3,
-    components)."""
+    """Return dx/ds (0 <= s <= 1 along the edge) at the ends and the middle of edges, shape (m, 3, components)."""
     a, b, m = edges.transpose(1, 0, 2)
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 
@@ -342,8 +341,7 @@ def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
 
 
 def _own_facets(mesh: Any, on: str) -> np.ndarray:
-    """Return the local numbers of the facets of a boundary whose cells this rank owns; each facet belongs to one
-    rank."""
+    """Return the local numbers of the facets of a boundary whose cells this rank owns."""
     topology, facets = mesh.domain.topology, mesh.facets_of(on)
     topology.create_connectivity(1, 2)
     cells = np.array([topology.connectivity(1, 2).links(f)[0] for f in facets], dtype=np.int64)

@@ -15,10 +15,10 @@ from .approach import LIMITS, Approach
 
 
 class EventPrediction(Protocol):
-    """Predicted contact events after an accepted state, and the path bent by them
-    (`formingx.extensions.contact_events`).
+    """Predicted contact events after an accepted state, and the path that they bend.
 
-    `StepLimit` calls `step_length` first, then `closures` and `bend` for the length that the step has in the end.
+    The extension `formingx.extensions.contact_events` provides it. `StepLimit` calls `step_length` first, then
+    `closures` and `bend` for the length that the step has in the end.
     """
 
     def step_length(self, length: float) -> float | None:

@@ -162,8 +162,7 @@ class ContactLaw:
         return False
 
     def start(self, x: np.ndarray) -> Touch:
-        """Return the history variables of points that begin at positions x relative to the tool, shape (n, c),
-        length."""
+        """Return the history variables of points that begin at positions x, shape (n, c), length."""
         raise NotImplementedError
 
     def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
@@ -221,10 +220,9 @@ class ContactLaw:
         return self.tractions(x, old).stiffness
 
     def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
-        """Return the derivative of the circumferential traction by the circumferential motion, in axisymmetric
-        problems.
+        """Return the derivative of the circumferential traction by the circumferential motion.
 
-        The second variation of non-axisymmetric modes uses this stiffness.
+        The second variation of non-axisymmetric modes of an axisymmetric body uses this stiffness.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
@@ -259,8 +257,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the normal traction over the penalty as a function F(d) of the distance, and its derivative; by
-        default 0.
+        """Return F(d), the normal traction over the penalty at distance d, and its derivative; by default 0.
 
         Args:
             d: signed distances from the tool, shape (n,), length.
@@ -292,8 +289,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> Self:
-        """Return the same law with other coefficients of friction mu, shape () or (n,); by default unchanged: without
-        friction."""
+        """Return the same law with another coefficient of friction mu, shape () or (n,); by default unchanged."""
         return self
 
 
@@ -334,8 +330,10 @@ class NormalLaw(ContactLaw):
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Return the geometry of the tool nearest to positions x, shape (n, c), with shifted distances; stored for
-        equal x."""
+        """Return the geometry of the tool nearest to positions x, shape (n, c), with distances less `shift`.
+
+        The last result is stored, for repeated calls with equal x.
+        """
         positions = x.tobytes()
         if self._near is None or positions != self._near[0]:
             near = self.tool.nearest(x)

@@ -75,8 +75,7 @@ class Law(NormalLaw):
         return (self.distance(x) > -self.theta) | self._bonded(old)
 
     def _bonded(self, old: Touch | None) -> np.ndarray | bool:
-        """Return the mask of the points that were in contact and cannot separate, shape (n,); False if all points
-        can."""
+        """Return the mask of the points that were in contact and cannot separate, shape (n,), or False for none."""
         return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -116,8 +115,7 @@ class Law(NormalLaw):
 
     @property
     def friction(self) -> np.ndarray:
-        """Ratio T/N of a point that slides under a vanishing pressure, shape () or (n,); infinite for a sticking
-        point."""
+        """Ratio T/N at which a point slides under a vanishing pressure, shape () or (n,); infinite with stick."""
         sticks = np.asarray(self.mu >= STICKS)
         grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
         return np.where(sticks, np.inf, grows)

@@ -1,12 +1,11 @@
 """Prediction of the contact events of a step (gap closure, sliding, opening), and of the path between them.
 
-Symbols: x are the unknowns, s is the arc length along the tangent of an accepted state.
-
-1. Predictor: along the tangent, an open point moves with the constant velocity w0.
+1. Predictor: along the tangent of an accepted state, an open point moves with constant velocity (per arc length).
 2. Event: the gap of a point closes where the point meets its tool. The earliest event of all points and ranks counts.
 3. Status: from this event on the point sticks, slides against mu N, or opens. The contact forces F of all closed points
    follow from Coulomb's law on the condensed system (`reduced_contact`). Changes of status are events too.
-4. Equilibrium: at each event, modified Newton iterations (Anderson acceleration, 1965) return to the curved path.
+4. Equilibrium: at each event, modified Newton iterations return the prediction to the curved path. They use the stored
+   LU factors and Anderson acceleration (1965).
 
 The path is piecewise linear between the events. A point sticks where its gap closed, so the order of events matters.
 """
@@ -174,8 +173,15 @@ class ContactEventSequence:
         return self._work >= _SETTINGS.work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """Return gap closure number k (from 0) if it lies within an arc length, else None; forces of earlier closures
-        act."""
+        """Return the gap closure number k (from 0) along the path.
+
+        Args:
+            k: number of the closure. The contact forces of the earlier closures act.
+            length: arc length up to which closures are searched.
+
+        Returns:
+            The closure; None if there is none within the arc length, or if the prediction fails.
+        """
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
                 return None
@@ -210,8 +216,7 @@ class ContactEventSequence:
         return self._piece(length).after(length).at
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the deviation of the predicted path from the tangent at an arc length: change of (x, control); None:
-        zero."""
+        """Return the change of (x, control) from the tangent to the predicted path at an arc length; None: zero."""
         piece, m = self._piece(length), len(self._points.who)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
@@ -243,8 +248,7 @@ class ContactEventSequence:
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _take_over(self) -> bool:
-        """Give sliding points of the accepted state contact forces of their own; return False if the prediction
-        fails."""
+        """Give sliding points of the accepted state contact forces of their own; return False if this fails."""
         x, control = self._way[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
@@ -264,8 +268,7 @@ class ContactEventSequence:
         return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
 
     def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
-        """Append the segment that starts at the start of `piece` with new statuses, (m,); return False if none is
-        admissible."""
+        """Append a segment with new statuses, shape (m,), at the start of `piece`; return False if this fails."""
         points, near = self._points, self._points.near(piece.at, piece.force)
         self._work += 1
         found = points.rates(points.at(self._along), status, near, piece.force)
@@ -317,8 +320,7 @@ class ContactEventSequence:
         return self._end is not None and self._first(self._back(self._end, last), length, last)
 
     def _first(self, times: list[np.ndarray], length: float, at: _Segment) -> bool:
-        """Store the earliest of predicted closures (`times`) if it lies before `length`; `at` gives the positions of
-        points."""
+        """Store the earliest of the closures at arc lengths `times` before `length`; return False without one."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
@@ -376,10 +378,9 @@ class ContactEventSequence:
         return False
 
     def _back(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return the arc lengths at which open points that are inside a tool passed its surface, else the end of the
-        segment.
+        """Return the arc lengths at which open points that are inside a tool at `end` passed its surface.
 
-        `but` is a closure whose point is left out.
+        For other points, and for the point of the closure `but`, it is the end of the segment.
         """
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
@@ -435,8 +436,7 @@ class ContactEventSequence:
         return piece._replace(off=(piece.off[0] + by[0], piece.off[1] + by[1]))
 
     def _learn(self, length: float) -> bool:
-        """Solve for the compliance of the last closure and of the expected next ones; return False without valid LU
-        factors."""
+        """Solve for the compliance of the last and of the expected next closures; return False without LU factors."""
         last, closure, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):

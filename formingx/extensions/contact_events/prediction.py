@@ -19,8 +19,7 @@ SHARE = 0.05
 
 
 class ContactEventPredictor:
-    """Predictor of the contact events of a `StepLimit`, which creates the predictor and calls `active` and
-    `predict`."""
+    """Predictor of the contact events of a `StepLimit`, which calls `active` and `predict`."""
 
     def __init__(self, limit: StepLimit):
         self._limit, self._vectors = limit, list[Any]()
@@ -43,8 +42,10 @@ class ContactEventPredictor:
 
     @property
     def active(self) -> bool:
-        """True if a face sticks, so that the result depends on the order of gap closures, and all contact laws are
-        predictable."""
+        """True if a face sticks and all active contact laws are predictable.
+
+        With stick the result depends on the order of the gap closures.
+        """
         present = self._limit.present
         return any(c.face.contact.sticks and self.allowed(c) > c.at_once for c in present) and all(
             c.face.law.predictable for c in present)
@@ -86,8 +87,9 @@ class ContactEventPrediction:
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
-        """Return the arc length at which the allowed number of gaps has closed, reduced if a point would pass through a
-        tool.
+        """Return the arc length of a step that closes the allowed number of gaps.
+
+        It is reduced if a point would pass through a tool.
 
         Args:
             length: largest arc length of the step.
@@ -103,8 +105,7 @@ class ContactEventPrediction:
         return found
 
     def _to_enough_closures(self, length: float) -> float | None:
-        """Return the arc length, at most `length`, at which the allowed number of gaps has closed; None if the
-        prediction fails."""
+        """Return the arc length, at most `length`, at which enough gaps have closed; None if the prediction fails."""
         sequence = self._sequence
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
         for k in range(2 * sum(allowed)):

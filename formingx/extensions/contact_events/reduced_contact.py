@@ -66,8 +66,7 @@ class ToolFrame(NamedTuple):
 
 
 class ReducedSystem(NamedTuple):
-    """Motion dx of m contact points as a linear function of the contact forces, without contact stiffness in the
-    tangent.
+    """Motion dx of m contact points as a linear function of their contact forces, free of contact stiffness.
 
     Attributes:
         free: dx without contact forces, shape (2 m,).
@@ -170,15 +169,13 @@ class Points:
             among[f][i] = values[k]
 
     def _of_faces(self, point_ids: Sequence[tuple[int, int, int]]) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """Return for each face with listed points of this rank: face number, indices in the list, and local point
-        numbers."""
+        """Return (face number, indices in the list, local point numbers) for faces with listed points of this rank."""
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
         return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
 
     def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion that brings points to given positions along their tools and to the depth of their contact
-        forces.
+        """Return the motion of points along their tools to given positions, and normal to them to their contact depth.
 
         Args:
             at: for each face, present positions of its locally owned points relative to the tool, shape (n, 2), length.
@@ -293,8 +290,7 @@ class Points:
 
     def _agreed(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame, N: np.ndarray,
                 T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Search for contact statuses for which the rates of force and motion satisfy Coulomb's law (active-set
-        search).
+        """Search for contact statuses whose rates of force and motion satisfy Coulomb's law (active set).
 
         Args:
             small: condensed motion of the points.

@@ -78,8 +78,7 @@ class Response:
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
     def _by(self, E: Array) -> tuple[Array, Array] | None:
-        """Return the changes of x, shape (n, m), and of the control, shape (m,), for right-hand sides E, shape (n,
-        m)."""
+        """Return the changes of x, (n, m), and of the control, (m,), for right-hand sides E, shape (n, m)."""
         V = self._newton.solve_ahead(E)
         if V is None:
             return None
