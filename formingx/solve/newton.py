@@ -1,4 +1,4 @@
-"""Newton's method for F(x, control) = 0 with one more equation, c(x, control) = 0: one factorisation, two solves."""
+"""Newton's method for F(x, control) = 0 with a constraint c(x, control) = 0: one factorisation, two solves."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ from .local_contact import LocalSolve, Update, woodbury
 
 @dataclass(frozen=True)
 class Newton:
-    """Settings of Newton's method. `Tolerances` say when it ends.
+    """Settings of Newton's method. `Tolerances` state when the iteration ends.
 
     Attributes:
-        unloaded: floor of the support forces (over stress times volume over length) in the relative residual.
-        at_rest: floor of the displacements (dimensionless) in the relative correction. On a tool whose force grows as
-            the square of the penetration, corrections near the reference configuration are as large as displacements.
-        hurried: iterations allowed while the active set of a contact with a history changes, where there is something
-            cheaper to try, such as half the step.
+        unloaded: lower bound of the support forces (over stress times volume over length) in the relative residual.
+        at_rest: lower bound of the displacements (dimensionless) in the relative correction. On a tool whose force
+            grows as the square of the penetration, corrections near the reference configuration are as large as
+            displacements.
+        hurried: iterations allowed while the active set of a contact with a history changes, where a cheaper attempt is
+            left, such as half the step.
         small: corrections (dimensionless displacement) that may grow without a sign of divergence while the active set
             changes.
         exempt: number of iterations with a small correction and a new active set that do not count against
@@ -34,13 +35,13 @@ class Newton:
             a history, a shorter step is better.
         cycles: number of returns to an earlier active set from which on the iteration counts as cycling. Converged
             iterations took up to 4.
-        diverged: the iteration has diverged, contact or not, where three relative corrections in a row are larger (of
-            solutions: below 0.1).
-        left_alone: the iteration (from 0) without a local solve of contact: it often corrects the errors of
+        diverged: relative correction above which three corrections in a row mean divergence, with contact or without.
+            In converged iterations they stayed below 0.1.
+        left_alone: number (from 0) of the iteration without a local solve of contact: it often corrects the errors of
             the first one.
-        chords: chord iterations that may cost less than one with a new tangent: each costs a residual and a solve,
-            about a sixth.
-        slow: fall of the residual in an iteration above which a tangent is not kept: round-off would look like
+        chords: number of chord iterations that may cost less than one with a new tangent: each costs a residual and a
+            solve, about a sixth.
+        slow: factor of the residual in an iteration above which a tangent is not kept: round-off would look like
             convergence.
     """
 
@@ -57,16 +58,21 @@ class Newton:
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
-    """Return a norm of forces relative to the support forces, at the residual last computed."""
+    """Return the norm of out-of-balance forces relative to the support forces, at the residual last computed.
+
+    floor: lower bound of the support forces (`Newton.unloaded`).
+    """
     return float(forces / (equations.force_scale + floor))
 
 
 class Iteration(NamedTuple):
-    """One Newton iteration: its residual and its correction. The last entry of a history is the converged state.
+    """One Newton iteration. The last entry of a history is the converged state.
 
-    residual: |F| before it, over the norm of the support forces; correction: |dx|/(|x| + `Newton.at_rest`),
-    criterion (3.5.1); work: |F . dx| over its first value, criterion (3.5.2). chord: with the tangent of an iteration
-    before it.
+    Attributes:
+        residual: |F| before the iteration, over the norm of the support forces.
+        correction: |dx|/(|x| + `Newton.at_rest`), criterion (3.5.1) of Song (1993).
+        work: |F . dx| over its first value, criterion (3.5.2).
+        chord: True if the tangent of an earlier iteration was used.
     """
 
     residual: float
@@ -76,24 +82,25 @@ class Iteration(NamedTuple):
 
 
 def tangents(history: list[Iteration]) -> int:
-    """Return the number of iterations with a new tangent; the last entry is the converged state."""
+    """Return the number of iterations with a new tangent in a history, whose last entry is the converged state."""
     return sum(not iteration.chord for iteration in history[:-1])
 
 
 class Failure(Exception):
-    """Newton's method did not converge; `reason` says how, `history` holds the iterations."""
+    """Failure of Newton's method, or of a step: `reason` is a text, `history` holds the iterations, `attempt` their
+    end."""
 
     def __init__(self, reason: str, history: list[Iteration]):
         super().__init__(reason)
         self.reason, self.history = reason, history
-        self.attempt: Attempt | None = None                 # where it ended, if that is known
+        self.attempt: Attempt | None = None                 # end of the iteration, if known
 
 
 class _ActiveSet:
-    """The active set of contact, iteration by iteration.
+    """Changes of the active set of contact in a run of Newton's method.
 
     Attributes:
-        changed: number of the iteration in which it changed last.
+        changed: number of the iteration in which the active set changed last.
         share: factor of a correction, halved when an earlier active set returns: full corrections would cycle.
         found: number of small corrections that led to a new active set (`Newton.small`).
         returns: number of returns to an earlier active set.
@@ -106,7 +113,8 @@ class _ActiveSet:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def look(self, moved: float) -> None:
-        """Note the active set of an iteration; call it once after each residual. moved: size of the last correction."""
+        """Compare the active set with earlier ones; call it once after each residual. moved: size of the last
+        correction."""
         self._iteration += 1
         now = self._problem.active_set
         if now != self._last and self._last is not None:
@@ -124,11 +132,12 @@ class _ActiveSet:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Convergence criteria of a state: all of these.
+    """Convergence criteria of a state, all of which must be met.
 
     Attributes:
-        correction: the next correction that quadratic convergence predicts, over the norm of x (and `Newton.at_rest`).
-        residual: norm of F over the norm of the support forces.
+        correction: tolerance of the next correction, as quadratic convergence predicts it, over the norm of x (and
+            `Newton.at_rest`).
+        residual: tolerance of the norm of F over the norm of the support forces.
         iterations: largest number of iterations with one active set of contact.
         settling: largest number of iterations while the active set changes, see `Newton.small`.
 
@@ -150,11 +159,11 @@ class Tolerances:
         count("Tolerances: settling", self.settling)
 
     def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
-        """Return True if a state with these corrections behind it, and these residuals (its own last), has converged.
+        """Return True if an iteration with these relative corrections and residuals (one more) has converged.
 
-        `chord`: the last correction was one of a chord iteration, which converges linearly: the next one is predicted
-        from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an iteration
-        could go to and fro.
+        `chord`: the last iteration was a chord iteration, which converges linearly. The next correction is then
+        predicted from the fall of residuals and corrections, and doubled. `smooth`: F has no kinks, between which an
+        iteration could oscillate.
 
         Corrections below 1e-7 that no longer shrink, and all below 1e-11, are round-off (a flat thin sheet: near 1e-8).
         The residual may then be round-off, too. With corrections below the tolerance, a residual that no longer shrinks
@@ -165,7 +174,7 @@ class Tolerances:
             return False
         residual, last, before = residuals[-1], corrections[-1], corrections[-2] if len(corrections) > 1 else 1.0
         if chord:
-            if residual == 0:                                # in the reference configuration, where nothing acts
+            if residual == 0:                                # in the unloaded reference configuration
                 return True
             ahead = 2 * last * max(residual / residuals[-2], last / before)
             return ahead < self.correction and residual < self.residual
@@ -182,11 +191,11 @@ class Tolerances:
 
 
 class _ModifiedNewton:
-    """Modified Newton method: keeps the tangent while a few chord iterations cost less than a new one.
+    """Modified Newton method: keeps a tangent while a few chord iterations cost less than a new one.
 
-    (Ortega and Rheinboldt 1970, section 7.1.) The first iteration of a step uses the tangent of an earlier state. The
-    fall of the residual with such a tangent is taken from the last step that began with one. It is halved for every
-    step since, so that the old tangent is tried again.
+    Source: Ortega and Rheinboldt 1970, section 7.1. The first iteration of a step uses the tangent of an earlier state.
+    The expected fall of the residual is its fall in the last step that began with an old tangent. It is halved for
+    every step since, so that an old tangent is tried again.
     """
 
     def __init__(self, settings: Newton) -> None:
@@ -195,42 +204,50 @@ class _ModifiedNewton:
         self._before, self._fall = 0.0, 1.0
 
     def made(self, setting: StepData | None) -> None:
-        """Note that a new tangent was made with these step data; None: it is singular."""
+        """Note that a tangent was factorised under these step data; None: the tangent is singular."""
         self._setting = setting
 
     def begin(self, setting: StepData | None, allowed: bool) -> None:
-        """Begin Newton's method at a guess; `allowed`: tangents may be kept in this step."""
+        """Begin Newton's method at a guess, under these step data; `allowed`: tangents may be kept in this step."""
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0
 
     def keeps(self, residual: float, requested: float) -> bool:
-        """Return True if the tangent is kept for the next iteration, from this residual to the requested one."""
+        """Return True if the present tangent should be kept, to reduce the present residual to the requested one."""
         ahead = residual * self._fall**self._settings.chords
         return self._allowed and self._fall < self._settings.slow and ahead < requested
 
     def took(self, chord: bool, fall: float) -> None:
-        """Note the factor of the residual in an iteration, with an old tangent or a new one."""
+        """Note the factor `fall` of the residual in an iteration; `chord`: the iteration used an old tangent."""
         if self._allowed and self._first:
             self._before = fall if chord else self._before / 2
         self._fall, self._first = fall, False
 
 
 class Drag(Protocol):
-    """Forces that are added to F, and their derivative."""
+    """Forces that are added to F, with their derivative, such as viscous forces."""
 
     def forces(self, x: Array) -> Array:
         """Return the forces at x, locally owned, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add their derivative by x."""
+        """Add the derivative of the forces with respect to x to a tangent matrix."""
 
 
 class BorderedNewton:
-    """Solves F(x, control) = 0 together with c(x, control) = 0.
+    """Solver of F(x, control) = 0 together with a constraint c(x, control) = 0 (`Constraint`).
 
-    `norm(x, control)` measures corrections. The constraint is called as c(x, control, gradient) and returns
-    (c, dc/dcontrol), having put dc/dx into `gradient`. `drag`: forces that are added to F; with them the control stands
-    still (`fixed`), and nothing is solved for along it.
+    Args:
+        problem: the equations.
+        tolerances: convergence criteria.
+        norm: function (change of x, change of the control) that returns the size of a correction.
+        settings: settings of Newton's method.
+        drag: forces that are added to F, or None. With them the control must stay constant (`fixed`).
+
+    Attributes:
+        F, F_control, gradient: vectors F, dF/dcontrol and dc/dx of the last iteration.
+        a: last correction of x.
+        b: derivative dx/dcontrol along the path.
     """
 
     def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float],
@@ -242,12 +259,13 @@ class BorderedNewton:
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0                             # control and its last correction in `correct`
         self._hurried = False
-        self._update: Update | None = None                  # of solutions, by a tangent that is not factorised
+        self._update: Update | None = None                  # of solutions, to a tangent that is not factorised
         self._modified = _ModifiedNewton(self.settings)
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """While something cheaper is left to try, contact with a history must settle in `Newton.hurried` iterations."""
+        """Limit the iterations of contact with a history to `Newton.hurried` while a cheaper attempt is left
+        (`hurried`)."""
         self._hurried = hurried and self.problem.has_history
         try:
             yield
@@ -255,9 +273,9 @@ class BorderedNewton:
             self._hurried = False
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
-        """`self.b` = dx/dcontrol along the path at a solution; False if the tangent matrix is singular.
+        """Compute `self.b` = dx/dcontrol along the path at a solution (x, control); return False if dF/dx is singular.
 
-        `ahead`: see `Problem.tangent`.
+        `ahead`: use the one-sided derivative of F towards the next step.
         """
         if not self._factorise(x, control, ahead):
             return False
@@ -266,7 +284,7 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
-        """Make factors of the tangent, and `F_control`; False if it is singular."""
+        """Factorise dF/dx and compute `F_control` at (x, control); return False if dF/dx is singular."""
         matrix = self.problem.tangent(x, control, ahead)
         if self._drag:
             self._drag.add_to(matrix)
@@ -277,7 +295,8 @@ class BorderedNewton:
         return good
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Update `self.b` at a converged solution to the tangent ahead, by Woodbury's formula; False if it fails."""
+        """Update `self.b` at a converged solution to the tangent ahead, by Woodbury's formula; return False if this
+        fails."""
         update = woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
         if found is None:
@@ -286,23 +305,24 @@ class BorderedNewton:
         return True
 
     def solve_ahead(self, E: Array) -> Array | None:
-        """K^-1 E, locally owned rows, (n, m), by the tangent made last by `tangent` or `update_ahead`; None: it is
-        singular."""
+        """Return K^-1 E, locally owned rows, shape (n, m), by the tangent K last made by `tangent` or `update_ahead`.
+
+        None if K is singular.
+        """
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: Standing | None = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:
-        """Iterate x (in place) and control to convergence; returns the control and the history.
+        """Iterate a guess to a solution of F = 0 and c = 0, with x changed in place; return the control and the
+        iterations.
 
-        `old`: the accepted state before the guess, or None. `chords`: tangents may be kept where that costs less and F
-        has no kinks (modified Newton).
-
-        Afterwards `self.b` is dx/dcontrol at the solution (to the accuracy of the last correction, or of the tangent
-        that was kept).
+        `old`: the accepted state before the guess, or None. `chords`: allow tangents of earlier iterations where they
+        cost less and F has no kinks (modified Newton). Afterwards `self.b` is dx/dcontrol at the solution, to the
+        accuracy of the last correction or of the kept tangent.
 
         Raises:
-            Failure: no convergence; x is then worthless.
+            Failure: no convergence; x is then meaningless.
         """
         problem = self.problem
         history: list[Iteration] = []
@@ -352,12 +372,13 @@ class BorderedNewton:
             self._residual(x, control)
 
     def _residual(self, x: PETSc.Vec, control: float) -> None:
+        """Compute `self.F` at (x, control), the drag included."""
         self.problem.residual(x, control, self.F)
         if self._drag:
             self.F.array_w += self._drag.forces(x.array_r)
 
     def _check(self, history: list[Iteration], active: _ActiveSet, moved: float) -> None:
-        """Check the progress of the iteration.
+        """Check the progress of the iteration; moved: size of the last correction.
 
         Raises:
             Failure: the iteration diverges, cycles or takes too long.
@@ -378,9 +399,9 @@ class BorderedNewton:
             raise Failure(f"{where}no convergence in {len(history)} Newton iterations", history)
 
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
-        """Compute `self.a` = -K^-1 F; return False if K is singular.
+        """Compute `self.a` = -K^-1 F, and `self.b` unless there is drag or `chord`; return False if K is singular.
 
-        But in a chord iteration, K is factorised before, and without drag `self.b` is computed, too.
+        A chord iteration (`chord`) uses the factors of an earlier tangent K.
         """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False
@@ -393,7 +414,7 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
-        """Compute the correction: store its part in x in `self.a`, and return the change of the control.
+        """Complete the correction of x in `self.a` by the constraint, and return the correction of the control.
 
         Raises:
             Failure: the constraint does not change along the path.

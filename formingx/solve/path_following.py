@@ -1,7 +1,7 @@
 """Path following of a scene through limit points to a target (Riks 1979; Song 1993, eqs. 4.8 to 4.31).
 
-A step predicts along the tangent and corrects in the plane normal to it (Keller), in a norm that knows neither the
-mesh nor the units. Targets are hit exactly: within reach, the equation "measure = target" takes the plane's place.
+A step predicts along the tangent and corrects in the plane normal to it (Keller), in a norm that is independent of mesh
+and units. Targets are met exactly: within reach, the equation "quantity = target" replaces the plane.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class PathFollowing:
     """Settings for cutbacks and for giving up. The length of steps is set by `StepControl`.
 
     Attributes:
-        inaccurate: errors in time, over the tolerance, at which a step is taken again.
-        snap_through: see `SnapThrough`.
+        inaccurate: time integration error over its tolerance above which a step is repeated.
+        snap_through: settings of snap-through (`SnapThrough`).
     """
 
     inaccurate: float = 1.4
@@ -49,17 +49,17 @@ class PathFollowing:
 
 
 class Run:
-    """States with one control that follow each other, and the targets still open.
+    """Run along a path with one control, from state to state, until its last target is met.
 
     Args:
-        record: where the states go; its curve solves for them.
-        targets: (target, its measure): the last one ends the run, the others are met on the way.
-        step: step control; default that of the record's last states, or `StepControl()`.
-        at_limit_point: what to do where the control has a limit point: "continue" along the path back,
-            "snap_through" to the next state, or "stop"; None: as `at_limit_points` says.
-        accuracy: the error in time that is allowed, relative.
+        record: record of the states, with the solver of the path.
+        targets: pairs (target, output quantity): the last one ends the run, the others are met in between.
+        step: step control; default: the one of the last state in the record, or `StepControl()`.
+        at_limit_point: rule at limit points of the control, "continue", "snap_through" or "stop"; None:
+            `at_limit_points`.
+        accuracy: tolerance of the relative time integration error.
         label: text before the target beside a progress bar.
-        requested: another target that ends the run, as the last does, or None.
+        requested: another target that ends the run, or None.
     """
 
     settings = PathFollowing()
@@ -73,16 +73,16 @@ class Run:
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.aim = Aim(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
-        self._ahead = self.settings.snap_through.ahead      # the amount by which the control goes on in a jump
-        self._no_rest_at = np.nan                           # control from which a body that jumped reached rest nowhere
-        self._turned: list[State] = []                      # the first state of a run that turned back there
+        self._ahead = self.settings.snap_through.ahead      # change of the control in a snap-through
+        self._no_rest_at = np.nan                           # control at which a snap-through found no equilibrium
+        self._turned: list[State] = []                      # first state of a run that goes back along the path
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
-        """Follow the path from a state, or on from the last one, until the last target is met.
+        """Follow the path from a state, or from the last recorded one, until the last target is met.
 
-        max_steps: number of states after which the run gives up; None: it gives up when many states came no nearer to
-            the target.
-        may_turn: a continued run with another target than before may go back along the path to it.
+        max_steps: number of states after which the run gives up; None: when many states came no nearer to the target.
+        start: first state of the run; None: continue from the last recorded state.
+        may_turn: a continued run with a new target may go back along the path to it.
 
         Raises:
             ConvergenceError: the target cannot be reached. The error has no `path` yet; the record holds the states.
@@ -136,43 +136,43 @@ class Run:
 
     @property
     def _aims_at_control(self) -> bool:
-        """True if the target is the controlled quantity: not of a flow, which aims at a time."""
+        """True if the last target is a value of the controlled quantity, and not a process time under another
+        control."""
         return self.aim.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
     def _may_jump(self) -> bool:
-        """True if the body may jump: at folds, or, if these are followed, where contact or friction ends the path."""
+        """True if the body may snap through: at limit points, or, if these are passed, where contact or friction
+        ends the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
         return self._limit_rule in ("snap_through", "continue_volume") or self._limit_rule == "continue" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
-        """True if the body jumps where short steps fail, not only the shortest.
-
-        Not where a pressure is followed with a history: slip on the way counts.
-        """
+        """True if failed short steps lead to a snap-through, not only the shortest. False for a pressure with a
+        history, since slip during the motion matters."""
         return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
     @property
     def _sense(self) -> float:
-        """1 or -1: which way the control goes from the first state."""
+        """Direction of the control at the first state of the run, 1 or -1."""
         return float(np.sign(self.states[0].slope)) or 1.0
 
     @property
     def _falls(self) -> bool:
-        """True if the controlled quantity is taken back towards 0, as a pressure that is let off."""
+        """True if the controlled quantity decreases towards 0, as a pressure that is released."""
         return self.aim.of_control and abs(self.aim.until.value) < abs(self.aim.values[0])
 
     @property
     def states(self) -> list[State]:
-        """States of this run."""
+        """States of this run, in order."""
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _go_on(self, may_turn: bool) -> dict[str, Any]:
-        """Make the recorded states with the step data of the last one the states of this run.
+        """Continue a run: take its states, those with the step data of the last one, from the record.
 
-        If the run turns, its first state is the last one. (It does not turn back to a pressure, which may be reached
-        ahead, too.)
+        If the run goes back along the path, its first state is the last one. (It does not go back to a pressure, which
+        may be reached further along the path, too.)
 
         Returns:
             The data (`State.stepping`) with which the run continues; empty if no state has any.
@@ -197,21 +197,23 @@ class Run:
         return kept
 
     def _elapsed(self) -> float:
-        """Seconds since this was last asked."""
+        """Return the seconds since the last call."""
         before, self._began = self._began, time.perf_counter()
         return self._began - before
 
     def _complete_step(self) -> None:
+        """Complete a step in the record, with the data with which the run continues."""
         self.record.counts.seconds += self._elapsed()
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
         self.record.complete_step(self.step, self.aim.until, given=self._step and asdict(self._step),
                                   accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
-        """Return the next states: one at a target within reach, or one step ahead, and those between.
+        """Return the next states, in order: the end of a step, or a target within reach, and the states inside this
+        step.
 
         A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
-        snap-through near there found no rest, and from a first state with a history, only if the shortest fails.
+        snap-through near there found no equilibrium, and from a first state with a history, only if the shortest fails.
         """
         first, failed, most, limit, held = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -251,20 +253,20 @@ class Run:
                                   failure.attempt)
 
     def _failed(self, why: str, length: float) -> None:
-        """Note a rejected step; `length` is tried next."""
+        """Count a rejected step and its reason; `length`: length of the next attempt."""
         self.record.counts.failures += 1
         self._limited(why, length)
 
     def _limited(self, why: str, length: float) -> None:
-        """Note a shortened or rejected step; `length` is tried next."""
+        """Count the reason for a shortened or rejected step; `length`: length of the next attempt."""
         self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
               reach: float, held: float | None = None) -> list[State]:
-        """One step of a length, or to a target that is within reach; raises `Failure` or `Cutback`.
+        """Return the states of one step of a length, or to a target within reach; raise `Failure` or `Cutback`.
 
-        held: the control at its end, in place of the length.
+        reach: arc length to the target. held: control at the end of the step, in place of the length, or None.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._way._replace(length=reach), ends=True) if limit else None
@@ -295,13 +297,13 @@ class Run:
         except Failure:
             self.problem.memory = memory
             raise
-        if target is None and length == self.step.length:   # not one that contact has made shorter
+        if target is None and length == self.step.length:   # not a step that contact has shortened
             self.step.accepted(tangents(new.history) - (limit.settling if limit else 0), error)
         return states
 
     @property
     def _predictor(self) -> Predictor | None:
-        """Predictor of a step in which a body relaxes: x at a control; None: the tangent is better."""
+        """Function from the control to a guess of x in a step of a body that relaxes; None: the tangent is better."""
         if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
@@ -312,7 +314,7 @@ class Run:
         return x
 
     def _error_in_time(self, new: State) -> float:
-        """Return the time integration error of a step over its tolerance; raise `Cutback` if it is much more."""
+        """Return the time integration error of a step over its tolerance; raise `Cutback` if it is much larger."""
         if self._time_error is None:
             return 0.0
         error = self._time_error.of(self.states, new.x, new.control)
@@ -323,7 +325,7 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """Return the state after a snap-through from a limit point, as a list.
+        """Return the state after a snap-through from `old`, at which the path leads back, in a list.
 
         The list is empty, and the run ends, if a body with constant loads reaches no equilibrium.
         """
@@ -334,17 +336,17 @@ class Run:
         try:
             return [self._jump(old, 0.0, onward=onward)]
         except Failure as failure:
-            if not self.problem.setting.rests:              # the controlled quantity was to go on
+            if not self.problem.setting.rests:              # the controlled quantity should have changed further
                 controlled = "enclosed volume" if onward else self._driven
                 self._give_up(f"the {controlled} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
     def _jump(self, old: State, length: float, step: float = 0.0, onward: float = 0.0) -> State:
-        """Return the state after a snap-through from a step of this length ahead; raise `Failure`.
+        """Return the state after a snap-through from `old`, by a predictor of this length on its tangent; raise
+        `Failure`.
 
-        step: the length of the last step that went well; onward: see `snap_through`.
-
+        step: length of the last successful step; onward: sign of the work of the controlled load, see `snap_through`.
         With length 0, contact with a history may settle at one control and not at another next to it: others are tried,
         too. A fading force is removed at once, since no process has it as a load of its own.
         """
@@ -371,11 +373,11 @@ class Run:
         return new
 
     def _found_no_rest_near(self, old: State) -> bool:
-        """Return True if a jump from about the control of a state, which costs most, reached rest nowhere."""
+        """Return True if a snap-through from about the control of a state, which costs most, reached no equilibrium."""
         return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
-        """Return the largest number of viscous solutions of a jump from a state."""
+        """Return the largest number of viscous solutions of a snap-through from a state."""
         most = self.settings.snap_through.solutions
         return most // 5 if self._found_no_rest_near(old) else most
 
@@ -389,21 +391,20 @@ class Run:
         self._stop_if(self.aim.stalled())
 
     def _stop_if(self, why: str) -> None:
+        """Give up the run with the reason `why`, unless it is ""."""
         if why:
             self._give_up(why)
 
     def _sorted_into(self, old: State, new: State) -> list[State]:
-        """Return the states from old to new in order: a limit point and targets inside the step, then new itself.
-
-        Raises `Failure` if one of them cannot be solved for.
-        """
+        """Return the states of a step in order: limit point and targets inside it, then its end `new`; raise
+        `Failure`."""
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:
                 limit = self.curve.limit_point(old, new)
             except Failure as failure:
                 raise Failure(f"a limit point lies ahead but could not be located: {failure.reason}", []) from None
-            if (limit.control - old.control) * old.slope < 0:   # it belongs to the part that a jump has passed
+            if (limit.control - old.control) * old.slope < 0:   # on the piece of path that a jump has skipped
                 raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
         for target, bound in self.aim.open:
@@ -437,6 +438,7 @@ class Run:
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
+        """Raise the error of a run that cannot reach its target, with a diagnosis; `why` and `pace`: see `diagnose`."""
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
@@ -445,4 +447,4 @@ class Run:
 
 
 class _Astray(Failure):
-    """A state was found, but not one that a step should reach: a shorter one will do better."""
+    """Failure of a step that found another state than the one sought; a shorter step will do better."""
