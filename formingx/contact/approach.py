@@ -31,8 +31,8 @@ class StepLimits:
         corrections: largest number of repeated solutions of a step that reduce this difference.
         inaccurate: change of the pressure in a step, over `lag`, from which on the step is rejected.
         settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
-        weak: normal force, over shear modulus times thickness times length, that is added to the pressure in these
-            ratios: lightly loaded contacts do not limit the step.
+        weak: normal force, over shear modulus times thickness times length, that is added to the denominator of these
+            relative changes: lightly loaded contacts do not limit the step.
         shortest: arc length (dimensionless) below which steps are never too long for these changes.
         mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others close.
     """
@@ -95,9 +95,10 @@ class Approach:
     def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
         """Return the admissible arc length of a step along a tangent.
 
-        The step ends at the first gap closure of a face without contact, otherwise where `at_once` new points have come
-        into contact. If a whole region came into contact in one step, its sticking positions would depend on the step
-        length.
+        The step ends where `at_once` new points have come into contact. If at most one point was in contact before, it
+        ends at the first gap closure. If a whole region came into contact in one step, its sticking positions would
+        depend on the step length. In lagged contact the motion of the points and the change of the friction pressure
+        are limited too.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
@@ -171,7 +172,8 @@ class Approach:
 
         The limit is about twice `at_once`, or twice the predicted number of gap closures. In lagged contact the limit
         concerns
-        the depth: a new point must not be deeper in the tool than twice its tributary length.
+        the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts without history
+        variables have no limit.
 
         Args:
             old: locally owned unknowns at the start of the step, shape (n,).

@@ -136,7 +136,7 @@ class FaceContact:
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the contact tractions at the points in a state; after `linearise`, those of the linearised law.
+        """Return the contact tractions at the points in a state; after `linearise`, of the linearised law.
 
         Args:
             fields: locally owned unknowns of the state.
@@ -420,7 +420,7 @@ class FaceContact:
               mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
         """Return the history variables of a face of another mesh, transferred to this face.
 
-        A point is in contact if the nearest point of the source is. Its elastic slip is fitted to those of the source.
+        A point is in contact if the nearest point of the source is; elastic slips are fitted to slips of the source.
 
         Args:
             source: the same contact on the other mesh.

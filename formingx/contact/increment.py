@@ -24,7 +24,7 @@ class Increment:
         start: positions of the points relative to the tool at the last accepted state, shape (n, c), length; None
             without such a state.
         guessed: mask of the points whose contact forces are predicted at the first guess of the iteration, shape (n,).
-            The law of these points is first linearised at the guess, that of the others at the start.
+            The law is first linearised at the guess for these points, and at the start for the others.
     """
 
     def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
@@ -39,8 +39,7 @@ class Increment:
     def tractions(self, x: np.ndarray) -> Tractions:
         """Return the tractions of the law at given positions.
 
-        They are computed once per position. After `linearise` at the same positions, they are those of the linearised
-        law.
+        They are computed once per position. After `linearise` at the same positions, the linearised law gives them.
 
         Args:
             x: positions of the points relative to the tool, shape (n, c), length.

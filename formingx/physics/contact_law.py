@@ -53,7 +53,7 @@ class Tractions:
     """Contact tractions at n points per unit reference area, of the body on the tool.
 
     Args:
-        force: traction vectors, shape (n, c), stress. Their sign is that of the contact forces in the residual.
+        force: traction vectors, shape (n, c), stress. Their sign equals the sign of contact forces in the residual.
         normal: normal tractions N, shape (n,), stress, positive in compression.
         tangential: tangential tractions T, shape (n,), stress.
         sense: sense of sliding, 1 or -1 along the tangent of the tool, 0 for a sticking point, shape (n,).
@@ -129,8 +129,8 @@ class ContactLaw:
     In each increment a contact calls these methods in this order:
 
     * `motion` and `touching` at its beginning, for distances, slips and points in contact;
-    * `tractions` in each Newton iteration, linearised at the `Motion` that the iteration before predicts. It returns
-      tractions and stiffness, and the new history variables of an accepted state;
+    * `tractions` in each Newton iteration, for tractions, stiffness and new history variables. The law is linearised at
+      the `Motion` that the iteration before predicts;
     * `stiffness_ahead` at an accepted state, for the tangent towards the next step;
     * `distance`, `nearest` and `ramp` for the limits of the next step.
 
