@@ -142,7 +142,7 @@ class Curve:
         return self._found
 
     def look_ahead(self, state: State) -> None:
-        """Compute the path tangent of an accepted state again, under its history variables, for the next step.
+        """Compute the path tangent of an accepted state again, with the history variables updated, for the next step.
 
         The factors of its last iteration are used, unless many contact points differ or materials have advanced.
         Predicted contact events need new factors, so that a run from a checkpoint finds the same ones.
@@ -159,8 +159,7 @@ class Curve:
             self._ahead_of = state, self.newton.solver.count
 
     def factorise_ahead(self, state: State) -> bool:
-        """Factorise the tangent matrix ahead of an accepted state, unless the present factors are these; False if
-        singular."""
+        """Factorise dF/dx ahead of an accepted state, unless this was done last; return False if it is singular."""
         if self._ahead_of != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
             if not self.newton.tangent(self._x, state.control, ahead=True):
@@ -202,21 +201,22 @@ class Curve:
              bend: Bend | None = None) -> State:
         """Return the state after a step of arc length `length` from the state `old` (Song 1993, eqs. 4.14 to 4.31).
 
-        The predictor follows the tangent; Newton's method corrects in the plane normal to it at this length.
+        The guess lies on the tangent; Newton's method corrects in the plane normal to it at this length.
 
         Args:
-            predictor: guess of x in a step in time, or None.
+            predictor: function from the control to a guess of x, in a step in time, or None.
             behind: earlier state on the same smooth path, or None. The guess lies on the parabola through it and `old`.
-            bend: correction of the guess, in the plane normal to the tangent, or None.
+            bend: correction of the guess in this plane, or None.
         """
         plane = self._plane(old, *self._ahead(old, length))
         return self._solve_from(*self._ahead(old, length, behind, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state near a step of arc length `length` at which a constraint holds, such as "quantity = target".
+        """Return the state near the end of such a step at which the constraint `equation` holds, such as "quantity =
+        target".
 
-        The predictor and the other arguments are the same as in `step`. `kind`: kind of the new state.
+        The other arguments are the same as in `step`. `kind`: kind of the new state.
         """
         return self._solve_from(*self._ahead(old, length, behind, bend), equation, kind, old, predictor)
 
@@ -307,8 +307,8 @@ class Curve:
         return x, control
 
     def between(self, a: State, b: State, bound: Measure, target: float) -> State:
-        """Return the state between two states at which an output quantity has a target value; raise `Failure` if
-        there is none."""
+        """Return the state between a and b at which the output quantity `bound` has the value `target`; raise
+        `Failure`."""
         low, high = 0.0, 1.0
         sign = self.value(bound, a.x, a.control) - target
         for _ in range(40):
@@ -325,8 +325,7 @@ class Curve:
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
-        """Return the state between a and b that meets a target; `bound`: the output quantity of the target (see
-        `between`).
+        """Return the state between a and b that meets a target, whose output quantity is `bound`.
 
         Raises:
             ConvergenceError: no such state was found.
@@ -366,7 +365,7 @@ class Curve:
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
 
     def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """Solve again for the first of the states of a step from `old`, with the points that penetrated a tool in
+        """Solve again for the first of `states`, found by a step from `old`, with points that penetrated a tool in
         contact.
 
         For tools in three dimensions. A point stays in contact where it met the tool. If the state meets one of

@@ -114,7 +114,8 @@ class Increment(Protocol):
         """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c), (m, c, c)."""
 
     def foretold(self, by: Array) -> Tractions:
-        """Return the tractions at all points after a motion `by` relative to their tool, shape (n, c), length."""
+        """Return the tractions at all points after a motion `by` of the points relative to their tool, shape (n, c),
+        length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
         """Return a function from a motion of `points` relative to their tool, shape (m, c), length, to their
@@ -306,10 +307,10 @@ class ActiveSet(Protocol):
         place."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the difference of the point stiffnesses between the tangent `ahead` and the last
-        tangent.
+        """Return for each face the change of the stiffness per area of its points from the last tangent to the tangent
+        `ahead`.
 
-        Shape (n, c, c) each, stress/length.
+        Shape (n, c, c) each, stress/length. (x, control) is an accepted state.
         """
         return []
 
@@ -386,7 +387,8 @@ class Stages(Protocol):
         """Restore the step data and history variables of an accepted state, to start a step from it."""
 
     def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
-        """Return a context in which x, step data and history variables of the problem are those of a state."""
+        """Return a context in which the problem has the unknowns, the step data and the history variables of a
+        state."""
 
     def bring_in(self, number: int, x: Array, control: float) -> None:
         """Activate an item without history, at (x, control); `number`: its number in the scene.

@@ -154,8 +154,7 @@ class FixedControlCurve(Curve):
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
-        """Return the length of the tangent dx/dcontrol per unit of the control: 1, since the control measures
-        length."""
+        """Return 1, the length of a tangent dx/dcontrol per unit of the control: the control measures length."""
         return 1.0
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
@@ -179,5 +178,5 @@ class FixedControlCurve(Curve):
 
     @staticmethod
     def _at_rest(state: State) -> bool:
-        """Return True for the first state of a path in the reference configuration, x = 0."""
+        """Return True if a state is the first one of a path and the body is in the reference configuration, x = 0."""
         return state.kind == "start" and not np.any(state.x)

@@ -81,7 +81,8 @@ class LocalSolve:
         self.failed = 0
 
     def look(self) -> None:
-        """Mark the contact points whose status changed since the last call; call it once after each linearisation."""
+        """Mark the points whose gap closed, or whose status changed since the last call; call once after each
+        linearisation."""
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -146,7 +147,8 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
         solver: solver with the LU factors of the tangent.
 
     Returns:
-        The function (`Update`). None if so many points change that another factorisation costs less.
+        The function (`Update`). None if more points change than `LocalContact.few`: another factorisation then costs
+        less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
@@ -268,8 +270,8 @@ class _Points:
             ramps: for each face, function of motions that returns depth and path in the ramp (`Increment.in_ramp`).
             y: motions before the correction.
             new: motions after it.
-            behind: depth at which each point stops that enters the ramp, shape (points,); it grows for points that
-                enter.
+            behind: depth over the width of the ramp at which each point stops that enters the ramp, shape (points,).
+                It grows for points that enter.
 
         Returns:
             (the stopped motions, True if a point was stopped).

@@ -28,7 +28,7 @@ class FlowSteps:
     """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
-        stretched: a step ends at the next prescribed time if this is within so many step lengths. The last step is then
+        stretched: a step ends at the next prescribed time within this number of step lengths. The last step is then
             never much shorter than the others.
         cut: largest factor of the length of a step that is repeated because it was too long.
         still: relative change of the control below which it counts as constant, up to round-off.
@@ -168,8 +168,10 @@ class Flow(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _along(self, old: State, value: float) -> tuple[Array, float]:
-        """Return the point (x, control) on the tangent of a state at which the quantity has a value; (x, control) of
-        the state itself if there is no such point nearby."""
+        """Return the point (x, control) on the tangent of a state at which the prescribed quantity has a value.
+
+        If there is no such point nearby, return (x, control) of the state itself.
+        """
         def deviation(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
         now = deviation(0.0)

@@ -58,7 +58,7 @@ class Newton:
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
-    """Return the norm of out-of-balance forces relative to the support forces, at the residual last computed.
+    """Return `forces`, the norm of out-of-balance forces, relative to the support forces at the residual last computed.
 
     floor: lower bound of the support forces (`Newton.unloaded`).
     """
@@ -264,8 +264,7 @@ class BorderedNewton:
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """Limit the iterations of contact with a history to `Newton.hurried` while a cheaper attempt is left
-        (`hurried`)."""
+        """Return a context in which contact with a history must settle in `Newton.hurried` iterations, if `hurried`."""
         self._hurried = hurried and self.problem.has_history
         try:
             yield
@@ -284,7 +283,8 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
-        """Factorise dF/dx and compute `F_control` at (x, control); return False if dF/dx is singular."""
+        """Factorise dF/dx and compute `F_control` at (x, control), with a new scaling by MUMPS if `rescale`; False
+        if singular."""
         matrix = self.problem.tangent(x, control, ahead)
         if self._drag:
             self._drag.add_to(matrix)

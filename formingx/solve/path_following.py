@@ -136,21 +136,21 @@ class Run:
 
     @property
     def _aims_at_control(self) -> bool:
-        """True if the last target is a value of the controlled quantity, and not a process time under another
-        control."""
+        """True if the last target is a value of the control, not a process time under another control."""
         return self.aim.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
     def _may_jump(self) -> bool:
-        """True if the body may snap through: at limit points, or, if these are passed, where contact or friction
-        ends the path."""
+        """True if the body may snap through: at limit points, or else where contact or friction ends the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
         return self._limit_rule in ("snap_through", "continue_volume") or self._limit_rule == "continue" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
-        """True if failed short steps lead to a snap-through, not only the shortest. False for a pressure with a
-        history, since slip during the motion matters."""
+        """True if the body snaps through once some steps have failed, not only when the smallest step has failed.
+
+        False for a pressure with a history, since slip during the motion matters.
+        """
         return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
     @property
@@ -172,10 +172,8 @@ class Run:
         """Continue a run: take its states, those with the step data of the last one, from the record.
 
         If the run goes back along the path, its first state is the last one. (It does not go back to a pressure, which
-        may be reached further along the path, too.)
-
-        Returns:
-            The data (`State.stepping`) with which the run continues; empty if no state has any.
+        may be reached further along the path, too.) Return the data (`State.stepping`) with which the run continues;
+        empty if no state has any.
         """
         record, last = self.record, self.record.last
         there = record.restore()
@@ -212,8 +210,8 @@ class Run:
         """Return the next states, in order: the end of a step, or a target within reach, and the states inside this
         step.
 
-        A failure halves the step. Where short ones fail, or the control has its limit, the body snaps through; where a
-        snap-through near there found no equilibrium, and from a first state with a history, only if the shortest fails.
+        A failure halves the step. If short steps fail, or the path leads back, the body snaps through. It does so only
+        after the smallest step near a snap-through without equilibrium, and at a first state with a history.
         """
         first, failed, most, limit, held = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -266,7 +264,7 @@ class Run:
               reach: float, held: float | None = None) -> list[State]:
         """Return the states of one step of a length, or to a target within reach; raise `Failure` or `Cutback`.
 
-        reach: arc length to the target. held: control at the end of the step, in place of the length, or None.
+        bound: output quantity of the target. reach: arc length to it. held: control at the end of the step, or None.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._way._replace(length=reach), ends=True) if limit else None

@@ -177,8 +177,8 @@ class Execution:
         return run.aim.open
 
     def _change(self, begun: bool) -> None:
-        """Run piece 0 of the present stage: change the active items while the unbalanced forces fade; `begun`:
-        continue it."""
+        """Run piece 0 of the present stage: change the active items while unbalanced forces fade; `begun`: continue
+        the piece."""
         before, x, control = self._standing()
         start: float | None = None
         if not begun:

@@ -102,7 +102,7 @@ class SnapThrough:
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def most_of_step(self, iterations: int) -> float:
-        """Return the largest part of a failed step that is tried next.
+        """Return the largest part of the length of a failed step that is tried next.
 
         Args:
             iterations: Newton iterations of the step so far.
@@ -223,7 +223,8 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """Return the factor of eta after a rejected solution, `grows` or by default as in the settings.
+        """Return the factor by which eta grows after a rejected solution: `grows`, or the one of the settings if this
+        is 0.
 
         After the next solution eta does not fall.
         """
@@ -259,7 +260,8 @@ class _Motion:
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """Return True if the work of the controlled load from state a to state b has the wrong sign (`onward`)."""
+        """Return True if the work of the controlled load from state a to state b has the wrong sign; `onward` is the
+        right one."""
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:

@@ -239,8 +239,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         The plan of the stage.
 
     Raises:
-        InputError: the stage controls an item that cannot be controlled or is missing in the scene, makes a missing
-            item inactive, leaves the body free to move, or has a target that cannot be met.
+        InputError: an item cannot be controlled or is missing in the scene, the body is free to move, or a target
+            cannot be met.
     """
     caller = stage.who
     off = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})
