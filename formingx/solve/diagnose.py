@@ -263,7 +263,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     if len(states) > 2:
         a, b = states[-2:]
         slopes = [curve.unit_slope(s) for s in states]
-        drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 falls in proportion to the control left
+        drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 is proportional to the distance to the limit
         if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < _LIMITS.slowing * max(map(abs, slopes)):
             ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
             facts["limit_ahead"] = problem.shown(ahead)[1]
@@ -323,7 +323,7 @@ def _buckles(facts: dict[str, Any]) -> bool:
 def _of_limits(failure: Failure) -> Iterator[Finding]:
     """Yield findings on limit points that the control reached, or is about to reach, before its target."""
     facts, target = failure.facts, failure.target
-    if _buckles(facts):                                      # then the limit point is no more than its effect
+    if _buckles(facts):                                      # the limit point is only an effect of buckling
         return
     what, limits = facts["what"], facts.get("limit_points", ())
     if what == "process time" and facts["control"] in limits:

@@ -36,9 +36,9 @@ class DirectSolver:
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False, inertia: bool = False):
         self._matrix, self._symmetric, self._determinant, self._inertia = matrix, symmetric, determinant, inertia
-        self._columns: list[PETSc.Mat] = []                 # dense, for `solve_all`
-        self._scaled = False                                # there are factors, and a scaling with them
-        self.count = 0                                      # factorisations
+        self._columns: list[PETSc.Mat] = []                 # dense matrices for `solve_all`
+        self._scaled = False                                # factors exist, with a scaling
+        self.count = 0                                      # number of factorisations
         self._keeps = matrix.comm.size == 1                 # MUMPS can keep a scaling
         self._create()
 
@@ -63,7 +63,7 @@ class DirectSolver:
             self._scaled = False
         if self._scaled and (not keep or self.scaling == _KEEP_SCALING):
             return True
-        self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling has taken none
+        self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling made no factors
         self.destroy()                   # PETSc refuses to factorise again with a MUMPS that has failed once
         self._create()
         self._scaled = False
@@ -117,7 +117,7 @@ class DirectSolver:
         configure(self._ksp, self._matrix, self._symmetric)
         if self._determinant:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(33, 1)
-        if self._inertia:                # the last block is not left to ScaLAPACK, which counts no pivots
+        if self._inertia:                # without ScaLAPACK for the last block: it counts no pivots
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:

@@ -96,7 +96,7 @@ class FixedControl:
 class FixedControlCurve(Curve):
     """Solver for states at given values of the control, by PETSc SNES, for paths without limit points.
 
-    The length of its steps is the change of the control. So is the length by which its tangents are normalised.
+    Arc length is replaced by the change of the control, in the lengths of steps and of tangents.
     """
 
     fixed_control = True
@@ -135,7 +135,7 @@ class FixedControlCurve(Curve):
             Failure: Newton's method fails, or an element is inverted.
         """
         control = a.control + fraction * (b.control - a.control)
-        if self._at_rest(a):                                 # a slack body has no tangent there
+        if self._at_rest(a):                                 # a slack body has no tangent in its first state
             return self._correct(a, (control - a.control) / a.slope, "step")
         return self.solve(self.interpolate(a, b, fraction)[0], control, fixed(control), "step", a)
 

@@ -42,7 +42,7 @@ class LocalContact:
         full: number of full corrections, which may cycle. Later corrections of sticking points stop near the outer edge
             of the ramp. Others are halved where they increase the residual.
         halved: largest number of halvings of a correction, which would stall at a kink.
-        stays: part of its depth in the ramp at which a point stops that would leave the ramp.
+        stays: part of its present depth at which a point stops that a correction would move out of the ramp.
         least: depth over the width of the ramp below which a point may leave the ramp.
         behind: depth over the width of the ramp at which a point stops that enters the ramp again.
         farther: factor of `behind` from one entry to the next.
@@ -207,13 +207,13 @@ class _Points:
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
                  solver: DirectSolver, border: Border):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
-        self._c = contacts[0].points.shape[1]               # components
+        self._c = contacts[0].points.shape[1]               # number of components
         self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
         counts = self._comm.allgather(self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
         ends = np.cumsum([0, *(len(i) for _, i in self._some)])
-        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]     # of the owned points of each contact
+        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]     # slices of the owned points of each contact
         self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # locally owned rows
         self._steps = border(self._columns)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])

@@ -200,7 +200,7 @@ class _ModifiedNewton:
 
     def __init__(self, settings: Newton) -> None:
         self._settings = settings
-        self._setting: StepData | None = None                # of the tangent; None: there is none
+        self._setting: StepData | None = None                # step data of the factorised tangent, or None
         self._before, self._fall = 0.0, 1.0
 
     def made(self, setting: StepData | None) -> None:
@@ -245,7 +245,9 @@ class BorderedNewton:
         drag: forces that are added to F, or None. With them the control must stay constant (`fixed`).
 
     Attributes:
-        F, F_control, gradient: vectors F, dF/dcontrol and dc/dx of the last iteration.
+        F: residual of the last iteration.
+        F_control: dF/dcontrol.
+        gradient: dc/dx.
         a: last correction of x.
         b: derivative dx/dcontrol along the path.
     """
@@ -305,10 +307,8 @@ class BorderedNewton:
         return True
 
     def solve_ahead(self, E: Array) -> Array | None:
-        """Return K^-1 E, locally owned rows, shape (n, m), by the tangent K last made by `tangent` or `update_ahead`.
-
-        None if K is singular.
-        """
+        """Return K^-1 E by the tangent K ahead of a state, (n, m), locally owned; None if K is singular. Call it
+        after `tangent` or `update_ahead`."""
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
 

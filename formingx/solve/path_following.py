@@ -114,7 +114,7 @@ class Run:
                     if state.kind == "limit point" and self._limit_rule == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._limit_rule == "snap_through":
-                        break                           # the rest of the step starts from here
+                        break                           # the next step starts from this state
                     if not self.aim.is_open() and state.met is self.aim.until:
                         break
                 self._complete_step()

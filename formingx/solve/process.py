@@ -64,7 +64,7 @@ class Execution:
         self._accuracy = accuracy
         self._rest, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
         self._still = StepData(nothing, nothing, [])
-        self._targets = [self._bind(plan) for plan in plans]    # so that nothing is compiled between stages
+        self._targets = [self._bind(plan) for plan in plans]    # compile before the first stage
         problem.enter(self._still, self._rest, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
@@ -89,7 +89,7 @@ class Execution:
                 self._change(piece == 0)
                 if self.record.ended:
                     break
-                if any(plan is p for p in self._unsure):     # now its travels are known
+                if any(plan is p for p in self._unsure):     # the travels of its tools are known now
                     self._look(plan, self._stands)
             if plan.in_flow:
                 self._flow(plan.numbers, piece > 0)

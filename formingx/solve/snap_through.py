@@ -241,7 +241,7 @@ class _Motion:
             Failure: the viscous forces vanish, but a body without a history has no equilibrium here.
         """
         try:
-            with self.curve.newton.in_a_hurry(True):        # if it fails the body moves on, with viscosity
+            with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
                 state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
         except Failure:
             if self.rest > self._settings.at_rest:

@@ -23,6 +23,8 @@ AT_LIMIT_POINT = (None, "continue", "snap_through", "stop")
 class Stage:
     """One stage of a process: a control with its target, prescribed amplitudes, or only a change of the active items.
 
+    Process time is 0 at the start of the process. It passes in stages with a table, a speed or a duration; other stages
+    are instantaneous.
     Args:
         name: name of the stage in the record of the run.
         control: the load, support or contact whose amplitude the stage varies, itself or its name.
@@ -42,8 +44,7 @@ class Stage:
         duration: process time that the stage takes: until the target of the control is met, or while nothing is
             controlled.
         constant: with `control` and `duration`: a target, such as `force(2.0)`, that stays met, since the control is
-            adjusted. Process time is 0 at first. It passes in stages with a table, a speed or a duration; others are
-            instantaneous.
+            adjusted.
         step: step control of this stage; default: the step control of the run.
         at_limit_point: rule where the control has a limit point, one of `AT_LIMIT_POINT`, as in `formingx.trace`.
 
@@ -251,7 +252,7 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         if not item.driven:
             raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a Displaced support, or"
                              f" a Contact that moves can")
-        if number in off and item.direction is None:                  # a tool may go home while it is away
+        if number in off and item.direction is None:                  # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{caller}: one thing has two tables")
