@@ -19,7 +19,7 @@ class InputError(ValueError):
 
     >>> fx.NeoHookean(c10=-1.0)
     Traceback (most recent call last):
-    formingx.errors.InputError: NeoHookean(c10=-1.0) has no stiffness: its shear modulus at rest is -2, must be positive
+    formingx.errors.InputError: NeoHookean(c10=-1.0) has no stiffness: its initial shear modulus is -2, must be positive
     """
 
     path: Any = None

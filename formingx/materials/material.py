@@ -290,7 +290,7 @@ class Material(Energies):
         n = sets.shape[1]
         moduli = self._moduli(sets, n)
         for mu in moduli[~((moduli > 0) & np.isfinite(moduli))][:1]:
-            raise InputError(f"{self} has no stiffness: its shear modulus at rest is {mu:.6g}, must be positive")
+            raise InputError(f"{self} has no stiffness: its initial shear modulus is {mu:.6g}, must be positive")
         stress = self.response.derivatives(np.ones((3, n)), sets)[0]
         for g in stress.T[np.ptp(stress, axis=0) > 1e-6 * moduli[1]][:1]:
             raise InputError(f"{self} is not free of stress at rest: dW/dl along r, z and the hoop are {g[0]:.6g},"
