@@ -1,1 +1,1 @@
-"""Solves F(x, control) = 0 and follows its solutions; knows no physics."""
+"""Solver of F(x, control) = 0 for single states and for paths of states, independent of the physics of F."""

@@ -63,7 +63,7 @@ class DirectSolver:
             self._scaled = False
         if self._scaled and (not keep or self.scaling == _KEEP_SCALING):
             return True
-        self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling made no factors
+        self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling has applied none
         self.destroy()                   # PETSc refuses to factorise again with a MUMPS that has failed once
         self._create()
         self._scaled = False

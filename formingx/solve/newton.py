@@ -139,7 +139,7 @@ class Tolerances:
             `Newton.at_rest`).
         residual: tolerance of the norm of F over the norm of the support forces.
         iterations: largest number of iterations with one active set of contact.
-        settling: largest number of iterations while the active set changes, see `Newton.small`.
+        settling: largest number of iterations while the active set changes (but `Newton.exempt`).
 
     Raises:
         InputError: a value that is not greater than 0.

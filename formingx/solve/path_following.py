@@ -436,7 +436,8 @@ class Run:
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
-        """Raise the error of a run that cannot reach its target, with a diagnosis; `why` and `pace`: see `diagnose`."""
+        """Raise the error of a run that cannot reach its target, with a diagnosis; `why`: the reason, without a full
+        stop."""
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control and self._aims_at_control else None)

@@ -140,8 +140,10 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the present stage (`StepData`); `control`: at the present
-        state."""
+        """Set new step data in the problem for a piece of the present stage; `base`, `rate`: see `StepData`.
+
+        piece: number of the piece. control: at the present state. fading: unbalanced forces fade as it goes to 1.
+        """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._standing()[1], control)
@@ -201,17 +203,20 @@ class Execution:
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _drive(self, numbers: list[int], begun: bool) -> None:
-        """Run piece 1 of a stage in which one item is the control; `numbers`: see `Plan`; `begun`: continue the
-        piece."""
+        """Run piece 1 of a stage in which one item is the control; `begun`: continue the piece.
+
+        numbers: numbers of the controlled item and of the items that move with it.
+        """
         before, _, control = self._standing()
         if not begun:
             control = self._enter_driving(numbers)
         self._trace(self._left_to_meet(), None if begun else control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
-        """Make the amplitude of an item the control (`numbers`: see `Plan`); return the present value of the control.
+        """Set step data in which the amplitude of one item is the control; return the present value of the control.
 
-        clocked: process time passes while the control changes.
+        numbers: numbers of the controlled item and of the items that move with it. clocked: process time passes while
+        the control changes.
         """
         base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
@@ -228,9 +233,9 @@ class Execution:
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
-        """Run piece 1 of a stage in which the control is adjusted so that a quantity follows an amplitude in time.
+        """Run piece 1 of a stage in which one item is adjusted so that another quantity follows an amplitude in time.
 
-        numbers: see `Plan`; begun: continue the piece.
+        numbers: numbers of the adjusted item and of the items that move with it. begun: continue the piece.
         """
         control = None if begun else self._enter_driving(numbers, clocked=False)
         target, course, times = self._course(self.problem.setting.base[-1])
@@ -261,10 +266,9 @@ class Execution:
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _follow(self, tables: list[tuple[int, Array]], piece: int) -> None:
-        """Run pieces 1, 2, ... of a stage with tables, from knot to knot; the control is the time; `tables`: see
-        `Plan`.
+        """Run pieces 1, 2, ... of a stage with tables, each from knot to knot; the control is the process time.
 
-        piece: number of the piece to continue; 0 to begin with the first.
+        tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue, or 0.
         """
         before, _, control = self._standing()
         stage, through = self._stage, self._left_to_meet()
@@ -375,7 +379,8 @@ def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tupl
              then: float) -> tuple[list[float], list[float]]:
     """Return (base, rate) of step data between the times `now` and `then`, where the tables are straight lines.
 
-    The control is proportional to the time. The other arguments are as in `driving` and `Plan`.
+    The control is proportional to the time. The amplitudes and scales are as in `driving`. tables: [(number of the
+    item, knots (time, value), shape (n, 2))].
     """
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
