@@ -48,8 +48,8 @@ class MooneyRivlin(Material):
     .. math:: W = c_{10} (I_1 - 3) + c_{01} (I_2 - 3)
 
     Args:
-        c10: the I1 constant, stress, at lowest 0.
-        c01: the I2 constant, stress, at lowest 0 (both at lowest 0: else W falls without bound).
+        c10: the I1 constant, stress, at least 0.
+        c01: the I2 constant, stress, at least 0 (both at least 0: else W falls without bound).
 
     >>> rubber = fx.MooneyRivlin(c10=0.3, c01=0.1)
     >>> round(float(rubber.stress("uniaxial", 2.0)), 6)                            # 2 (c10 + c01/l) (l - l^-2)
@@ -64,7 +64,7 @@ class MooneyRivlin(Material):
         for name, value in constants.items():
             if finite(f"{self}: {name}", value) < 0:
                 raise InputError(f"{self} is not stable: with {name} < 0 the energy falls without bound at large"
-                                 f" stretch; {name} must be at lowest 0")
+                                 f" stretch; {name} must be at least 0")
 
     def strain_energy(self, F, c10, c01):
         I1, I2 = kinematics.invariants(F)
@@ -85,8 +85,8 @@ class Yeoh(Material):
 
     Args:
         c10: stress, greater than 0.
-        c20: stress, greater than -sqrt(3 c10 c30) (at lowest 0 if c30 is 0), so that W grows with I1 everywhere.
-        c30: stress, at lowest 0.
+        c20: stress, greater than -sqrt(3 c10 c30) (at least 0 if c30 is 0), so that W grows with I1 everywhere.
+        c30: stress, at least 0.
 
     >>> round(float(fx.Yeoh(c10=0.2, c20=0.01, c30=0.001).shear_modulus), 6)
     0.4
@@ -100,9 +100,9 @@ class Yeoh(Material):
         super().check_constants(**constants)
         c10, c20, c30 = constants.values()
         positive(f"{self}: c10", c10)
-        lowest = -math.sqrt(3 * c10 * max(c30, 0.0))
+        lowest = 0.0 - math.sqrt(3 * c10 * max(c30, 0.0))
         if c30 < 0 or c20 < 0 and c20 <= lowest:
-            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at lowest"
+            raise InputError(f"{self} is not stable: its energy does not grow with I1 everywhere; c30 must be at least"
                              f" 0 and c20 greater than -sqrt(3 c10 c30) = {lowest:.6g}")
 
     def strain_energy(self, F, c10, c20, c30):
@@ -241,7 +241,7 @@ class Ogden(Material):
     def __init__(self, *, mu: Any, alpha: Any):
         mu, alpha = _as_tuple(mu), _as_tuple(alpha)
         if len(mu) != len(alpha) or not mu:
-            raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at lowest one each")
+            raise InputError(f"Ogden: mu = {mu!r} and alpha = {alpha!r} must be as many, and at least one each")
         for exponent in alpha:
             if varying(exponent) is not None:
                 raise InputError(f"Ogden: alpha = {alpha!r}: exponents must be numbers; the mu may vary")
