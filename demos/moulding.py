@@ -128,7 +128,7 @@ def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarra
     """(reference arc length, contact pressure per current area) at the nodes of the facing side at a state."""
     with path.problem.state_context(state) as problem:
         points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
-    rest, now = getattr(profile, f"rest_{side}"), getattr(profile, side)
+    rest, now = getattr(profile, f"reference_{side}"), getattr(profile, side)
     nearest = np.hypot(*np.moveaxis(points[:, None] - rest, -1, 0)).argmin(1)
     order = np.argsort(nearest)
     at = nearest[order]
