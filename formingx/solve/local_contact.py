@@ -40,7 +40,7 @@ class LocalContact:
         few: number of changed points up to which Woodbury's formula costs less than another factorisation.
         iterations: largest number of iterations of the local solve.
         full: number of full corrections, which may cycle. Later corrections of sticking points stop near the outer edge
-            of the ramp. Others are halved where they increase the residual.
+            of the ramp. Where a point slides, corrections are halved that increase the residual.
         halved: largest number of halvings of a correction, which would stall at a kink.
         stays: part of its present depth at which a point stops that a correction would move out of the ramp.
         least: depth over the width of the ramp below which a point may leave the ramp.
@@ -254,8 +254,8 @@ class _Points:
                 return None
             new = y - found
             if k >= _LOCAL.full:
-                new, stopped = self._to_foot(ramps, y, new, behind)
-                halved = _LOCAL.halved if stopped else 0
+                new, whole = self._to_foot(ramps, y, new, behind)
+                halved = _LOCAL.halved if whole else 0
             y, by = new, y - new
         return None
 
@@ -274,14 +274,14 @@ class _Points:
                 It grows for points that enter.
 
         Returns:
-            (the stopped motions, True if a point was stopped).
+            (the stopped motions, True if the correction must not be halved: a point was stopped, or all points stick).
         """
         (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
         leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
         at = np.where(leaves, _LOCAL.stays * np.minimum(was, 1.0), np.where(enters, np.minimum(now, behind), now))
         behind[enters] *= _LOCAL.farther
         stops = (at - now)[:, None] * way
-        return new + stops.ravel(), bool(stops.any())
+        return new + stops.ravel(), bool(stops.any() or way.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
         """Return solutions V = K^-1 E, or dx/dcontrol, updated to changed stiffnesses of the points.
