@@ -72,7 +72,7 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
     """Check that a process of given stages can continue from a state.
 
     Args:
-        state: the state.
+        state: a `State` of the path.
         stages: all stages of the process.
         problem: the discretised problem.
 

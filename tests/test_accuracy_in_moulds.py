@@ -145,3 +145,15 @@ def test_a_small_nose_of_a_plug_gets_short_columns():
         fx.Contact("bottom", plug, "none", direction=(0, 1))], loads=[])
     lengths, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
     assert lengths[(middle > 2.4) & (middle < 4.0)].max() < 0.6 * lengths[middle < 1.0].max()
+
+
+def test_a_scene_tells_that_it_chose_other_elements(caplog):
+    """A log entry and `scene.mesh`; the mesh that was given stays as it was."""
+    mesh = fx.mesh.disc(radius=10.0, thickness=0.2)
+    mould = fx.Contact("top", fx.tools.cup(radius=9.0, depth=4.0, mouth=0.2, fillet=1.0, lip=0.5), "stick")
+    with caplog.at_level("INFO", logger="formingx"):
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")], contacts=[mould],
+                         supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
+    columns = [len(found.columns.ends) - 1 for found in (scene.mesh, mesh)]
+    assert columns[1] == 40 != columns[0]
+    assert f"elements chosen for the tools: {columns[0]} columns instead of 40" in caplog.text

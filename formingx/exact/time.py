@@ -243,7 +243,7 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    """Return a thin spherical balloon, with s = ln(r/R0) and p R0/H0 as load.
+    """Return a thin spherical balloon of radius R0 and thickness H0: unknown s = ln(r/R0), load p R0/H0.
 
     Args:
         c10: material constant, stress.

@@ -63,7 +63,7 @@ class Probe:
         """Return the displacement at the points in a state; the fields of the forms are restored; collective.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
 
         Returns:
             Displacement, shape (n, components), length.

@@ -115,7 +115,10 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
 
 def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coordinates: np.ndarray,
                  through: list[np.ndarray], body: Callable[[np.ndarray, list[np.ndarray]], Mesh]) -> Mesh:
-    """Return the mesh with its `Preset`; body: returns the mesh of other columns and other elements through layers."""
+    """Return the mesh with a `Preset`, from which a `Scene` makes the same body of other elements.
+
+    body: function of (ends of the columns, relative ends of elements through each layer) that returns the mesh.
+    """
     thickness = np.array([thickness_at(coordinates).max() for thickness_at in layers.values()])
     return replace(mesh, preset=Preset(accuracy, thickness, tuple(len(ends) - 1 for ends in through), lambda ends, n:
                                        body(ends, [np.linspace(0.0, 1.0, m + 1) for m in n])))

@@ -127,10 +127,10 @@ class Kinematics:
         raise NotImplementedError
 
     def rigid_modes(self, number: float) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Return the modes without strain of the deformed body.
+        """Return the rigid-body modes of the deformed body, as amplitudes of waves out of the section.
 
         Args:
-            number: number of waves; in plane strain the wave number.
+            number: circumferential wave number n; in plane strain the wave number along the depth, 1/length.
 
         Returns:
             Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3).

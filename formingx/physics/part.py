@@ -9,14 +9,14 @@ class Part:
     """Load, support or contact of a scene; each kind overrides some of the defaults.
 
     Attributes:
-        name: name in a process and in columns, or None.
+        name: name in stages of a process and in columns of results, or None.
         on: boundary on which it acts, or None.
-        driven: True if the run controls it.
+        driven: True if its quantity is the control (load parameter) of a run.
         quantity: controlled quantity, such as "pressure" or "travel", or None.
         symmetric: True if its part of the tangent is symmetric.
         direction: motion per unit of travel, (r, z) or (x, y, z); None if it does not move as a whole.
         holds_rotation: True if it also constrains the rotation.
-        described: attributes that its repr shows as text; a summary leaves out their numbers.
+        described: names of attributes that `repr` shows as text, whose numbers a summary of the scene leaves out.
     """
 
     name: str | None = None

@@ -212,7 +212,7 @@ class Problem(Stages, Units):
         """Return the volume ratio with the largest |ln J| in a state; collective.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
 
         Returns:
             The volume ratio with its reference position; None for a membrane.
@@ -224,7 +224,7 @@ class Problem(Stages, Units):
         """Return the root mean square of J - 1 in a state over the elements far from given positions; collective.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
             places: reference positions, shape (k, 2), length.
             distance: elements with a quadrature point nearer to one of the positions are left out, length.
 

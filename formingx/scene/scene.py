@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
@@ -27,6 +28,8 @@ from .sampling import sample
 from .summary import summary
 from .symmetry import NO_PLANES, MirrorPlanes, mirror_planes
 from .temperature import Expansion, GivenTemperature
+
+log = logging.getLogger("formingx")
 
 _HIGHEST = 30
 """Largest degree of a quadrature: higher degrees are mistakes, and their points would fill the memory."""
@@ -56,7 +59,8 @@ class Scene:
         preformed: deformation transferred from another mesh (`trace(remesh=)`).
 
     Attributes:
-        mesh: the mesh.
+        mesh: mesh of the body. If `accuracy` chose the elements of the given mesh, and a tool touches the body, it is a
+            mesh with other elements, see `formingx.mesh.disc`.
         materials: {layer name: material}.
         supports: list of supports.
         loads: list of loads.
@@ -114,7 +118,11 @@ class Scene:
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
                              f" in space ThreeD()")
         if preformed is None:
-            self.mesh = mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
+            self.mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
+            if self.mesh is not mesh:
+                log.info("elements chosen for the tools: %d columns instead of %d",
+                         *(len(found.columns.ends) - 1 for found in (self.mesh, mesh) if found.columns is not None))
+            mesh = self.mesh
         usual = 1 if in_space else 5
         self.quadrature_degree = count("Scene: quadrature_degree",
                                        usual if quadrature_degree is None else quadrature_degree)

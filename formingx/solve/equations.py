@@ -251,7 +251,7 @@ class Residual(Protocol):
         """Compute in `out` the vector for which out . b = inner(a, b) for every b."""
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if an element is inverted at (x, control), which F alone may not show."""
+        """Return True if an element is inverted at (x, control): the residual may be finite there all the same."""
         return False
 
     def viscosity(self) -> Viscosity:

@@ -164,7 +164,7 @@ class Execution:
         self.record.complete_step(StepControl(), changed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
-        """Follow the path of the present piece until its last target is met; return the pairs with targets still open.
+        """Follow the path until the last target is met, with one control throughout; return the pairs of open targets.
 
         targets: pairs (target, output quantity). control: at the present state, where the piece starts; None: continue
         a piece. requested: another target that ends the piece.

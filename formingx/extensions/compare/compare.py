@@ -219,7 +219,7 @@ def _table(side: str, given: Any) -> csv_files.Table:
 
 
 def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[str, str]:
-    """Return {our name: their name}, checked."""
+    """Return {column of left: column of right} to compare: the given pairs, else columns of equal name; checked."""
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
         pairs = {c: c for c in shared[:2]}

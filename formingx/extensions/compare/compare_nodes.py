@@ -91,7 +91,7 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
     For a sheet in three dimensions the columns are node, X, Y, u_x, u_y, u_z.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: path of the CSV file.
         state: a state of the path; default: the last.
         mesh: a text mesh file (`formingx.mesh.Grid`) that gives the nodes and their numbers. Default: the run's own
@@ -116,7 +116,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     """Compare a state with another program's nodal displacements, at its nodes; the meshes may differ.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node. For a sheet in three
             dimensions u_x, u_y, u_z and X, Y.
         state: a state of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.

@@ -99,7 +99,7 @@ class MeasuredWall:
         """Return the wall of the last state of a path at the measured points.
 
         Args:
-            path: the path.
+            path: the computed `Path`.
 
         Returns:
             Wall, shape (m,), length.
@@ -114,7 +114,7 @@ class MeasuredWall:
         """Compare the wall of the last state of a path with the measured one; collective.
 
         Args:
-            path: the path.
+            path: the computed `Path`.
 
         Returns:
             The comparison.

@@ -65,7 +65,7 @@ class _StateTransfer:
                 raise Failure(f"parameter {entry.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
-        """Carry the perturbed runs from the first state to the last."""
+        """Repeat the steps of the base run with each parameter slightly changed, from its first state to its last."""
         states = self.path.states
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):

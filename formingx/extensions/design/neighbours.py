@@ -107,7 +107,7 @@ class PerturbedRun:
         return np.array(self.F.array_r)
 
     def balance(self, left_over: np.ndarray) -> None:
-        """Set the contact forces to the reactions of the body.
+        """Set the contact forces of the perturbed run so that they balance the internal forces of its body.
 
         The gaps of the perturbed run are below round-off, so its contact law gives no useful force.
 

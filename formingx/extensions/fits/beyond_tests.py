@@ -49,7 +49,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
     """Find parts of the body whose last deformation the tests of its material do not cover; collective.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
 
     Yields:
         Findings.

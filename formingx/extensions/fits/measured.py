@@ -73,7 +73,7 @@ def _columns(caller: str, head: list[str]) -> list[int]:
 
 
 def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
-    """Return the name of the test in a row."""
+    """Return the kind of test ("uniaxial", ...) that a row of the file names, checked."""
     if len(row) != width or len(columns) not in (3, 4):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")

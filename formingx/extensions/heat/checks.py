@@ -152,7 +152,7 @@ def were_beyond_limits(path: Any) -> Iterator[Finding]:
     """Find temperatures of the run at which a constant is unknown, unless an earlier check has found them.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
 
     Yields:
         A finding for each such constant.
@@ -201,7 +201,7 @@ def temperature_errors(path: Any) -> Iterator[Finding]:
     """Find discretisation errors of the temperature in states of the last mesh; collective.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
 
     Yields:
         A finding if the mesh is too coarse.

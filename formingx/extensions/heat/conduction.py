@@ -109,10 +109,10 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the present state, with prescribed values at fixed faces.
+        """Return the temperatures at the start of a time step, with prescribed values at fixed faces.
 
         Returns:
-            [T, *lines], locally owned entries.
+            [T of the nodes of the body, temperatures along the line into each tool, ...], locally owned entries.
         """
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 

@@ -70,7 +70,7 @@ class Preformed(NamedTuple):
 
         Args:
             problem: the `Problem`.
-            state: the state.
+            state: a `State` of the path.
 
         Returns:
             The data.

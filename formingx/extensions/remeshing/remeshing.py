@@ -109,7 +109,7 @@ class Remesh(RunExtension):
         """Set up the remeshing of a path (`formingx.run_hooks.RunExtension`).
 
         Args:
-            path: the path.
+            path: the computed `Path`.
         """
         path.record.hooks.renew = functools.partial(_follow, path, self, path.record.curve.newton.tolerances)
 

@@ -15,10 +15,10 @@ _SHARE = 1e-3              # of the sheet's area in compression
 
 @register("end")
 def compressed(path: Any) -> Iterator[Finding]:
-    """Find a membrane in compression without a relaxed energy; collective.
+    """Warn of a membrane in compression whose material has no relaxed energy (tension field); collective.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
 
     Yields:
         A finding if there is compression.

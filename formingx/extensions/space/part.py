@@ -136,7 +136,7 @@ def filling(path: Any, contact: Any) -> FillingInSpace:
     """Return the filling of a tool; see `Path.filling`.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         contact: the `FaceContact`.
 
     Returns:

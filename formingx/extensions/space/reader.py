@@ -21,7 +21,7 @@ class SheetReader:
     """Reader of a sheet in three dimensions (`formingx.results.reader.Reader`).
 
     Args:
-        path: the path.
+        path: the computed `Path`.
     """
 
     def __init__(self, path: Path):
@@ -31,7 +31,7 @@ class SheetReader:
         """Return the wall of a state for each triangle.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
 
         Returns:
             The wall.
@@ -42,7 +42,7 @@ class SheetReader:
         """Return the whole part of a state as numbers.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
             density: density in g/cm3, or None.
             trim: see `Path.part`.
             heights: see `Path.part`.
@@ -69,7 +69,7 @@ class SheetReader:
 
         Args:
             file: path of the PNG file.
-            state: the state.
+            state: a `State` of the path.
             grid: size of the squares, length, or None.
         """
         show.view(self._path, state, file, grid)
@@ -78,7 +78,7 @@ class SheetReader:
         """Return the surface of the whole part with its wall.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
 
         Returns:
             Points, triangles and wall ratios, see `show.solid`.

@@ -30,11 +30,11 @@ _LARGEST_TOOL = 20_000
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
-    """Draw the whole part of a state, coloured by its wall, as PNG (rank 0 draws).
+    """Draw the part at a state, completed by mirror images and coloured by wall thickness, as PNG (rank 0 draws).
 
     Args:
-        path: the path.
-        state: the state.
+        path: the computed `Path`.
+        state: a `State` of the path.
         file: path of the PNG file.
         grid: size of the squares of a grid printed on the flat sheet, length, or None.
 
@@ -71,8 +71,8 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Half of the wall lies on each side of the mid-surface, along the normals at the nodes.
 
     Args:
-        path: the path.
-        state: the state.
+        path: the computed `Path`.
+        state: a `State` of the path.
 
     Returns:
         Points, shape (n, 3), length; triangles that look outward, shape (m, 3); wall ratios at the points, shape (n,).
@@ -111,7 +111,7 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
     S3 with its wall as section thickness; the material must be added.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: path of the file.
         state: the state; default the last.
     """
@@ -132,7 +132,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     """Write the report of a run in three dimensions; see `Path.report`.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: path of the file.
         title: heading of the page.
         failure: failure of the run, or None.

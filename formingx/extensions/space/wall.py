@@ -217,8 +217,8 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
     """Return the wall in a state, in an order of nodes and triangles that does not depend on ranks; collective.
 
     Args:
-        path: the path.
-        state: the state.
+        path: the computed `Path`.
+        state: a `State` of the path.
 
     Returns:
         The wall.

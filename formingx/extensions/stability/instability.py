@@ -26,7 +26,7 @@ class CriticalPoint:
     """Point of a path at which one mode becomes unstable, or stable again.
 
     Attributes:
-        path: the path.
+        path: the computed `Path`.
         found: the located point, see `Located`.
         number: circumferential wave number n, cos(n theta); in plane strain the wave number along the depth, 1/length.
         flipped: name of the symmetry plane under which the mode is antisymmetric, or None.

@@ -101,7 +101,7 @@ class _Look(NamedTuple):
 
     Attributes:
         fraction: position between the two states, from 0 to 1.
-        state: the state.
+        state: a `State` of the path.
         unstable: number of unstable modes.
         values: eigenvalues nearest to 0, ascending, dimensionless.
         modes: their modes, locally owned entries.
@@ -137,7 +137,7 @@ class Modes:
         """Return the number of unstable modes with a wave number and symmetry.
 
         Args:
-            state: the state.
+            state: a `State` of the path.
             kind: wave number and symmetry.
 
         Returns:

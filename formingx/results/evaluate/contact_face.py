@@ -121,7 +121,7 @@ def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
     """Return the contacts of a tool.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         tool: name of the tool, the `Tool` or a `Contact`; None if there is only one.
         caller: name of the calling method, for the message.
 

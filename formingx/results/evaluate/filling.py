@@ -87,7 +87,7 @@ def filling(path: Any, contact: Any) -> Filling:
     """Return the filling of the corners of a tool (`Path.filling`).
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         contact: the `FaceContact` of the tool.
 
     Raises:

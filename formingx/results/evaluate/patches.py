@@ -46,7 +46,7 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Return the coefficients of the fitted cubics, shape (m, 10, k).
+        """Return the coefficients of the cubics that are fitted to values around each of m nodes, shape (m, 10, k).
 
         Args:
             values: values at the quadrature points of all cells, shape (n, q, k).

@@ -92,7 +92,7 @@ def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
 
 
 def _mesh(problem: Any) -> dict[str, Any]:
-    """Return counts and sums of the mesh."""
+    """Return numbers by which a checkpoint recognises its mesh: counts, extent and weighted sums of coordinates."""
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
     x = of_cells(domain, owned)[..., :COORDINATES] / problem.forms.length

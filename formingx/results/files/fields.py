@@ -43,7 +43,7 @@ class Fields:
     """Computes fields of the states of a path at the nodes of all cells.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
 
     Attributes:
         points: reference positions of the nodes of this rank's cells, shape (cells, nodes, components), length.
@@ -126,7 +126,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
     """Write fields of states as VTU files, and a PVD file that lists their times (`Path.to_vtk`).
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: its name ends in .pvd.
         states: a state, several in order, or "all"; default the last.
 

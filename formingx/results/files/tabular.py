@@ -17,7 +17,7 @@ def write_path(path: Any, file: Any, units: Units = NONE) -> None:
     """Write one row per state: stage (of a process), kind, iterations, then every column of the path.
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: its name ends in .csv.
         units: units for the header; in plane strain per unit depth.
     """

@@ -23,7 +23,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
     """Draw the animation of a path (`Path.animate`).
 
     Args:
-        path: the path.
+        path: the computed `Path`.
         file: its name ends in .gif or .mp4.
         frames: number of frames.
         seconds: duration, s.
