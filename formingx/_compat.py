@@ -84,7 +84,7 @@ def _compiled_here(compiled: Any) -> Any:
 
 
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
-    """(mesh, cell tags, facet tags), distributed, of arrays on rank 0 (elsewhere: of length 0).
+    """Return (mesh, cell tags, facet tags), distributed, from arrays on rank 0 (of length 0 on other ranks).
 
     Args:
         cells, edges: indices of points, shapes (m, 3 or 6) and (k, 2 or 3), as DOLFINx orders them; a tag for each.
@@ -124,7 +124,7 @@ def assemble_vector(vector: Any, form: Any) -> Any:
 
 
 def interpolation_points(space: Any) -> Any:
-    """Points of the reference cell where a function space looks at what it interpolates, shape (n, 2)."""
+    """Return the points of the reference cell where a space evaluates a function to interpolate it, shape (n, 2)."""
     points = space.element.interpolation_points
     return points() if callable(points) else points
 
@@ -136,12 +136,12 @@ def coordinate_map(mesh: Any) -> Any:
 
 
 def cell_nodes(mesh: Any) -> Any:
-    """Numbers of the points (rows of `geometry.x`) of the cells, shape (cells, nodes of a cell)."""
+    """Return the indices of the points (rows of `geometry.x`) of the cells, shape (cells, nodes of a cell)."""
     geometry = mesh.geometry
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
 
 
 def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
-    """Bounding boxes of cells (local numbers)."""
+    """Return the tree of bounding boxes of cells (local indices), each enlarged by `padding`, length."""
     from dolfinx import geometry
     return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)

@@ -13,7 +13,11 @@ _FOLDER = Path(__file__).parent / "extensions"
 
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
-    """Skip the rest of the block if it needs an extension whose folder is missing."""
+    """Skip the rest of the block if it needs an extension whose folder is missing.
+
+    Raises:
+        ModuleNotFoundError: another module is missing.
+    """
     try:
         yield
     except ModuleNotFoundError as error:

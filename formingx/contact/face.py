@@ -342,7 +342,7 @@ class FaceContact:
         self._take(Memory(touch, arrived, penalty))
 
     def let_go(self, fields: np.ndarray, control: float) -> bool:
-        """Separate the points under tension from a tool in three dimensions; return True if any did. Collective."""
+        """Return True if points under tension were separated from a tool in three dimensions; collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         touch, x = self._memory.touch, self.positions(fields, control)

@@ -21,7 +21,10 @@ class Axes(Protocol):
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """(figure, axes, row by row) with `columns` plots side by side, widths in `ratios`; saving needs no screen."""
+    """Return (figure, axes, row by row) with `columns` plots side by side, of width ratios `ratios`.
+
+    The figure is saved without a screen.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from .notebook import ShownAxes, ShownFigure

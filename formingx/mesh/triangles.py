@@ -43,6 +43,9 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
         mesh: the mesh.
         point: reference coordinates, shape (2,), length, equal on all ranks; in three dimensions (x, y).
         layer: name of the layer, if known.
+
+    Returns:
+        The place.
     """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
