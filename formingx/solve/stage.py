@@ -25,6 +25,7 @@ class Stage:
 
     Process time is 0 at the start of the process. It passes in stages with a table, a speed or a duration; other stages
     are instantaneous.
+
     Args:
         name: name of the stage in the record of the run.
         control: the load, support or contact whose amplitude the stage varies, itself or its name.
