@@ -100,11 +100,10 @@ def test_notebook(file, tmp_path):
 
 def test_messages_are_quoted_as_they_are():
     """Phrases of the tables of errors.md, but those of the first, which are Python's own, are said by the package."""
-    said = ""
-    for file in (ROOT / "formingx").rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text())):
-            parts = node.values if isinstance(node, ast.JoinedStr) else [node]
-            said += "".join(str(part.value) for part in parts if isinstance(part, ast.Constant)) + "\n"
+    nodes = (node for file in (ROOT / "formingx").rglob("*.py") for node in ast.walk(ast.parse(file.read_text()))
+             if isinstance(node, ast.JoinedStr | ast.Constant))
+    said = "\n".join("".join(str(part.value) for part in getattr(node, "values", [node])
+                             if isinstance(part, ast.Constant)) for node in nodes)
     tables = (DOCS / "errors.md").read_text().split("the message says |")[2:]
     rows = [row for table in tables for row in table.splitlines() if row.startswith("| ")]
     quoted = [re.sub(r"\(.*?\)", "", row.split(" | ")[0][2:]) for row in rows]
