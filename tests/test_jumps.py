@@ -1,6 +1,7 @@
 """Where there is no state nearby to go on to: jumps to the next one."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from formingx import tools
 from formingx.contact.face import FaceContact
 from formingx.results.evaluate import snaps
 from formingx.results.show import plots
+from formingx.solve.newton import fixed
 from formingx.solve.path_following import PathFollowing, Run
 from formingx.solve.snap_through import SnapThrough
 
@@ -278,3 +280,14 @@ def test_pictures_and_reports_mark_jumps(balloon, tmp_path):
     assert [list(line.get_xdata()) for line in marks] == [[s.measures["pressure"] for s in path.jumps]]
     fx.report([path], tmp_path / "report.html")
     assert f"{len(path.jumps)} jump" in (tmp_path / "report.html").read_text()
+
+
+def test_a_jump_that_is_solved_again_keeps_its_lost_work():
+    """As where points separate after it; the target, the kind and the sense of the tangent stay, too."""
+    path = fx.trace(Balloon().scene(), until=fx.pole_stretch(1.5), progress=False)
+    curve, (*_, old, last) = path.segments[-1].curve, path.states
+    jumped = replace(last, kind="jump", jump={"dissipated": 0.5}, direction=-last.direction, slope=-last.slope)
+    found = curve.solve_again(jumped, fixed(jumped.control), old)
+    assert (found.kind, found.jump, found.met) == ("jump", jumped.jump, last.met)
+    assert found.slope == pytest.approx(jumped.slope, rel=1e-4) and found.direction @ jumped.direction > 0
+    assert found.control == last.control and np.allclose(found.x, last.x, atol=1e-12)

@@ -1,5 +1,7 @@
 """Signed distance and normal of every tool against brute force; what a profile may not be."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -318,11 +320,18 @@ def test_no_compiler(tmp_path, monkeypatch):
     from formingx import _jit
     from formingx.tools import nearest
     monkeypatch.setattr(_jit, "_compiler", lambda: ("false",))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(_jit.jit, "get_options", lambda: {"cache_dir": tmp_path})
     with pytest.raises(RuntimeError, match="the C compiler failed, with status 1: false"):
         nearest._compiled.__wrapped__()
+    def interrupted(command, code):
+        Path(command[-1]).write_text("half of a library")
+        raise KeyboardInterrupt
+    with monkeypatch.context() as patch:
+        patch.setattr(_jit, "compile_c", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            nearest._compiled.__wrapped__()
     monkeypatch.setattr(_jit, "_compiler", lambda: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(RuntimeError, match="the C compiler cannot be run"):
         nearest._compiled.__wrapped__()
-    assert not list((tmp_path / "fenics").rglob("*.so"))
+    assert [file for file in tmp_path.rglob("*") if file.is_file()] == []
