@@ -32,8 +32,9 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     Returns:
         Pairs (state before the branch point, state after it).
     """
-    problem = curve.problem
-    solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
+    if _needs_no_sign(curve, states):
+        return _turns(curve, states)
+    solver = DirectSolver(curve.problem.matrix, curve.problem.symmetric, determinant=True)
     found = branches(curve, states, determinant_sign(curve, solver))
     solver.destroy()
     return found
@@ -51,11 +52,14 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
     Returns:
         Pairs (state before the branch point, state after it).
     """
-    if any(state.orientation for state in states):
+    if _needs_no_sign(curve, states):
         return _turns(curve, states)
-    if curve.problem.has_history:
-        return []
     return _changes(states[1 if curve.problem.slack_at_rest else 0:], sign)
+
+
+def _needs_no_sign(curve: Curve, states: Sequence[State]) -> bool:
+    """Return True if the states tell all branch points: they have orientations, or a history, which allows none."""
+    return curve.problem.has_history or any(state.orientation for state in states)
 
 
 def warn_of_branches(record: Any, step: Sequence[State]) -> None:
