@@ -1,4 +1,4 @@
-"""Public calls with arguments of another kind, or number, than they take: an InputError that says what they take.
+"""Errors of public calls with arguments of a wrong kind or number: an InputError that names the allowed ones.
 
 A call that fails is explained: its arguments are compared with its signature and its annotations. Each function
 checks the values itself (`errors.py`). Calls by a user are explained. Methods that the solver calls during a run stay
@@ -37,7 +37,7 @@ _seen: set[type] = set()     # classes whose methods are explained
 
 
 class _WrongCall(InputError, TypeError):
-    """Whoever looks for a `TypeError`, as code of Python does, finds it."""
+    """`InputError` that is also a `TypeError`, which Python raises for a wrong call."""
 
     __module__, __qualname__ = InputError.__module__, "InputError"
 
@@ -82,7 +82,7 @@ def _explain_methods(cls: type) -> None:
 
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
-    """`call`, whose first `skip` arguments are the object's own, or its class's."""
+    """Return `call`, explained if it fails; `skip`: number of leading arguments that are the object or its class."""
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
 

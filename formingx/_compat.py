@@ -105,10 +105,16 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
     return domain, marks[0], marks[1]
 
 
-def assemble_matrix(matrix: Any, form: Any, bcs: Any, held: float = 1.0) -> None:
-    """Add a compiled form's entries to a PETSc matrix, but for the rows and columns that `bcs` hold: these get `held`
-    on the diagonal, else nothing."""
-    fem_petsc.assemble_matrix(matrix, form, bcs, held)  # type: ignore[misc]  # types of another variant
+def assemble_matrix(matrix: Any, form: Any, bcs: Any, diagonal: float = 1.0) -> None:
+    """Add the entries of a compiled form to a PETSc matrix.
+
+    Args:
+        matrix: the matrix.
+        form: the compiled form.
+        bcs: boundary conditions; nothing is added in the rows and columns of constrained unknowns.
+        diagonal: entry on the diagonal of constrained unknowns.
+    """
+    fem_petsc.assemble_matrix(matrix, form, bcs, diagonal)  # type: ignore[misc]  # types of another variant
 
 
 def assemble_vector(vector: Any, form: Any) -> Any:

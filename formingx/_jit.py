@@ -55,10 +55,11 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
     Args:
         items: forms or (expression, points), by their `key`.
-        jit_options: options of the C compiler and of the cache; form_options: of FFCx.
+        jit_options: options of the C compiler and of the cache.
+        form_options: options of FFCx.
 
     Returns:
-        For each item the object of FFCx, a module with its `ffi`, and an empty (declaration, implementation).
+        {key: (object of FFCx, namespace with `ffi` and `library`, (None, None))}, as DOLFINx's `ffcx_jit` returns it.
 
     Raises:
         RuntimeError: the compiler failed, or on other ranks than 0: FFCx refused an item.
@@ -84,9 +85,9 @@ def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], j
     found = {name: _loaded(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
         folder = _writable(folder)
-        with _locked(folder, next(name for name, one in found.items() if not one)):
-            found = {name: one or _loaded(ffi, name, items[name], folder) for name, one in found.items()}
-            missing = {name: items[name] for name, one in found.items() if not one}
+        with _locked(folder, next(name for name, loaded in found.items() if not loaded)):
+            found = {name: loaded or _loaded(ffi, name, items[name], folder) for name, loaded in found.items()}
+            missing = {name: items[name] for name, loaded in found.items() if not loaded}
             if missing:
                 _build(missing, folder, jit_options, form_options)
         found |= {name: _loaded(ffi, name, item, folder) for name, item in missing.items()}

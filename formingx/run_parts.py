@@ -25,7 +25,7 @@ log = logging.getLogger("formingx")
 
 
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
-                 run: Callable[[Scene, Any], Path]) -> Path:
+                        run: Callable[[Scene, Any], Path]) -> Path:
     """Return the path of a run on the mesh that is adapted to a first run.
 
     Args:
@@ -90,7 +90,7 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 
 
 def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
-          found: list[Finding], timed: bool = False) -> Path:
+             found: list[Finding], timed: bool = False) -> Path:
     """Return a new path that begins with the states of another path, or with a state.
 
     Args:

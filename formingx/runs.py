@@ -121,7 +121,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     with run_errors(checkpoint) as register:
         problem = Problem(scene) if start is None else start.problem
         path = register(new_path(Curve(problem, tolerances or Tolerances()), start, record, allow_inadmissible,
-                             before_run(scene, [*intermediate, until])))
+                                 before_run(scene, [*intermediate, until])))
         write_checkpoints(path, checkpoint)
         for extension in filter(None, (remesh, stop_at)):
             extension.attach(path)

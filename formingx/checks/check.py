@@ -39,7 +39,7 @@ class Report:
 
 
 def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
-           units: Units = NONE) -> Report:
+          units: Units = NONE) -> Report:
     """Check a scene before its run; nothing is compiled or solved; collective.
 
     The check covers:

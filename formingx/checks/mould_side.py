@@ -46,13 +46,13 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
     Returns:
         The distances, shape (n,), length; infinity beyond `limit`.
     """
-    gone = np.zeros(len(points))
-    for _ in range(1000):                                    # the distance to the tool is a safe advance
-        free = -tool.signed_distance(points + gone[:, None] * directions)
-        if not np.any((free > 1e-6 * limit / 100) & (gone < limit)):
+    distance = np.zeros(len(points))
+    for _ in range(1000):                                    # the gap to the tool is a safe advance
+        gap = -tool.signed_distance(points + distance[:, None] * directions)
+        if not np.any((gap > 1e-6 * limit / 100) & (distance < limit)):
             break
-        gone = np.minimum(gone + np.maximum(free, 0.0), limit)
-    return np.where(gone < limit, gone, np.inf)
+        distance = np.minimum(distance + np.maximum(gap, 0.0), limit)
+    return np.where(distance < limit, distance, np.inf)
 
 
 def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

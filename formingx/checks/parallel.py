@@ -22,8 +22,8 @@ def unknowns(scene: Scene) -> int:
     pressure, components = scene.model.pressure if scene.model.solid else None, scene.kinematics.components
     if pressure is None:
         return int(components * (vertices + edges))
-    per_field = vertices if pressure.continuous else cells * (1 + 2 * pressure.degree)
-    return int(components * (vertices + edges + cells * pressure.bubble) + per_field)
+    pressures = vertices if pressure.continuous else cells * (1 + 2 * pressure.degree)
+    return int(components * (vertices + edges + cells * pressure.bubble) + pressures)
 
 
 @register("start")

@@ -111,7 +111,7 @@ def _fillets(body: Body) -> Iterator[Finding]:
         if length < _ELEMENTS_PER_FILLET * edge:
             need = int(np.ceil(total * _ELEMENTS_PER_FILLET * edge / length))
             middle = smallest.centre + smallest.radius * np.array([np.cos(smallest.start + smallest.sweep / 2),
-                                                             np.sin(smallest.start + smallest.sweep / 2)])
+                                                                   np.sin(smallest.start + smallest.sweep / 2)])
             yield Finding("warning", repr(contact), f"its fillet of radius {smallest.radius:.4g} at (R, Z) ="
                           f" ({middle[0]:.4g}, {middle[1]:.4g}) is {length:.3g} long, {length / edge:.2g} elements of"
                           f" the face ({edge:.3g} each): use {need} or more elements along it, or a larger fillet")

@@ -25,7 +25,7 @@ Found = Iterator[Finding]
 _LARGEST_PRESSURE = 100.0  # pressure over shear modulus that fills every corner
 _SMALLEST_PRESSURE = 1e-4  # pressure over shear modulus x thickness / length that has no effect
 _ABOVE_PEAK = 1.1          # pressure over the maximum of a cap (3 % below the one of a disc)
-_PRESSURE_DROP = 0.8       # pressure at the mould over the peak pressure of a tube (tests/test_check.py)
+_REMAINING_PRESSURE = 0.8  # lowest pressure beyond the limit point of a tube over its maximum (tests/test_check.py)
 _BLOW_RATIO = 8.0          # largest blow ratio of bottles
 _MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
 _WIDTH_RATIO = 4.0         # width of a sheet over its mould, or the inverse, that suggests different units
@@ -176,15 +176,15 @@ class PressurisedFace:
         blown = Inflated(self._layers(), self.radius)
         return first_peak(blown.tube if self.tall else blown.disc)
 
-    def pressure_drop(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the drop of the pressure of a free tube behind its limit point.
+    def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
+        """Return the lowest pressure of a free tube beyond its limit point, relative to the limit point.
 
         Args:
             blow_ratio: largest stretch of the tube, mould over parison radius.
 
         Returns:
-            The smallest pressure between the limit point and the blow ratio, over the pressure at the limit point, and
-            the state there. None if there is no limit point below the blow ratio.
+            The lowest pressure between the limit point and the blow ratio over the pressure at the limit point, and
+            the state at the limit point. None if there is no limit point below the blow ratio.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -249,7 +249,7 @@ def _blow_ratio(body: Body) -> Found:
                           f"the parison of radius {body.format(face.radius, 'travel')} is blown up"
                           f" {ratio:.3g}-fold in this mould: are the units of length the same (mm and"
                           f" cm)?")
-        elif (found := face.pressure_drop(ratio)) is not None and found[0] < _PRESSURE_DROP:
+        elif (found := face.remaining_pressure(ratio)) is not None and found[0] < _REMAINING_PRESSURE:
             yield Finding("warning", "materials",
                           f"a tube of {_names(body)} has its largest pressure,"
                           f" {body.format(found[1].pressure, 'pressure')}, at a blow ratio of"
@@ -350,9 +350,9 @@ def _tool_paths(body: Body) -> Found:
                           f" (moved), turn its way, or let it travel farther")
 
 
-def _gap(faces: list[tuple[Tool, np.ndarray]], moves: Any, travel: float) -> float:
+def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) -> float:
     """Return the smallest gap between tools and nodes of their faces after a travel along a direction, length."""
-    return min(float(-tool.signed_distance(nodes - travel * np.array(moves)).max()) for tool, nodes in faces)
+    return min(float(-tool.signed_distance(nodes - travel * np.array(direction)).max()) for tool, nodes in faces)
 
 
 @register("scene")

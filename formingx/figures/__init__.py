@@ -16,14 +16,17 @@ class Axes(Protocol):
         """Draw a line."""
 
     def set(self, **properties: Any) -> Any:
-        """Labels, titles, limits."""
+        """Set labels, title and limits."""
 
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return (figure, axes, row by row) with `columns` plots side by side, of width ratios `ratios`.
+    """Return an empty figure and its axes, row by row (a single one as itself); it is saved without a screen.
 
-    The figure is saved without a screen.
+    Args:
+        columns, rows: numbers of plots.
+        width, height: size of one plot, inches.
+        ratios: relative widths of the columns; default equal.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -61,9 +64,13 @@ class _LoadedWhenUsed(types.ModuleType):
 
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
-    """Rigid tools, as far as they reach into the box from `low` to `high`, (r, z); their solid grey.
+    """Draw rigid tools in grey, as far as they reach into a box.
 
-    placed: [(tool, its shift (r, z))]; mirror: with their mirror images at r = 0.
+    Args:
+        axes: matplotlib axes.
+        placed: [(tool, its shift (r, z))].
+        low, high: corners (r, z) of the box, length.
+        mirror: True to draw their mirror images at r = 0, too.
     """
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)

@@ -57,7 +57,7 @@ class Formulation(BodyModel):
         control: `Constant` of the dimensionless control.
         time: process time, a function of the control (UFL scalar, time).
         scales: for every item of the scene, its value (pressure, travel, ...) in the user's units over its amplitude
-            (`Setting`); the last entry, 1, belongs to the time.
+            (`StepData`); the last entry, 1, belongs to the time.
         control_scale: scale of the only controlled item, or L.
         terms: the `MaterialTerms` of each material of the scene.
         histories: arguments of the forms besides fields, control and time (`History`).
@@ -403,7 +403,7 @@ class Formulation(BodyModel):
         """Set loads, elastic supports and process time from step data.
 
         Args:
-            setting: the `Setting`.
+            setting: the `StepData`.
         """
         for support, present in self.elastic_supports:
             present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))

@@ -23,7 +23,7 @@ class Viscosity:
 
     def __init__(self, form: Any, bcs: list):
         self._matrix = fem_petsc.create_matrix(form)
-        _compat.assemble_matrix(self._matrix, form, bcs, held=0.0)
+        _compat.assemble_matrix(self._matrix, form, bcs, diagonal=0.0)
         self._matrix.assemble()
         self._change, self._forces = self._matrix.createVecs()
         self._rows = np.arange(*self._matrix.getOwnershipRange(), dtype=PETSc.IntType)

@@ -35,7 +35,8 @@ class _View:
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
         self.columns |= standard_columns.own(problem, columns, self.columns)
-        self.profiles, self.stresses, self.verdict = Profiles(problem), Stresses(problem), AdmissibilityCheck(problem)
+        self.profiles, self.stresses = Profiles(problem), Stresses(problem)
+        self.admissibility = AdmissibilityCheck(problem)
 
 
 class States:
@@ -57,7 +58,7 @@ class States:
         self._views = {} if views is None else views         # by id(problem)
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
-        record.judge = lambda state: self._view(record.segments[-1]).verdict.of(state)
+        record.judge = lambda state: self._view(record.segments[-1]).admissibility.of(state)
 
     @property
     def segments(self) -> list[Segment]:
@@ -306,7 +307,7 @@ class States:
         return list(np.array(rows).T)
 
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
-        """Return rows of columns between the states of one stage, from behind the first to the last."""
+        """Return rows of columns of one stage, after its first state to its last."""
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns
         arc_lengths = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
@@ -407,7 +408,7 @@ class States:
     @property
     def admissibility(self) -> AdmissibilityCheck:
         """Admissibility check of the states of the last segment."""
-        return self._view(self.segments[-1]).verdict
+        return self._view(self.segments[-1]).admissibility
 
     def _view(self, segment: Segment) -> _View:
         """Return the evaluation objects of a segment's problem."""

@@ -69,7 +69,7 @@ class Stage:
         caller = self.who = f"Stage {name!r}"
         self.name, self.control, self.until = name, control, until
         self.intermediate = several(f"{caller}: intermediate", intermediate, "targets, such as pole_stretch(3)")
-        self.inactive = several(f"{caller}: inactive", inactive, "things of the scene")
+        self.inactive = several(f"{caller}: inactive", inactive, "items of the scene")
         known(f"{caller}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
         self.at_limit_point = at_limit_point
         self.step = instance(f"{caller}: step", step, StepControl | None, "a StepControl or None")
@@ -251,8 +251,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     for number in numbers:
         item = scene.items[number]
         if not item.driven:
-            raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a Displaced support, or"
-                             f" a Contact that moves can")
+            raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a PrescribedDisplacement"
+                             f" support, or a Contact that moves can")
         if number in off and item.direction is None:                  # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):

@@ -71,8 +71,8 @@ class Table:
         return PchipInterpolator(self.x, self.y)
 
     def _expression(self, x: Any) -> Any:
-        # as UFL constants: tables with as many points share one compiled form
         """Return the curve as a UFL expression."""
+        # as UFL constants: tables with as many points share one compiled form
         domain = ufl.domain.extract_unique_domain(x)
         slopes = self._curve.derivative()(self.x[[0, -1]])
         ends = fem.Constant(domain, np.array([self.x[[0, -1]], self.y[[0, -1]], slopes]).T.copy())

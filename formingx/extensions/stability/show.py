@@ -20,8 +20,8 @@ def draw(loss: Any, file: Any, scale: float) -> None:
         file: path of the PNG file.
         scale: largest amplitude of the mode over the size of the body.
     """
-    file = files.named("Loss.view3d", file, ".png")
-    scale = positive("Loss.view3d: scale", scale)
+    file = files.named("CriticalPoint.view3d", file, ".png")
+    scale = positive("CriticalPoint.view3d: scale", scale)
     lines, comm = _outline(loss), loss.path.problem.comm
     files.on_root(comm, lambda: _draw(loss, lines, file, scale))
 

@@ -111,7 +111,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
                 ("RZ"[coordinate], float(profile.reference_bottom[k, coordinate])), float(wall.wall[k] / mean),
                 float(np.sqrt(spread) / average), weight, walls_at, float(1 - sums[0] / volume.sum()),
-                images * _content(wall, inside, axisymmetric), basis, units)
+                images * _capacity(wall, inside, axisymmetric), basis, units)
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
@@ -139,7 +139,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
     return inside
 
 
-def _content(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
+def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     """Return the volume inside the inner face, over the strips between nodes that belong to the part, length^3."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):

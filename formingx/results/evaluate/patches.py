@@ -46,7 +46,7 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Return the coefficients of the cubics that are fitted to values around each of m nodes, shape (m, 10, k).
+        """Return the coefficients of the cubics fitted to values on the patches of the m cells, shape (m, 10, k).
 
         Args:
             values: values at the quadrature points of all cells, shape (n, q, k).
@@ -87,7 +87,7 @@ class Patches:
         """Return the ten monomials of a cubic for some of the patches, shape (cells, ..., 10).
 
         Args:
-            some: numbers of the patches.
+            chunk: slice of the patches.
             points: points of each patch, shape (cells, ..., 2).
         """
         between = (slice(None), *[None] * (points.ndim - 2))

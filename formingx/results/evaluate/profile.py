@@ -107,8 +107,8 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
         The distances, shape (m,), length.
     """
     a, b = line[:-1], line[1:]
-    direction = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
-    offset = points[:, None] - a - np.clip(direction, 0, 1)[..., None] * (b - a)
+    fraction = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
+    offset = points[:, None] - a - np.clip(fraction, 0, 1)[..., None] * (b - a)
     return np.hypot(offset[..., 0], offset[..., 1]).min(1)
 
 
@@ -125,10 +125,10 @@ class Profiles:
 
     def of(self, state: Any) -> Profile:
         """Return the profile of a state; collective."""
-        self._probe = problem = self._probe or self._make_probe()
-        deformed = problem.points + problem.displacement_in(state)
-        n = len(problem.points) // 2
-        return Profile(problem.points[:n].copy(), problem.points[n:].copy(), deformed[:n], deformed[n:])
+        self._probe = faces = self._probe or self._make_probe()
+        deformed = faces.points + faces.displacement_in(state)
+        n = len(faces.points) // 2
+        return Profile(faces.points[:n].copy(), faces.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
         """Return the probe that evaluates displacements at the points of both faces.

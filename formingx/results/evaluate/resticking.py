@@ -46,7 +46,7 @@ def furthest(path: Any) -> Resticking | None:
         The point, or None if no gap closed again.
     """
     found = []
-    for number, contact in enumerate(c for c in path.problem.contacts if c.remembers):      # the first histories
+    for number, contact in enumerate(c for c in path.problem.contacts if c.remembers):   # they come first in memory
         definition = contact.contact
         if definition.lagged or not (definition.sticks and definition.separates):
             continue

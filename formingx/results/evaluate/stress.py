@@ -74,15 +74,15 @@ class StressField:
         """
         recovery = self._recovery
         layer = recovery.layer(layer)
-        at = as_points("Stress: points", points)
-        comm, place = recovery.problem.comm, recovery.locate(at, layer)
-        values = np.zeros((len(at), _COUNT))
+        positions = as_points("Stress: points", points)
+        comm, place = recovery.problem.comm, recovery.locate(positions, layer)
+        values = np.zeros((len(positions), _COUNT))
         if len(place.mine):
             shapes: Any = recovery.element.tabulate(0, place.reference)
             dofs = recovery.space.dofmap.list[place.cells]
             column = list(recovery.cells).index(layer)
             values[place.mine] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
-        return _unpack(at, comm.allreduce(values, MPI.SUM))
+        return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
         """Return the projected stresses at points of each of this rank's m cells, each from its own layer.
@@ -278,7 +278,7 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Return the numbers of the locally owned cells of a layer (None: of all), shape (m,)."""
+        """Return for each of the m locally owned cells True if it lies in a layer (None: any layer), shape (m,)."""
         owned = own_cells(self.problem.forms.domain)
         return np.isin(owned, self.cells[self.layer(name)]) if name is not None else np.ones(len(owned), dtype=bool)
 
@@ -287,10 +287,11 @@ class Stresses:
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return points, entries of F and S, and reference volumes at the quadrature points of this rank's m cells of a
-        layer.
+        """Return data at the q quadrature points of this rank's m cells of a layer.
 
-        The shapes are (m, q, 2), (m, q, _COUNT) and (m, q).
+        Returns:
+            Reference positions, shape (m, q, 2), length; entries of F and S, shape (m, q, _COUNT); reference volumes,
+            shape (m, q).
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)

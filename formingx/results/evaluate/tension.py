@@ -61,8 +61,8 @@ class Tension:
             h = F[1, 1] * forms.thicknesses[terms.names[0]]
             resultants = [N + h * (F[i, i] * P[i, i] - F[1, 1] * P[1, 1]) for N, i in zip(resultants, (0, 2))]
         unit = forms.constant(forms.stress) * sum(forms.thicknesses.values())
-        at_rest = resultants[1] * forms.F[0, 0]
-        values = ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], at_rest])
+        reference_hoop = resultants[1] * forms.F[0, 0]      # per reference length
+        values = ufl.as_vector([*(N / unit for N in resultants), forms.X[0], forms.X[1], reference_hoop])
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def smallest(self, state: Any) -> Resultant:

@@ -25,7 +25,7 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
     Args:
         error: root mean square of J - 1.
         where: name of the state, for the message.
-        away: the same away from clamped faces (`away_from_clamps`); None if unknown or without clamps.
+        far_error: the same away from clamped faces (`away_from_clamps`); None if unknown or without clamps.
     """
     if error <= BOUND:
         return []

@@ -177,7 +177,7 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return the parameters s at which lines start + s across meet straight pieces, shape (n,).
+    """Return the parameters s at which lines start + s direction meet straight pieces, shape (n,).
 
     The pieces have shape (m, 2, 2). s is nan if a line meets none of them within 0 <= s <= 1.
     """

@@ -28,7 +28,7 @@ from ...solve.newton import Failure
 _LOSSES = "friction", "jumps", "bonds"
 _GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
 _RAMP_EDGE = 0.06          # distance from the outer edge of the contact ramp, over its half width, that counts as 0
-_SMALL = 1e-5              # half of a difference quotient, over the arc length of a state
+_SMALL = 1e-5              # half the step of a central difference quotient in arc length
 _STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest energy
 _RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry
 _HALVINGS = 6              # largest number of halvings of a step
@@ -119,7 +119,7 @@ class EnergyBalance:
 
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
-        """Return the energies of a step, computed through states between its ends; `whole` is the first estimate."""
+        """Return the energies of a step, computed through states between its ends; `estimate` is without them."""
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return estimate
@@ -211,7 +211,7 @@ class EnergyBalance:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return the reactions of driven supports and tools in a state; cached."""
+        """Return the cached reactions of driven supports and tools in a state, {entry: reaction}."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]
@@ -232,7 +232,7 @@ class EnergyBalance:
             for i, item in self._driven:
                 setting = p.setting
                 travel = forms.length * setting.amplitude(i, state.control)
-                by_arc = forms.length * setting.rate[i] * state.slope
+                travel_slope = forms.length * setting.rate[i] * state.slope
                 if i in setting.inactive:
                     force = slope = 0.0
                 elif item in scene.contacts:
@@ -245,7 +245,7 @@ class EnergyBalance:
                 else:
                     force = -p.reaction(i, p.x, state.control)
                     slope = self._sum(change[p.driven_unknowns(i)])
-                found[_entry_name(scene, item)] = _Reaction(force, slope, travel, by_arc)
+                found[_entry_name(scene, item)] = _Reaction(force, slope, travel, travel_slope)
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:

@@ -16,7 +16,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from dolfinx import fem
 
 from ...errors import InputError, instance, place
 from ...findings import Finding
-from ...forms.schedule import StepData
 from ...measures.targets import Target
 from ...problem.problem import Problem
 from ...scene.scene import Scene
@@ -238,8 +237,7 @@ def _read_state(data: dict, problem: Any) -> State:
     last = problem.comm.rank == problem.comm.size - 1
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
-    met, setting = data.pop("met"), data["setting"]
-    data["setting"] = setting and asdict(StepData(**setting))             # fills in missing entries
+    met = data.pop("met")
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),

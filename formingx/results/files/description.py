@@ -36,7 +36,7 @@ def describe(problem: Any) -> dict[str, Any]:
             found["materials"][layer] |= {"shear_modulus": scene.shear_modulus(layer),
                                           "sums": _sums(scene, layer, constants)}
     if "thickness" in extra:
-        found["thickness"] = {layer: _sums(scene, layer, {"sum": lambda at, h=h: h(*at.points.T)})
+        found["thickness"] = {layer: _sums(scene, layer, {"sum": lambda sample, h=h: h(*sample.points.T)})
                               for layer, h in scene.thickness.items()}
     return found
 
@@ -84,10 +84,10 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
     """Return {name: sum over a layer} of functions of a `Sample`, weighted so that a change at any point changes it."""
-    points_of = scene.sample(layer)
-    numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[points_of.cells])
-    weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(points_of.places)))).ravel()
-    return {name: float(scene.mesh.comm.allreduce(float(weights @ values(points_of)), MPI.SUM))
+    sample = scene.sample(layer)
+    numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[sample.cells])
+    weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(sample.places)))).ravel()
+    return {name: float(scene.mesh.comm.allreduce(float(weights @ values(sample)), MPI.SUM))
             for name, values in fields.items()}
 
 

@@ -57,6 +57,9 @@ class Fields:
         self._components = domain.geometry.dim
         self._where, self._u = (_compat.compile_expression(ufl.as_vector([v[i] for i in range(self._components)]),
                                                             _NODES[self.dimension]) for v in (forms.X, forms.u))
+        if self._components == 3:
+            ratio, reference = forms.F[2, 2], sum(forms.thicknesses.values())
+            self._wall = _compat.compile_expression(ufl.as_vector([reference * ratio, ratio, 0.0]), _NODES[2])
         self.points = self._eval(self._where)
         self._elastic = ElasticStretches(self._problem, _NODES[self.dimension])
         self._between: tuple[np.ndarray, np.ndarray] | None = None
@@ -68,14 +71,12 @@ class Fields:
         Returns:
             {name: values, shape (cells, nodes, components)}.
         """
-        problem, forms, shape = self._problem, self._problem.forms, self.points.shape[:2]
+        problem, shape = self._problem, self.points.shape[:2]
         with problem.state_context(state):
             found = {"displacement": self._eval(self._u)}
         if self._components == 3:
-            ratio, reference = forms.F[2, 2], sum(forms.thicknesses.values())
-            wall = _compat.compile_expression(ufl.as_vector([reference * ratio, ratio, 0.0]), _NODES[2])
             with problem.state_context(state):
-                h = self._eval(wall)
+                h = self._eval(self._wall)
             found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
         elif self.dimension == 2:
             field = self._path.stress(state)
@@ -104,7 +105,7 @@ class Fields:
         return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
 
     def _eval(self, expression: Any) -> np.ndarray:
-        """Return the values of a UFL expression at the nodes of this rank's cells."""
+        """Return the values of a compiled expression at the nodes of this rank's cells, shape (cells, nodes, c)."""
         if not len(self._cells):
             return np.zeros((0, len(_NODES[self.dimension]), self._components))
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
@@ -135,7 +136,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
         OSError: a file cannot be written.
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
-    fields: dict[int, Fields] = {}                          # by mesh
+    meshes: dict[int, tuple[Fields, Any]] = {}              # fields, and points of all ranks
     steps = []
 
     def write(target: Any, text: str) -> None:
@@ -143,10 +144,11 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
     for number, state in _chosen(path, states):
         key = id(path.segment(state).problem)
-        if key not in fields:
-            fields[key] = Fields(path.alone(state))
-        points = _gather(fields[key].points, comm)
-        values = {name: _gather(v, comm) for name, v in fields[key].of(state).items()}
+        if key not in meshes:
+            fields = Fields(path.alone(state))
+            meshes[key] = fields, _gather(fields.points, comm)
+        fields, points = meshes[key]
+        values = {name: _gather(v, comm) for name, v in fields.of(state).items()}
         piece = file.with_name(f"{file.stem}-{number}.vtu")
         text = _as_vtu(points, values) if comm.rank == 0 else ""
         files.on_root(comm, partial(write, piece, text))
@@ -205,16 +207,17 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
 
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return for points (m, 2) the number k of the strip between lines k and k + 1, and the position in it, 0 to 1.
+    """Return where m points, shape (m, 2), lie between the n lines from the bottom to the top of a sheet.
 
-    The lines lead from the bottom to the top of a sheet. Both results have shape (m,).
+    Returns:
+        Number k of the last line before each point, and its position between lines k and k + 1, 0 to 1; shape (m,).
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
-    line = top - bottom
+    across = top - bottom
     for i, x in enumerate(points):
-        side = line[:, 0] * (x - bottom)[:, 1] - line[:, 1] * (x - bottom)[:, 0]
-        s = np.clip(((x - bottom) * line).sum(1) / (line**2).sum(1), 0, 1)
-        distance = np.hypot(*(bottom + s[:, None] * line - x).T)
+        side = across[:, 0] * (x - bottom)[:, 1] - across[:, 1] * (x - bottom)[:, 0]
+        s = np.clip(((x - bottom) * across).sum(1) / (across**2).sum(1), 0, 1)
+        distance = np.hypot(*(bottom + s[:, None] * across - x).T)
         between = np.flatnonzero(side[:-1] * side[1:] <= 0)
         if not len(between):                                    # beyond the first line, or the last
             k[i], part[i] = (0, 0.0) if np.argmin(distance) == 0 else (max(np.argmin(distance) - 1, 0), 1.0)

@@ -63,7 +63,16 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
-    """Write key numbers as a JSON file; NaN raises a ValueError."""
+    """Write key numbers as a JSON file.
+
+    Args:
+        file: the file.
+        summary: the numbers.
+        comm: MPI communicator; rank 0 writes.
+
+    Raises:
+        ValueError: a number is nan or infinite.
+    """
     text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
     on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
 

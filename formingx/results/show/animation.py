@@ -104,19 +104,19 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     low, high = plots.span(shapes, mirrored=len(sides) == 2)
     ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
-    figure, (first, right) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
-    bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=first, shrink=0.8, label="thickness / original")
+    figure, (sheet, loading) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
+    bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=sheet, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
     pictures: list[Any] = []
     for shape, ratio, tool, (names, point) in zip(shapes, ratios, tools, now):
-        first.clear()
-        first.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"),
-                 ylabel=units.label("z"), aspect="equal")
-        first.spines[["top", "right"]].set_visible(False)
-        figures.tools(first, tool, low, high, mirror=len(sides) == 2)
+        sheet.clear()
+        sheet.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"), ylabel=units.label("z"),
+                  aspect="equal")
+        sheet.spines[["top", "right"]].set_visible(False)
+        figures.tools(sheet, tool, low, high, mirror=len(sides) == 2)
         for side in sides:
-            plots.section(first, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
-        _curve(right, names, curves[names], point, units)
+            plots.section(sheet, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
+        _curve(loading, names, curves[names], point, units)
         figure.canvas.draw()
         if not pictures:
             figure.set_layout_engine("none")                # or the axes would shift from frame to frame

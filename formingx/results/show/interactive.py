@@ -63,11 +63,11 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
     """Return the data of one run: its section and the colours, frame by frame."""
     ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
-    at, frames = record.progress, record.frames
-    stages = [{"name": words(record.stages[a]), "from": float(at[a]), "to": float(at[b - 1])}
-              for a, b in zip([0, *ends], [*ends, len(at)])]
+    progress, frames = record.progress, record.frames
+    stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
+              for a, b in zip([0, *ends], [*ends, len(progress)])]
     shown = [c for c in record.measures if c.endswith(("pressure", "travel", "pole_height", "process_time"))]
-    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": rounded(at[frames]),
+    found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": rounded(progress[frames]),
              "stage": [record.stages[k] for k in frames],
              "numbers": {units.label(c): rounded(record.measures[c][frames]) for c in shown},
              "images": [[*scale, *shift] for scale, shift in record.planes.images(3 if record.space else 2)],
@@ -102,7 +102,7 @@ def _label(record: Record, units: Units, key: str) -> str:
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
-    """Return outlines of the tools of a section, with a shell on their solid side, and their travel in every frame."""
+    """Return the outline of each tool of a section, its offset outline, direction, and travel in every frame."""
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found = []
@@ -191,13 +191,13 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
     """
     traces, timed = [], any(record.timed for record in records)
     for record, name in zip(records, names):
-        course = record.measures["process_time"] if timed else next(
+        abscissa = record.measures["process_time"] if timed else next(
             (v for c, v in record.measures.items() if c.endswith("pressure")), None)
-        if course is None:
+        if abscissa is None:
             continue
         drawn = [k for k in record.shown if timed or record.stages[k] == record.stages[-1]]
         for label, gaps in record.gaps(drawn).items():
-            traces.append(_trace(course[drawn], gaps, f"{name}: {label}" if len(records) > 1 else label))
+            traces.append(_trace(abscissa[drawn], gaps, f"{name}: {label}" if len(records) > 1 else label))
     return _chart("Gap left in the corners " + ("over time" if timed else "against pressure"),
                   units.label("process_time" if timed else "pressure"), units.label("gap"), traces)
 

@@ -174,7 +174,11 @@ class Record:
         return found
 
     def _from(self, where: np.ndarray) -> str:
-        """Return the first state that satisfies a condition, as text; where: shape (n,)."""
+        """Return the first state that satisfies a condition, as text.
+
+        Args:
+            where: True for the states that satisfy it, shape (n,).
+        """
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
@@ -201,7 +205,7 @@ class Record:
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
-        """Return the smallest thickness of the sheet in the first drawn state, or None."""
+        """Return the smallest thickness of the sheet in the last state, length, or None without a sheet."""
         last = self.profiles[-1]
         return float(last.thickness.min()) if last is not None else None
 
