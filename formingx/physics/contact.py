@@ -131,6 +131,11 @@ class Contact(Part):
             raise InputError(f"{name}: direction = {direction!r}: must name a direction, or be None")
 
     @property
+    def label(self) -> str:
+        """Name of the tool, or of the face that it touches, for messages and tables."""
+        return self.name or self.on
+
+    @property
     def driven(self) -> bool:
         """True if the run controls the motion of the tool."""
         return self.direction is not None

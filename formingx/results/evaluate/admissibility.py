@@ -116,7 +116,7 @@ class AdmissibilityCheck:
             for contact in self._problem.present:
                 error = _force_error(contact, state, self._images)
                 if error > _LIMITS.warning_error:
-                    name = _name(contact)
+                    name = contact.contact.label
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
                                          f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
             for cut in self._deepest(edges, state, own=True):
@@ -159,11 +159,11 @@ class AdmissibilityCheck:
                 error = _force_error(contact, state, self._images)
                 depth = resultants.penetration(contact, state.x, state.control)
                 if error > _LIMITS.largest_error and depth > _LIMITS.negligible_penetration * contact.thickness:
-                    yield (f"the body did not follow the tool of {_name(contact)!r}: penetration changes the force by"
-                           f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
+                    yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes the force"
+                           f" by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
-                    yield (f"the body pulls at the tool of {_name(contact)!r}, which has no friction and cannot hold"
-                           f" it: it is behind the tool")
+                    yield (f"the body pulls at the tool of {contact.contact.label!r}, which has no friction and cannot"
+                           f" hold it: it is behind the tool")
         place = self._outline.fold(edges)
         if place is not None:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
@@ -179,7 +179,7 @@ class AdmissibilityCheck:
             share = np.where(face | (not own), depth.max(1) / allowed, 0.0)
             k = int(np.argmax(share))
             if share[k] > 1:
-                yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, _name(contact))
+                yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, contact.contact.label)
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
         """Yield the deepest contact point in each tool in three dimensions, if it is deeper than allowed.
@@ -196,7 +196,7 @@ class AdmissibilityCheck:
                 rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))
                 k = int(np.argmax(rows[:, 0]))
                 if rows[k, 0] > 1:
-                    yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, _name(contact))
+                    yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield contact points whose penetration is too large compared with the local wall."""
@@ -210,7 +210,7 @@ class AdmissibilityCheck:
             share = depth * grown / (_LIMITS.penetration * contact.thickness)
             k = int(np.argmax(share))
             if share[k] > 1:
-                yield Depth(share[k], depth[k], edges[face][k, 2], contact, _name(contact))
+                yield Depth(share[k], depth[k], edges[face][k, 2], contact, contact.contact.label)
 
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
@@ -270,8 +270,3 @@ def _pulled(contact: Any, state: State) -> bool:
 def _lengths(edges: np.ndarray) -> np.ndarray:
     """Return the lengths of curved edges, shape (m,), from (first end, last end, middle), shape (m, 3, 2)."""
     return np.linalg.norm(np.diff(along(edges, 4), axis=1), axis=-1).sum(1)
-
-
-def _name(contact: Any) -> str:
-    """Return the name of a contact's tool, or of the face that touches it."""
-    return contact.contact.name or contact.contact.on

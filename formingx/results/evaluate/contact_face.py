@@ -134,7 +134,7 @@ def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]
-    names = ", ".join(repr(c.contact.name or c.contact.on) for c in contacts)
+    names = ", ".join(repr(c.contact.label) for c in contacts)
     if not found:
         which = "the scene has no tool" if not contacts else f"the scene has no such tool; it has {names}"
         raise InputError(f"{caller}: " + f"tool = {tool!r}: " * (tool is not None) + which)

@@ -58,7 +58,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             turn *= adjacent & sliding & convex
             for k in np.argsort(turn)[-1:]:
                 r, z = x[k] + steps[k] / 2 + contact.travelled(state.control)
-                found.append(Edge(float(turn[k]), contact.contact.name or contact.contact.on, (float(r), float(z))))
+                found.append(Edge(float(turn[k]), contact.contact.label, (float(r), float(z))))
     return max((edge for edge in found if edge.turn > 0), default=None)
 
 

@@ -56,7 +56,7 @@ def furthest(path: Any) -> Resticking | None:
         again = rows[rows[:, 2] > 0]
         if len(again):
             r, z, shift = again[np.argmax(again[:, 2])]
-            found.append(Resticking(definition.name or definition.on, len(again), float(shift), (float(r), float(z))))
+            found.append(Resticking(definition.label, len(again), float(shift), (float(r), float(z))))
     return max(found, key=lambda item: item.shift, default=None)
 
 

@@ -62,10 +62,9 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
 
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
     """Return the data of one run: its section and the colours, frame by frame."""
-    ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
-              for a, b in zip([0, *ends], [*ends, len(progress)])]
+              for a, b in record.stage_ranges]
     shown = [c for c in record.measures if c.endswith(("pressure", "travel", "pole_height", "process_time"))]
     found = {"name": name, "axisymmetric": record.axisymmetric, "stages": stages, "progress": rounded(progress[frames]),
              "stage": [record.stages[k] for k in frames],
@@ -82,8 +81,9 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
-    profiles = [record.profiles[k] for k in record.frames]
-    for profile, fields_of_state in zip(profiles, [record.fields[k] for k in record.frames]):
+    frames = record.frames
+    profiles = [record.profiles[k] for k in frames]
+    for profile, fields_of_state in zip(profiles, [record.fields[k] for k in frames]):
         wall = profile.wall_thickness
         values = {units.label("wall"): wall, "wall / original": wall / profile.original_thickness}
         values |= {_label(record, units, key): v for key, v in fields_of_state.items()}
@@ -105,7 +105,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
     """Return the outline of each tool of a section, its offset outline, direction, and travel in every frame."""
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
-    found = []
+    found, frames = [], record.frames
     for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
         if contact.tool.components == 3:                    # nothing of it is in a section
             continue
@@ -114,7 +114,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
         found.append({"name": name, "line": rounded(line.T), "shell": rounded(shell.T),
                       "moves": contact.way.tolist(),
                       "travel": [None if t[k] is None else float(f"{t[k]:.7g}")
-                                 for t in (record.travels[i] for i in record.frames)]})
+                                 for t in (record.travels[i] for i in frames)]})
     return found
 
 
@@ -122,8 +122,7 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
     """Return the loading curves of each stage: force of a tool over its travel, or pressure over the pole height."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
-        ends = [k for k in range(1, len(record.stages)) if record.stages[k] != record.stages[k - 1]]
-        for a, b in zip([0, *ends], [*ends, len(record.stages)]):
+        for a, b in record.stage_ranges:
             of_stage = slice(a, b)
             for x, y, xs, ys in _driven(record, of_stage):
                 label = " ".join(w for w in (name if len(records) > 1 else "", words(record.stages[a])) if w)

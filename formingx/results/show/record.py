@@ -110,6 +110,12 @@ class Record:
         return bool(np.ptp(self.measures.get("process_time", 0.0)) > 0)
 
     @property
+    def stage_ranges(self) -> list[tuple[int, int]]:
+        """Numbers of the first state of each stage, and of the state after its last."""
+        ends = [k for k in range(1, len(self.stages)) if self.stages[k] != self.stages[k - 1]]
+        return list(zip([0, *ends], [*ends, len(self.stages)]))
+
+    @property
     def frames(self) -> list[int]:
         """Numbers of the drawn states (function `frames`)."""
         return frames(self.progress, self.kinds, self.stages, self.drawn)
