@@ -42,12 +42,22 @@ class Bond(NormalLaw):
     """k d exp(-|d|/THETA): pulls and presses."""
     pulls = True
 
-    def ramp(self, d, held=False):
+    def ramp(self, d, bonded=False):
         fades = np.exp(-np.abs(d) / THETA)
         return d * fades, (1 - np.abs(d) / THETA) * fades
 
     def stored(self, d):
         return -THETA * (np.abs(d) + THETA) * np.exp(-np.abs(d) / THETA)
+
+
+def test_a_law_without_its_ramp_is_refused():
+    """A misspelt `ramp` must not give a contact without forces."""
+    class Misspelt(NormalLaw):
+        def rampe(self, d, bonded=False):
+            return d, np.ones_like(d)
+
+    with pytest.raises(NotImplementedError, match="Misspelt: ramp"):
+        Misspelt(TOOL, K, THETA).tractions(points_near(TOOL, [0.2 * THETA])[0], None)
 
 
 def test_a_law_of_the_distance_alone():

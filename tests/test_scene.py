@@ -3,10 +3,12 @@
 import types
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from test_cooling import pressed
 
 import formingx as fx
+from formingx.problem.problem import Problem
 
 
 def contents(thing, seen=None):
@@ -48,3 +50,15 @@ def test_two_runs_of_a_scene_at_once_do_not_meet():
     second = fx.Process(scene).run(push, progress=False, accuracy="draft")
     assert np.array_equal(first.problem.temperature.T.x.array, T)
     assert [s.measures for s in second.states] == [s.measures for s in first.states]
+
+
+def test_a_constant_of_the_mesh_keeps_the_mesh():
+    """A scene chooses columns for its tools, but a UFL constant of the user's mesh belongs to that mesh."""
+    disc = fx.mesh.disc(radius=10.0, thickness=0.5)
+    R = ufl.SpatialCoordinate(disc.domain)[0]
+    rest = {"supports": [fx.Symmetry("axis"), fx.Clamped("rim")], "loads": [fx.Pressure("bottom")],
+            "contacts": [fx.Contact("top", fx.tools.cup(radius=9.0, depth=4.0, fillet=1.0).moved(0.0, 0.6), 0.3)]}
+    assert fx.Scene(mesh=disc, materials=fx.NeoHookean(c10=0.1), **rest).mesh is not disc
+    kept = fx.Scene(mesh=disc, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.1 + 0.001 * R), [(0.1, 1.0)]),
+                    **rest)
+    assert kept.mesh is disc and len(Problem(kept).forms.bodies) == 1

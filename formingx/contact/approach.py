@@ -171,9 +171,8 @@ class Approach:
         """Return True if too many points came into contact in a step.
 
         The limit is about twice `at_once`, or twice the predicted number of gap closures. In lagged contact the limit
-        concerns
-        the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts without history
-        variables have no limit.
+        concerns the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts
+        without history variables have no limit.
 
         Args:
             old: locally owned unknowns at the start of the step, shape (n,).

@@ -16,7 +16,7 @@ class Increment:
     accepted. In each iteration the contact calls `tractions(x)` for the residual, with x the positions of the points
     relative to the tool, shape (n, c). It then calls `linearise(x)` at the same positions. From then on `tractions(x)`
     contains the tangent of the iteration. The local solve of contact (`LocalSolve`) then reads `status`, `arrivals`,
-    `taken` and `foretold`, and calls `expect` to set the sense of sliding for the next iteration.
+    `taken` and `predicted`, and calls `expect` to set the sense of sliding for the next iteration.
 
     Args:
         law: contact law.
@@ -31,9 +31,9 @@ class Increment:
                  guessed: np.ndarray | None = None):
         self._law, self._touch = law, touch
         self._touched = None if start is None else law.touching(start, touch)
-        self._before: Motion | None = None if start is None else law.motion(start, touch)   # at the last iteration
+        self._before: Motion | None = None if start is None else law.motion(start, touch)   # in the last iteration
         self._guessed = guessed
-        self._sense: np.ndarray | None = None                                               # of sliding there
+        self._sense: np.ndarray | None = None               # of sliding in the last iteration
         self._last: tuple[np.ndarray, Tractions] | None = None
 
     def tractions(self, x: np.ndarray) -> Tractions:
@@ -100,16 +100,16 @@ class Increment:
         """
         return self._now[1].force[points], self._now[1].stiffness[points]
 
-    def foretold(self, by: np.ndarray) -> Tractions:
+    def predicted(self, motion: np.ndarray) -> Tractions:
         """Return the tractions after a further motion of all points, with distances and slips predicted to first order.
 
         Args:
-            by: motion of the points relative to the tool since the last computed tractions, shape (n, c), length.
+            motion: motion of the points relative to the tool since the last computed tractions, shape (n, c), length.
 
         Returns:
             Tractions of the law, linearised at the predicted distances and slips.
         """
-        return self.ahead(slice(None))(by)
+        return self.ahead(slice(None))(motion)
 
     def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
         """Return a function that predicts the tractions at some points after a further motion.
@@ -122,8 +122,8 @@ class Increment:
             their `Tractions`, linearised at the distances and slips predicted to first order.
         """
         touch = self._touch and Touch(*(part[points] for part in self._touch))
-        law, x, there = self._law.part(points), self._now[0][points], self._foreseen(points)
-        return lambda by: law.tractions(x, touch, None, there(by))
+        law, x, predicted = self._law.part(points), self._now[0][points], self._foreseen(points)
+        return lambda motion: law.tractions(x, touch, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Return a function that predicts how deep some points are in the ramp after a further motion.
@@ -142,17 +142,17 @@ class Increment:
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
         before = Motion(*(part[points] for part in self._before))
-        grows = np.reshape(self._law.has_friction and not self._law.pulls and self._law.part(points).sticks, (-1, 1))
+        sticks = np.reshape(self._law.has_friction and not self._law.pulls and self._law.part(points).sticks, (-1, 1))
 
-        def found(by: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return before.distance_at(x + by) / width + 0.5, width * grows * before.normal
-        return found
+        def depth_and_path(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return before.distance_at(x + motion) / width + 0.5, width * sticks * before.normal
+        return depth_and_path
 
     def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
         """Return a function that maps motions of some points, shape (m, c), length, to their first-order `Motion`."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
-        return lambda by: before.to(x + by)
+        return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Set the sense of sliding that the next `linearise` assumes at some points.

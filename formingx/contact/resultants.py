@@ -115,9 +115,8 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
     """Return the contact tractions at all points of the face, sorted by the reference coordinate R.
 
     A traction is the force at a point over its tributary reference area (`Rule.lumped`); the sum of the products is the
-    force. The node on the axis has no tributary area. Its force is added to the middle node of its facet, whose
-    pressure it
-    is given: the pressure is even in R, the tangential traction odd.
+    force. The node on the axis has no tributary area. Its force is added to the middle node of its facet. It gets
+    the pressure of that node and no tangential traction: the pressure is even in R, the tangential traction odd.
 
     Args:
         face: the contact.

@@ -171,8 +171,8 @@ class StepLimit:
         No contact slides then, so that a path does not end by sliding. The run may reduce a step to the shortest
         length.
         """
-        coarse = [approach.face for approach in self.present if approach.face.law.has_friction]
-        return bool(coarse) and all(face.contact.sticks and not face.contact.lagged for face in coarse)
+        faces = [approach.face for approach in self.present if approach.face.law.has_friction]
+        return bool(faces) and all(face.contact.sticks and not face.contact.lagged for face in faces)
 
     @property
     def predicts_events(self) -> bool:

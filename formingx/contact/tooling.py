@@ -53,7 +53,6 @@ class Tooling(NamedTuple):
         direction of motion count as one tool.
         """
         first: dict[Any, int] = {}
-        # tools with one motion are one
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
         return [c.name or f"tool {first.setdefault(alike[k], k) + 1}" for k, c in enumerate(self.contacts)]
 
@@ -78,8 +77,8 @@ class Tooling(NamedTuple):
         """
         if not setting:
             return [0.0] * len(self.contacts)
-        there = StepData(**setting)
-        return [None if i in there.inactive else self.length * there.amplitude(i, control)
+        step_data = StepData(**setting)
+        return [None if i in step_data.inactive else self.length * step_data.amplitude(i, control)
                 for i in range(self.before, self.before + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
@@ -134,9 +133,9 @@ def _contact(data: dict[str, Any]) -> Contact:
     """Return the `Contact` that is described by plain data (`description.describe`)."""
     direction = data["direction"] and tuple(data["direction"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
-    more = {name: data[name] for name in names if name in data}
+    options = {name: data[name] for name in names if name in data}
     words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
     found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], direction=direction,
-                    **more)
+                    **options)
     found.friction = data["friction"]                       # a function of the temperature is stored as text
     return found

@@ -161,6 +161,7 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
     problem.look_at(x, control)
     with source.state_context(state):
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
+            """Return points of the mesh of `source` as points of the mesh of `problem`."""
             return points + Probe(source, points).displacement_in(state) if moved else points
         same = len(problem.histories) == len(source.histories) and not moved
         n = len(problem.histories) if same else len(problem.forms.histories)

@@ -62,8 +62,8 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     nodes = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
     where = forms.X
     F = ufl.as_vector([forms.F[i] for i in BLOCK])
-    F, X, points = (in_own_cells(domain, of, np.asarray(gauss)) for of in (F, where, where + forms.u))
-    rest, moved = (in_own_cells(domain, of, nodes) for of in (where, where + forms.u))
+    F, X, points = (in_own_cells(domain, f, np.asarray(gauss)) for f in (F, where, where + forms.u))
+    rest, moved = (in_own_cells(domain, f, nodes) for f in (where, where + forms.u))
     tags = np.zeros(len(X), dtype=np.int64)
     for tag in problem.scene.mesh.layers.values():
         found = problem.scene.mesh.cells.find(tag)

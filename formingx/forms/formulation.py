@@ -280,10 +280,10 @@ class Formulation(BodyModel):
                 " .cache/fenics") from error
 
     def compile_ahead(self, *forms: Any) -> None:
-        """Compile forms by one call of the C compiler (collective); `compile` returns them at once then.
+        """Compile forms together by one call of the C compiler, so that `compile` then finds them; collective.
 
         Args:
-            forms: UFL forms; None is left out.
+            forms: UFL forms, or None, which is skipped.
         """
         _compat.compile_ahead(self.comm, [form for form in forms if form is not None])
 
@@ -293,12 +293,14 @@ class Formulation(BodyModel):
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
 
     def path_forms(self) -> list[Any]:
-        """Return the forms that each path uses.
+        """Return the forms that every path compiles.
 
         Returns:
-            List of forms; some are None.
+            List of UFL forms; None for a derivative that the scene does not have.
         """
-        return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row()]
+        areas = {contact.on: self.area(contact.on) for contact in self.scene.contacts}
+        return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row(),
+                *areas.values()]
 
     def integral(self, form: Any) -> float:
         """Compute an integral over all ranks; the form is compiled for this one use.

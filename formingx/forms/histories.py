@@ -19,7 +19,7 @@ class Histories:
 
     forms: Any
     histories: list[History]
-    _predicted: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms there
+    _predicted: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms at x
 
     @property
     def n_owned(self) -> int:

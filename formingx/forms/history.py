@@ -25,10 +25,12 @@ class History(Protocol):
 
     Contacts come first, then materials. The temperature comes last, since it takes the heat that they dissipate. Calls:
 
-        start                   set the reference configuration; get, advance, put       try a step: save the variables,
-        update them, restore them; advance                 accept a state; get, put                go to another
-        accepted state and return; save, load              write to and read from a file, on any number of ranks; carry
-        transfer to a problem of the same body on another mesh.
+    - `start` sets the reference configuration.
+    - `get`, `advance` and `put` try a step: they store, update and restore the variables.
+    - `advance` alone accepts a state.
+    - `get` and `put` go to another accepted state and return.
+    - `save` and `load` write to and read from a file, on any number of ranks.
+    - `carry` transfers the variables to a problem of the same body on another mesh.
 
     The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any
     ranks.

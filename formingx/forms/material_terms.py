@@ -54,8 +54,8 @@ class MaterialTerms:
         self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
             material.rest_stress)
         self.internal = {name: self.quadrature_function(np.shape(value)) for name, value in material.internal.items()}
-        self.past_integrals = {name: self.quadrature_function(np.shape(value)) for name, value in
-                     (material.integral.coefficients if material.integral else {}).items()}
+        coefficients = material.integral.coefficients if material.integral else {}
+        self.past_integrals = {name: self.quadrature_function(np.shape(value)) for name, value in coefficients.items()}
 
     def _constant(self, name: str, value: Any) -> Any:
         """Return the coefficient of a material constant."""
@@ -69,7 +69,7 @@ class MaterialTerms:
 
     @property
     def has_history(self) -> bool:
-        """True if the stress of the material depends on more than the deformation."""
+        """True if the stress of the material depends on past states."""
         return bool(self.internal or self.past_integrals)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:

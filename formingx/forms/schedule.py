@@ -77,14 +77,15 @@ class StepData:
         return self.base[number] + self.rate[number] * control
 
     def acting(self, number: int, control: float) -> float:
-        """Return the active part of a load's amplitude.
+        """Return the amplitude of a load that acts on the body.
 
         Args:
             number: number of the load.
             control: dimensionless control.
 
         Returns:
-            0 if the load is inactive; while forces fade, the part of a changed load increases or decreases linearly.
+            The amplitude, 0 for an inactive load; while forces fade, the amplitude of a changed load times the control
+            or times 1 - control.
         """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:

@@ -68,8 +68,7 @@ class Solid(Formulation):
 
     def path_forms(self) -> list[Any]:
         rows = {contact.on: self.length_row(contact.on) for contact in self.scene.contacts if contact.points == "nodes"}
-        areas = {contact.on: self.area(contact.on) for contact in self.scene.contacts}
-        return [*super().path_forms(), *rows.values(), *areas.values()]
+        return [*super().path_forms(), *rows.values()]
 
     def length_row(self, boundary: str) -> Any:
         """Return the linear form of the tributary lengths of the nodes of a boundary.
@@ -157,12 +156,12 @@ class Solid(Formulation):
     def _energy(self, density: Any) -> Any:
         self._eps, energy = self.constant(self.scene.model.eps), 0
         self._volume_stiffness = self.constant(self.scene.model.volume_stiffness)
-        for material, names in self.bodies:
-            for term, metadata in self.energy_densities(material, names, self.F, density):
+        for _, names in self.bodies:
+            for term, metadata in self.energy_densities(names, self.F, density):
                 energy += self.weighted(self._scale * term, names, metadata)
         return energy
 
-    def energy_densities(self, material: Any, names: list[str], F: Any,
+    def energy_densities(self, names: list[str], F: Any,
                          density: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
         r"""Return the energy densities of a body: the material's energy and the terms of incompressibility.
 
@@ -173,7 +172,6 @@ class Solid(Formulation):
         1)`.
 
         Args:
-            material: material of the body.
             names: layers of the body.
             F: deformation gradient (UFL, shape (3, 3)).
             density: function of (terms, F) that returns the energy density of a `MaterialTerms`.

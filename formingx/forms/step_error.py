@@ -103,7 +103,7 @@ class StepError:
         return [stress.values() for stress in self._stresses]
 
     def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses as `_at` does, for a body whose deformation was constant before."""
+        """Return `_at` without the motion of the last step: the body relaxes at a constant deformation."""
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)

@@ -33,7 +33,7 @@ class Tangent:
         self._movable = [k for k, item in enumerate(scene.items) if item in scene.supports and item.driven]
         self._by_motion = self._lift = None
         if constraints.can_move:
-            self._lift = fem.Function(forms.space)              # held unknowns move the others through the tangent
+            self._lift = fem.Function(forms.space)              # driven unknowns load the others through the tangent
             self._by_motion = forms.compile(ufl.action(forms.tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:

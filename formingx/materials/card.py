@@ -17,7 +17,7 @@ from .homogeneous import MODES
 _LARGEST_STRETCH = 6.0
 """Largest stretch of the curves, if the material has no smaller limit."""
 _PART = 0.97
-"""Largest stretch of the curves over the limit of the stretch."""
+"""Largest stretch of the curves over the largest stretch of the material."""
 
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
@@ -67,8 +67,8 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
     shift: factor of the relaxation times at this temperature.
     """
-    def said(value: float, of: str = "") -> str:
-        return f"{value:.4g} {of}".rstrip()
+    def said(value: float, symbol: str = "") -> str:
+        return f"{value:.4g} {symbol}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []
     rows.append(("instantaneous shear modulus", said(material.shear_modulus, unit)))
     for mode in MODES:

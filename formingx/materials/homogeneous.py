@@ -23,7 +23,7 @@ MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
 
 _DOMAIN = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
 _STRETCHES = [ufl.variable(ufl.Constant(_DOMAIN)) for _ in range(3)]
-_CONSTANTS: list[Any] = []                                   # as many as an energy has had
+_CONSTANTS: list[Any] = []                     # as many as the most constants of an energy so far
 
 
 class Response:
@@ -172,12 +172,10 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
-        """Return the margins of the three criteria, shape (3, n), relative to the size of their terms.
+        """Return the margins of the three criteria, shape (3, n); negative or not a number where a criterion fails.
 
-        The terms are 1, l^2 dP/dl and the smaller eigenvalue of the Hessian.
-
-        Returns:
-            The margins; negative where a criterion fails.
+        They are 1 where the stress is finite, then l^2 dP/dl and the smaller eigenvalue of the Hessian, both divided by
+        the size of Hessian and stress.
         """
         tau, K = response.logarithmic(along(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)

@@ -92,8 +92,8 @@ class Relaxing(Material):
         Returns:
             Moduli, the same shape, stress.
         """
-        rest = 0.0 if (left := self.equilibrium) is None else left.shear_modulus
-        return rest + self._modulus(finite_array("relaxation_modulus: times", times))
+        modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
+        return modulus + self._modulus(finite_array("relaxation_modulus: times", times))
 
     @property
     def shear_modulus(self) -> float:

@@ -85,12 +85,12 @@ class Material(Energies):
 
     @property
     def base(self) -> Material:
-        """Material without solidification."""
+        """Material that has not solidified; by default this material."""
         return self
 
     @property
     def equilibrium(self) -> Material | None:
-        """Material that describes the relaxed state, or None."""
+        """Material that describes the relaxed state, or None; by default this material, which does not relax."""
         return self
 
     @property

@@ -8,7 +8,7 @@ variable Cv, or its variable itself:
 Cbar keeps the branches stress-free in the reference configuration. A step of length dt from a known state has a
 potential, whose derivative by F is the stress at its end. Its tangent is therefore symmetric and consistent, without
 iterations at a point. With x = dt/tau the potential is regular at dt = 0, where it is the elastic energy. For infinite
-dt it has no contribution of the branch.
+dt the branch contributes nothing.
 
 A symmetric tensor with the block structure of F (`physics.kinematics`) is stored as its entries (11, 22, 12, 33).
 """
@@ -49,7 +49,7 @@ class RelaxingMaterial(Relaxing):
     """
 
     _tensor = ""                    # name of the branches' state
-    _stores_C = True               # the last state's C is needed, too
+    _stores_C = True                # C of the last state is a history variable too
     _sign = 1                       # of the branches' state: see `Material.shapes`
 
     def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):

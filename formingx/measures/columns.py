@@ -34,7 +34,7 @@ class _Scalar(_Recorded):
 
 
 class _Nodal(_Recorded):
-    """Column of a quantity of all active contacts, reduced to a number with 0: largest, smallest or sum."""
+    """Sum or maximum of 0 and a quantity of each active contact."""
 
     def __init__(self, problem, quantity, reduce, contacts=None):
         self._problem, self._quantity, self._reduce = problem, quantity, reduce

@@ -66,12 +66,12 @@ class PoleStressRatio:
         Returns:
             The ratio.
         """
-        now, left, modulus = self._integrals()
-        if left < _NONE * modulus:
+        stored, relaxed, modulus = self._integrals()
+        if relaxed < _NONE * modulus:
             self._strain.value = _STRAIN
-            now, left, _ = self._integrals()
+            stored, relaxed, _ = self._integrals()
             self._strain.value = 0.0
-        return float(now / left)
+        return float(stored / relaxed)
 
     def _integrals(self) -> np.ndarray:
         """Return the integrals of both stresses and of the largest modulus over the elements at the pole, all ranks."""

@@ -332,8 +332,7 @@ def _volume(problem: Any) -> Bound:
 
 
 def _unit_of_volume(forms: Any) -> float:
-    """Return the unit of the dimensionless volume: length^3, or in plane strain length^2 per unit depth, in the
-    user's units."""
+    """Return the unit of the dimensionless volume, length^3; in plane strain per unit depth, length^2."""
     return forms.length**forms.scene.kinematics.dimension_of_volume
 
 

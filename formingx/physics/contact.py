@@ -51,7 +51,7 @@ _ELASTIC_SLIP = 1e-3
 _SLIDES, _STICK, _BONDED = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 """Default (penalty, ramp) of sliding points, of sticking points that separate, and of points that never separate.
 
-A stiffer penalty of the last costs iterations."""
+The last pair also belongs to every tool in three dimensions; a stiffer penalty would cost iterations there."""
 
 
 class Contact(Part):
@@ -63,9 +63,10 @@ class Contact(Part):
         friction: "stick" (no sliding), "none", or the coefficient mu of Coulomb's law (5.9), 0 or larger. A coefficient
             that depends on the temperature of the body is a `table` {T: mu} or the result of `of_temperature`. The
             temperature is that at the last accepted state.
-        penalty: penalty k divided by shear modulus / thickness of the sheet; default 2e5, with separates=False 2e4.
+        penalty: penalty k divided by shear modulus / thickness of the sheet; default 2e5; 2e4 with
+            separates=False and in three dimensions.
         ramp: half-width theta of the ramp over thickness of the sheet; default 1e-7 where points slide, 1e-5 where
-            they stick.
+            they stick and in three dimensions.
         elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, over thickness of the sheet.
         separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for

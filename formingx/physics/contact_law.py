@@ -256,12 +256,12 @@ class ContactLaw:
         """
         raise NotImplementedError
 
-    def ramp(self, d: np.ndarray, held: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+    def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return F(d), the normal traction over the penalty at distance d, and its derivative; by default 0.
 
         Args:
             d: signed distances from the tool, shape (n,), length.
-            held: mask of the points that cannot separate, shape (n,), or False.
+            bonded: mask of the points that cannot separate, shape (n,), or False.
 
         Returns:
             F, shape (n,), length; dF/dd, shape (n,).
@@ -309,6 +309,10 @@ class NormalLaw(ContactLaw):
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
         self._near: tuple[bytes, Nearest] | None = None     # last positions, and their result
+
+    def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
+        raise NotImplementedError(f"{type(self).__name__}: ramp(d, bonded): is not defined; a contact law without"
+                                  f" friction must define it")
 
     def stored(self, d: np.ndarray) -> np.ndarray:
         """Return the energy of the normal traction over the penalty, the integral of `ramp` over the distance.

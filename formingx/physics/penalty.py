@@ -75,7 +75,7 @@ class Law(NormalLaw):
         return (self.distance(x) > -self.theta) | self._bonded(old)
 
     def _bonded(self, old: Touch | None) -> np.ndarray | bool:
-        """Return the mask of the points that were in contact and cannot separate, shape (n,), or False for none."""
+        """Return the mask of the points that were in contact and cannot separate, shape (n,); False for no point."""
         return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -116,7 +116,7 @@ class Law(NormalLaw):
     @property
     def friction(self) -> np.ndarray:
         """Ratio T/N at which a point slides under a vanishing pressure, shape () or (n,); infinite with stick."""
-        sticks = np.asarray(self.mu >= STICKS)
+        sticks = np.asarray(self.sticks)
         grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
         return np.where(sticks, np.inf, grows)
 

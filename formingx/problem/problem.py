@@ -126,8 +126,8 @@ class Problem(Stages, Units):
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, stage.active.rows, strict=True):
             values += multiplier * row
-        held = self.held
-        values[held] = fields[held] - stage.place - stage.rate * control
+        constrained = self.held
+        values[constrained] = fields[constrained] - stage.place - stage.rate * control
         self.fill(out, values, [self._dot(row, fields) - mean if present else multiplier
                                 for row, mean, present, multiplier in
                                 zip(stage.active.rows, stage.means, stage.active.present, multipliers, strict=True)])

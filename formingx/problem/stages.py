@@ -179,12 +179,12 @@ class Stages(Vectors):
         stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
         self._take(stage)
         if setting.fading and control < 1:
-            at, left = self.x.duplicate(), self.x.duplicate()
-            at.array_w[:] = x
-            self.residual(at, control, left)
-            self._stage = stage._replace(left=left.array_r / (1 - control))
-            at.destroy()
-            left.destroy()
+            unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()
+            unknowns.array_w[:] = x
+            self.residual(unknowns, control, unbalanced)
+            self._stage = stage._replace(left=unbalanced.array_r / (1 - control))
+            unknowns.destroy()
+            unbalanced.destroy()
 
     def _take(self, stage: _Stage) -> None:
         """Set the forms, the contacts and the matrix to a stage."""

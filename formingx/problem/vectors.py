@@ -27,7 +27,7 @@ class Vectors(Histories):
 
     @property
     def n_owned(self) -> int:
-        """Number of fields' unknowns that this rank owns."""
+        """Number of field unknowns that this rank owns."""
         return int(self._n)
 
     @cached_property

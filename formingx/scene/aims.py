@@ -72,9 +72,9 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
         for contact in moulds if scene.kinematics.components == 2 else ():
-            room, wrong = _room(scene, contact)
+            room, error = _room(scene, contact)
             room *= scene.symmetry_factor
-            if value > wrong * room:
+            if value > error * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
     return None
 
@@ -178,7 +178,7 @@ def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     if part[-1].any() or part[:, 0].any():
         return np.inf
     weight = np.array([scene.kinematics.weight((r, 0.0)) for r in R])
-    disc = lambda r: r * scene.kinematics.weight((r / 2, 0.0))             # noqa: E731  from the axis to r, a height
+    disc = lambda r: r * scene.kinematics.weight((r / 2, 0.0))             # noqa: E731  volume per height inside r
     within = sum((b[1] - a[1]) / 6 * (disc(a[0]) + 4 * disc((a[0] + b[0]) / 2) + disc(b[0]))
                  for a, b in zip(line, line[1:]))
     return float(size**2 * (weight * part.sum(1)).sum() - within)

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..physics.contact import Contact
 from .scene import Scene
 
-_POSITIONS = 50            # number of positions of the tools that are checked in a stage
+_POSITIONS = 50        # number of positions of the tools that are checked in each piece of a stage
 _MOST = 1000           # largest number of points of a tool in three dimensions that are checked
 
 

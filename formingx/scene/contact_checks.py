@@ -25,7 +25,7 @@ def check_start(scene: Any, contact: Contact) -> None:
         contact: contact of the tool.
 
     Raises:
-        InputError: one of these conditions is violated.
+        InputError: one of these conditions is violated, or the tool does not fit the kinematics.
     """
     contact.friction_at(None if scene.temperature is None else scene.temperature.on(contact.on))
     mesh, near = scene.mesh, 1e-6 * max(scene.extent)

@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..errors import InputError, count, known, several, together
-from ..materials.constants import Sample
+from ..materials.constants import OfMesh, Sample
 from ..materials.hyperelastic import Material
 from ..mesh.contact_columns import for_contacts
 from ..mesh.mesh import Mesh
@@ -117,7 +117,7 @@ class Scene:
         if not isinstance(self.kinematics, Kinematics) or (self.kinematics.components == 3) != in_space:
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
                              f" in space ThreeD()")
-        if preformed is None:
+        if preformed is None and not self._has_constants_of_mesh():
             self.mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
             if self.mesh is not mesh:
                 log.info("elements chosen for the tools: %d columns instead of %d",
@@ -218,8 +218,8 @@ class Scene:
         item = self.items[number]
         if item.direction is None:
             return [number]
-        return [i for i,
-                other in enumerate(self.items) if (other.direction, other.name) == (item.direction, item.name)]
+        return [i for i, other in enumerate(self.items)
+                if (other.direction, other.name) == (item.direction, item.name)]
 
     @property
     def driven(self) -> Any:
@@ -306,6 +306,11 @@ class Scene:
             InputError: two supports act on the same component of the same boundary.
         """
         support_checks.check_driven(supports)
+
+    def _has_constants_of_mesh(self) -> bool:
+        """Return True if a constant of a material is a UFL expression of the mesh, which must then be kept."""
+        return any(isinstance(constant, OfMesh) for material in self.materials.values()
+                   if isinstance(material, Material) for constant in material.constants().values())
 
     def _check_names(self) -> None:
         """Raise an InputError unless the names of items and controls are unique."""

@@ -19,10 +19,10 @@ def check_driven(supports: Sequence[Any]) -> None:
     Raises:
         InputError: two supports act on the same component of the same boundary.
     """
-    constraint = [(support, h) for support in supports for h in support.constraints()]
-    for mine, driven in constraint:
-        for other, h in constraint if driven.driven else ():
-            if other is not mine and (h.on, h.component) == (driven.on, driven.component):
+    pairs = [(support, constraint) for support in supports for constraint in support.constraints()]
+    for mine, driven in pairs:
+        for other, constraint in pairs if driven.driven else ():
+            if other is not mine and (constraint.on, constraint.component) == (driven.on, driven.component):
                 raise InputError(f"{mine!r}: {other!r} holds the same component of the same boundary")
 
 

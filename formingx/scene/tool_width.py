@@ -10,7 +10,7 @@ from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
 
-_DIRECTIONS = 90           # in which a closed tool's width is measured
+_DIRECTIONS = 90           # number of directions in which the width of a closed tool is measured
 
 CUT = 0.1
 """Penetration between contact points over the thickness above which a tool counts as cutting the face."""

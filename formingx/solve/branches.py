@@ -69,8 +69,8 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
         record: record of the run (`Record`).
         step: the state from which the step began, and the states that the step added.
     """
-    for before, behind in _turns(record.curve, step):
-        log.warning(ANOTHER_PATH, record.describe(before), record.describe(behind))
+    for before, after in _turns(record.curve, step):
+        log.warning(ANOTHER_PATH, record.describe(before), record.describe(after))
 
 
 def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:

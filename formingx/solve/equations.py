@@ -113,8 +113,8 @@ class Increment(Protocol):
     def taken(self, points: Array) -> tuple[Array, Array]:
         """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c), (m, c, c)."""
 
-    def foretold(self, by: Array) -> Tractions:
-        """Return the tractions at all points after a motion `by` of the points relative to their tool, shape (n, c),
+    def predicted(self, motion: Array) -> Tractions:
+        """Return the tractions at all points after a `motion` of the points relative to their tool, shape (n, c),
         length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:

@@ -111,20 +111,22 @@ class LocalSolve:
             if change is None:
                 self.failed += 1
                 return step
-            more, by = change
-            if not self._others(dx.array_r + more, step + by):
+            correction, step_correction = change
+            if not self._others(dx.array_r + correction, step + step_correction):
                 break
-        dx.array_w += more
-        return step + by
+        dx.array_w += correction
+        return step + step_correction
 
     def _others(self, dx: Array, step: float) -> bool:
-        """Mark further points whose status changes in a Newton update, and return True if there are any on any rank.
+        """Mark further points whose status changes in a Newton update, and return True if a rank has such points.
+
+        Set the sense of sliding that the next linearisation assumes at the marked points.
 
         dx: update of x, locally owned entries, shape (n,). step: update of the control.
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
-            law = contact.increment.foretold(contact.moved(dx, step))
+            law = contact.increment.predicted(contact.moved(dx, step))
             new = (law.status != status) & ~mark
             mark |= new
             found |= bool(new.any())
@@ -234,8 +236,8 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
-        y, by, behind = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.behind)
-        least, halved = np.inf, _LOCAL.halved
+        y, dy, behind = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.behind)
+        before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
         for k in range(_LOCAL.iterations):
             f, S = self._law(laws, y)
@@ -245,21 +247,21 @@ class _Points:
             if miss < accuracy:
                 forces = -self._scale * more
                 return self._columns @ forces, float(self._steps @ forces)
-            if miss > least and halved < _LOCAL.halved:
-                by, halved = by / 2, halved + 1
-                y = y + by
+            if miss > before and halvings:
+                dy, halvings = dy / 2, halvings - 1
+                y = y - dy
                 continue
-            least, found = miss, self._within(S - S0, R)
-            if found is None:
+            before, correction = miss, self._within(S - S0, R)
+            if correction is None:
                 return None
-            new = y - found
+            new = y - correction
             if k >= _LOCAL.full:
-                new, whole = self._to_foot(ramps, y, new, behind)
-                halved = _LOCAL.halved if whole else 0
-            y, by = new, y - new
+                new, keep = self._stop_at_edge(ramps, y, new, behind)
+                halvings = 0 if keep else _LOCAL.halved
+            y, dy = new, new - y
         return None
 
-    def _to_foot(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> tuple[Array, bool]:
+    def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> tuple[Array, bool]:
         """Stop corrections of motions at the outer edge of the ramp.
 
         The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero at its outer edge. A point
@@ -276,12 +278,13 @@ class _Points:
         Returns:
             (the stopped motions, True if the correction must not be halved: a point was stopped, or all points stick).
         """
-        (was, _), (now, way) = (self._all(self._each(ramps, at), (), (self._c,)) for at in (y, new))
-        leaves, enters = (was > _LOCAL.least) & (now <= 0), (was <= 0) & (now > 0)
-        at = np.where(leaves, _LOCAL.stays * np.minimum(was, 1.0), np.where(enters, np.minimum(now, behind), now))
+        (before, _), (depth, path) = (self._all(self._each(ramps, z), (), (self._c,)) for z in (y, new))
+        leaves, enters = (before > _LOCAL.least) & (depth <= 0), (before <= 0) & (depth > 0)
+        stopped = np.where(leaves, _LOCAL.stays * np.minimum(before, 1.0),
+                           np.where(enters, np.minimum(depth, behind), depth))
         behind[enters] *= _LOCAL.farther
-        stops = (at - now)[:, None] * way
-        return new + stops.ravel(), bool(stops.any() or way.any(axis=1).all())
+        back = (stopped - depth)[:, None] * path
+        return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
         """Return solutions V = K^-1 E, or dx/dcontrol, updated to changed stiffnesses of the points.
@@ -328,7 +331,7 @@ class _Points:
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
         """Return (forces, flat; stiffnesses, shape (k, c, c)) of the contact law after motions y; `laws`: a function
         per face."""
-        return self._forces([(there.force, there.stiffness) for there in self._each(laws, y)])
+        return self._forces([(tractions.force, tractions.stiffness) for tractions in self._each(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
         """Gather pairs (forces, stiffnesses) of the faces from all ranks: flat forces, and stiffnesses, shape (k, c,

@@ -84,8 +84,7 @@ class Flow(Run):
             try:
                 new = self._at(old, event if dt == left else old.time + dt)
                 error = self._error_in_time(new)
-                if dt < _STEPS.stretched * self.step.length * self._duration:
-                    self.step.accepted(tangents(new.history), error)
+                self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
             except Cutback as cut:
                 self.step.length = min(cut.part, _STEPS.cut) * dt / self._duration
@@ -116,8 +115,7 @@ class Flow(Run):
         problem, problem.clock = self.problem, time
         value = float(self._course(time))
         x, control = self._predicted(old, time, value)
-        by, slope = x - old.x, control - old.control
-        way, limit = Way(old.x, old.control, by, slope, 1.0), problem.limit
+        way, limit = Way(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
         if limit and limit.length(way) < _STEPS.contact:
             raise Failure("too many points would come into contact in one step", [])
         if limit:

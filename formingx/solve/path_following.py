@@ -176,14 +176,14 @@ class Run:
         empty if no state has any.
         """
         record, last = self.record, self.record.last
-        there = record.restore()
+        number = record.restore()                           # of states with the present step data
         aim, bound = self.aim, self.aim.measure
         pressure = isinstance(bound, Amplitude) and bound.of_load
         if may_turn and last.stepping.get("until") != [*aim.until[:2]] and not pressure:
             with self.problem.state_context(last):
                 facing = aim.facing(replace(last))
             self._turned = [facing] if facing.slope != last.slope else []
-        self._first -= 1 if self._turned else there
+        self._first -= 1 if self._turned else number
         for state in self.states:
             with self.problem.state_context(state):
                 aim.look(state)
@@ -353,9 +353,9 @@ class Run:
         for ahead in dict.fromkeys((self._ahead, *others)):
             self._ahead = ahead
             try:
-                by = self._sense * max(ahead, length * abs(old.slope))
-                by = 1 - old.control if fading else self.aim.short_of_targets(old, by)
-                new = snap_through(self.curve, old, by, length > 0 and not fading, settings, self._solutions(old),
+                change = self._sense * max(ahead, length * abs(old.slope))
+                change = 1 - old.control if fading else self.aim.short_of_targets(old, change)
+                new = snap_through(self.curve, old, change, length > 0 and not fading, settings, self._solutions(old),
                                    lambda: self._progress.limited("a jump", self.step.length), onward, self.states)
                 break
             except Failure as last:

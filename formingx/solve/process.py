@@ -207,10 +207,8 @@ class Execution:
 
         numbers: numbers of the controlled item and of the items that move with it.
         """
-        before, _, control = self._standing()
-        if not begun:
-            control = self._enter_driving(numbers)
-        self._trace(self._left_to_meet(), None if begun else control)
+        control = None if begun else self._enter_driving(numbers)
+        self._trace(self._left_to_meet(), control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of one item is the control; return the present value of the control.
@@ -365,12 +363,12 @@ def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int]
         base[number], rate[number] = 0.0, 1.0
     until = stage.until
     if clocked and until is not None and (stage.speed or stage.duration):
-        there = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
-        way = there - control
-        if way and stage.speed:
-            rate[-1] = np.sign(way) * scale / stage.speed
-        elif way and stage.duration:
-            rate[-1] = stage.duration / way
+        goal = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
+        change = goal - control
+        if change and stage.speed:
+            rate[-1] = np.sign(change) * scale / stage.speed
+        elif change and stage.duration:
+            rate[-1] = stage.duration / change
         base[-1] -= rate[-1] * control
     return base, rate, control
 

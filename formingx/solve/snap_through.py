@@ -214,10 +214,10 @@ class _Motion:
         before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.rest < min(self.near, before)
         self._lose(origin, x, pull)                         # from the last or the predicted position
-        self._pull, self.at, by = pull, new, x - last.x
+        self._pull, self.at = pull, new
         self.problem.advance(x, self.control)
         if limit:
-            limit.prepare(Way(x, self.control, by, 0.0, 1.0))
+            limit.prepare(Way(x, self.control, x - last.x, 0.0, 1.0))
         self.solved += 1
         stays, self._wait = self._wait or len(history) - 1 > settings.few, False
         return max(1.0 if stays else settings.falls, far)
@@ -275,8 +275,8 @@ class _Motion:
             x: unknowns at its end.
             pull: unbalanced forces at its end.
         """
-        by = x - a
-        self.lost += 0.5 * (max(self._sum(self._pull * by), 0.0) + self._sum(pull * by))
+        dx = x - a
+        self.lost += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
 
     def _sum(self, values: Array) -> float:
         """Return the sum of locally owned values over all ranks."""

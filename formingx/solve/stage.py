@@ -116,8 +116,7 @@ class Stage:
         if self.constant is not None and (self.control is None
                                           or self.duration is None or until or amplitudes is not None):
             raise InputError(f"{caller}: constant = {self.constant}: give it control=..., what is adjusted to hold"
-                             f" it, and"
-                             f" duration=..., and neither until nor amplitudes")
+                             f" it, and duration=..., and neither until nor amplitudes")
         if amplitudes is not None and (self.speed or self.duration):
             raise InputError(f"{caller}: amplitudes has times of its own: give no speed or duration")
         if self.speed and (self.control is None or self.duration):
@@ -128,12 +127,10 @@ class Stage:
                              f" travel(3)")
         if self.control is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
             raise InputError(f"{caller}: until = {until} with a duration: must be a target of what is driven; give a"
-                             f" speed"
-                             f" instead")
+                             f" speed instead")
         if self.control is None and amplitudes is None and until is not None and self.duration is None:
             raise InputError(f"{caller}: has a target but drives nothing: give it control=..., amplitudes=..., or"
-                             f" duration=...,"
-                             f" the longest time that it is waited for")
+                             f" duration=..., the longest time that it is waited for")
         if self.control is None and amplitudes is None and self.duration is None and self.intermediate:
             raise InputError(f"{caller}: has targets but drives nothing: give it control=..., amplitudes=... or"
                              f" duration=...")
@@ -155,8 +152,7 @@ class Stage:
         """
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
-                             f" [(time,"
-                             f" value), ...]}} with a function that makes targets, such as enclosed_volume")
+                             f" [(time, value), ...]}} with a function that makes targets, such as enclosed_volume")
         ((measure, course),) = amplitudes.items()
         if callable(course):
             if self.until is None:
@@ -251,16 +247,16 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     for number in numbers:
         item = scene.items[number]
         if not item.driven:
-            raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a PrescribedDisplacement"
-                             f" support, or a Contact that moves can")
+            raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a"
+                             f" PrescribedDisplacement, or a Contact with a direction can")
         if number in off and item.direction is None:                  # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{caller}: one thing has two tables")
-    there = [item for i, item in enumerate(scene.items) if i not in off]
+    present = [item for i, item in enumerate(scene.items) if i not in off]
     try:
-        supports = [t for t in there if t in scene.supports]
-        scene.check_constrained(supports, any(t in there for t in scene.contacts))
+        supports = [item for item in present if item in scene.supports]
+        scene.check_constrained(supports, any(contact in present for contact in scene.contacts))
         scene.check_driven(supports)
         aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], off)
     except InputError as error:

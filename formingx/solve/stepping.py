@@ -100,8 +100,7 @@ def allowed(caller: str, accuracy: str | float) -> float:
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
             raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"
-                             f" or an"
-                             f" error such as 1e-4")
+                             f" or an error such as 1e-4")
         return ACCURACY[accuracy]
     if not 0 < finite(f"{caller}: accuracy", accuracy) < 1:
         raise InputError(f"{caller}: accuracy = {accuracy!r}: must be between 0 and 1")

@@ -115,9 +115,9 @@ class _Segment(NamedTuple):
 
     def after(self, time: float) -> _Segment:
         """Return the segment with its start moved along the segment to an arc length `time`."""
-        by = time - self.begins
-        return self._replace(begins=time, at=[x + by * w for x, w in zip(self.at, self.speed)],
-                             force=self.force + by * self.rate, extra=self.extra + by * self.growth)
+        ds = time - self.begins
+        return self._replace(begins=time, at=[x + ds * w for x, w in zip(self.at, self.speed)],
+                             force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
 
     def of(self, m: int) -> _Segment:
         """Return the segment extended to m points of known compliance; added points are open."""
@@ -260,12 +260,15 @@ class ContactEventSequence:
         found = [face.tractions(x[: self._n], control) for face in self._faces]
         force = self._points.at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
         status = self._points.at([t.sense for t in found]).astype(int)
-        status[self._points.friction == 0] = 1
+        status[self._points.friction == 0] = ContactStatus.SLIDES
         slip = self._points.at([np.zeros(len(face.points)) if face.touch is None else face.touch.slip
                                 for face in self._faces])
         piece = self._pieces[0].of(len(status))
         place = self._points.at(piece.at) - slip[:, None] * self._points.near(piece.at, force).tangent
-        return self._turn(piece._replace(status=status, force=force, place=place), status) and bool(self._pieces.pop(0))
+        if not self._turn(piece._replace(status=status, force=force, place=place), status):
+            return False
+        del self._pieces[0]
+        return True
 
     def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
         """Append a segment with new statuses, shape (m,), at the start of `piece`; return False if this fails."""
@@ -334,14 +337,14 @@ class ContactEventSequence:
         closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
-            law, by = face.law.part([i]), 0.0
+            law, ds = face.law.part([i]), 0.0
             for _ in range(_SETTINGS.to_surface):
-                near = law.nearest(x + by * w)
+                near = law.nearest(x + ds * w)
                 gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
                 if abs(gap) < _SETTINGS.same_place * law.theta or not rate > 0:
                     break
-                by = max(by - gap / rate, self._pieces[-1].begins - time)
-            closure = GapClosure(time + by, rank, f, i, (x + by * w)[0], float(face.rule.lengths[i]),
+                ds = max(ds - gap / rate, self._pieces[-1].begins - time)
+            closure = GapClosure(time + ds, rank, f, i, (x + ds * w)[0], float(face.rule.lengths[i]),
                                  bool(np.isinf(np.ravel(law.friction)[0])))
         return self._comm.bcast(closure, root=rank)
 
@@ -398,9 +401,8 @@ class ContactEventSequence:
 
         The stored LU factors make iterates without acceleration oscillate.
         """
-        by = np.array([np.concatenate([(b - a).ravel() for a, b in zip(before.at, after.at)])
-                       for before, after in tried])
-        gram = self._comm.allreduce(by @ by.T)
+        changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.at, y.at)]) for x, y in tried])
+        gram = self._comm.allreduce(changes @ changes.T)
         if not gram.trace() < FAR:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
@@ -420,20 +422,19 @@ class ContactEventSequence:
         piece, points = piece.of(len(self._points.who)).after(time), self._points
         x, control, direction, slope = self._way
         self._work += 1
-        forces = [np.full(at.shape, np.nan) for at in piece.at]
-        for given, free in zip(forces, self._free):
-            given[free] = 0.0                               # open points carry no force
+        # open points carry no force
+        forces = [np.where(free[:, None], 0.0, np.full(at.shape, np.nan)) for free, at in zip(self._free, piece.at)]
         points.spread(piece.force, forces)
-        by = self._response.to_equilibrium(
+        change = self._response.to_equilibrium(
             x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),
             control + time * slope + piece.off[1] - float(points.steps @ piece.extra.ravel()), forces)
-        if by is None:
+        if change is None:
             return None
-        moved = [face.moved(by[0][: self._n], by[1]) for face in self._faces]
+        moved = [face.moved(change[0][: self._n], change[1]) for face in self._faces]
         piece = self._held(piece, moved)
         if not np.isfinite(piece.extra).all():
             return None
-        return piece._replace(off=(piece.off[0] + by[0], piece.off[1] + by[1]))
+        return piece._replace(off=(piece.off[0] + change[0], piece.off[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
         """Solve for the compliance of the last and of the expected next closures; return False without LU factors."""

@@ -142,6 +142,11 @@ class Points:
         self._S = np.concatenate([self._S, known * touched])
         return True
 
+    @property
+    def _mu(self) -> np.ndarray:
+        """Coefficient of friction of each point, shape (m,), 0 for stick."""
+        return np.where(self.friction < np.inf, self.friction, 0.0)
+
     def at(self, values: Sequence[np.ndarray], point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
         """Return values at contact points of all ranks, shape (m, ...).
 
@@ -249,7 +254,7 @@ class Points:
             New forces F, and the change of force outside the factorised tangent, dF - S dx, shape (m, 2) each. If no
             such forces exist, the second is NaN and F is `force`.
         """
-        N, mu = self.parts(force, near)[0], np.where(self.friction < np.inf, self.friction, 0.0)
+        N, mu = self.parts(force, near)[0], self._mu
         slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
         try:
             small = self._small(u + (self._C @ force.ravel()).reshape(u.shape), near,
@@ -303,8 +308,8 @@ class Points:
         Returns:
             Rates of the forces and of the positions, shape (m, 2) each, and statuses; None if the search failed.
         """
-        seen, mu = set(), np.where(self.friction < np.inf, self.friction, 0.0)
-        gives_way = self._C.diagonal().reshape(len(N), -1).mean(1)
+        seen, mu = set(), self._mu
+        compliance = self._C.diagonal().reshape(len(N), -1).mean(1)
         for k in range(_SEARCH.tries):
             try:
                 F, dx = self._solved(small, status, near)
@@ -313,23 +318,23 @@ class Points:
             if not np.isfinite(F).all():
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
-            none = _SEARCH.limit * (np.abs(N).max() + _SEARCH.soon * np.abs(dN).max())
+            negligible = _SEARCH.limit * (np.abs(N).max() + _SEARCH.soon * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != ContactStatus.STICKS) & (mu > 0)
             turns = slides & (status * along < -_SEARCH.none * np.abs(along).max())
             other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
-            most = mu * ((1 - _SEARCH.limit) * N - none)
-            full = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
-            sense = np.where(np.abs(T) > mu * none, np.sign(T), np.sign(dT))
+            most = mu * ((1 - _SEARCH.limit) * N - negligible)
+            at_limit = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
+            sense = np.where(np.abs(T) > mu * negligible, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            gives = full & (over > _SEARCH.none * np.abs(dT).max())
-            other[gives], miss[gives] = sense[gives], (over * gives_way)[gives]
-            lets = held & ~self._pulls & (none >= N) & (dN < 0)
-            other[lets], miss[lets] = ContactStatus.FREE, -(dN * gives_way)[lets]
-            comes = here & ~held & (into > 0)
-            sense = np.where(along[comes] < 0, ContactStatus.SLIDES_BACK, ContactStatus.SLIDES)
-            other[comes] = np.where(self.friction[comes] < np.inf, sense, ContactStatus.STICKS)
-            miss[comes] = into[comes]
+            slips = at_limit & (over > _SEARCH.none * np.abs(dT).max())
+            other[slips], miss[slips] = sense[slips], (over * compliance)[slips]
+            opens = held & ~self._pulls & (negligible >= N) & (dN < 0)
+            other[opens], miss[opens] = ContactStatus.FREE, -(dN * compliance)[opens]
+            closes = here & ~held & (into > 0)
+            sense = np.where(along[closes] < 0, ContactStatus.SLIDES_BACK, ContactStatus.SLIDES)
+            other[closes] = np.where(self.friction[closes] < np.inf, sense, ContactStatus.STICKS)
+            miss[closes] = into[closes]
             changes = np.flatnonzero(other != status)
             if not len(changes):
                 return F, dx, status
@@ -353,21 +358,21 @@ class Points:
             Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
             change.
         """
+        if not len(status):
+            return np.inf, status
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
-        none = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
+        negligible = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
-        lets = held & ~self._pulls & (dN < 0) & (none < N)
-        times[lets], other[lets] = -N[lets] / dN[lets], ContactStatus.FREE
-        for sense in (1, -1):
-            k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
-            mu = self.friction[k]
-            left, grows = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (grows > 0) & (left > _SEARCH.limit * mu * np.abs(N[k]))
-            t = np.divide(left, grows, out=np.full(len(k), np.inf), where=slips)
+        opens = held & ~self._pulls & (dN < 0) & (negligible < N)
+        times[opens], other[opens] = -N[opens] / dN[opens], ContactStatus.FREE
+        k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
+        mu = self.friction[k]
+        for sense in (ContactStatus.SLIDES, ContactStatus.SLIDES_BACK):
+            margin, closing = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
+            slips = (closing > 0) & (margin > _SEARCH.limit * mu * np.abs(N[k]))
+            t = np.divide(margin, closing, out=np.full(len(k), np.inf), where=slips)
             first = t < times[k]
             times[k[first]], other[k[first]] = t[first], sense
-        if not len(times):
-            return np.inf, status
         first = int(np.argmin(times))
         after = status.copy()
         after[first] = other[first]
@@ -407,11 +412,11 @@ class Points:
         Returns:
             Forces, or their rates without `to`, and motions of the points, shape (m, 2) each.
         """
-        free, by, turn = small
+        free, C, turn = small
         held, m, c = status != ContactStatus.FREE, len(status), self._components
         stuck = held & (status == ContactStatus.STICKS) & (self.friction > 0)
         sticks, slides = np.flatnonzero(stuck), np.flatnonzero(held & ~stuck)
-        mu = np.where(self.friction < np.inf, self.friction, 0.0)
+        mu = self._mu
         # one unknown force per direction: normal and tangent of sticking points, Coulomb's cone edge of sliding points
         point = np.concatenate([sticks, sticks, slides])
         into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
@@ -420,17 +425,17 @@ class Points:
         each, columns = np.arange(len(point))[:, None], c * point[:, None] + np.arange(c)
         A, B = np.zeros((len(point), len(free))), np.zeros((len(free), len(point)))
         A[each, columns], B[columns, each] = into, against
-        gives, a = A @ by @ B, np.zeros(len(point))
-        largest = np.abs(gives).max(1, initial=0.0)
+        compliance, a = A @ C @ B, np.zeros(len(point))
+        largest = np.abs(compliance).max(1, initial=0.0)
         most = largest.max(initial=0.0)
         stiff = np.flatnonzero(largest < _SEARCH.none * most)
-        gives[stiff, stiff] = most                          # no motion along a support or across the axis
+        compliance[stiff, stiff] = most                          # no motion along a support or across the axis
         if to is not None:
             n = 2 * len(sticks)
             a[:n], a[n:] = np.einsum("ni,ni->n", to[point[:n]], into[:n]), near.beyond[slides]
         if slips is not None:
             k = each[len(sticks):2 * len(sticks), 0]
-            gives[k, k] += slips[sticks]
-        size_of = np.linalg.solve(gives, A @ free - a)
-        dx = (free - by @ (B @ size_of)).reshape(m, c)
-        return (B @ size_of).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx
+            compliance[k, k] += slips[sticks]
+        amounts = np.linalg.solve(compliance, A @ free - a)
+        dx = (free - C @ (B @ amounts)).reshape(m, c)
+        return (B @ amounts).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx

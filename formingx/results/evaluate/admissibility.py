@@ -159,8 +159,8 @@ class AdmissibilityCheck:
                 error = _force_error(contact, state, self._images)
                 depth = resultants.penetration(contact, state.x, state.control)
                 if error > _LIMITS.largest_error and depth > _LIMITS.negligible_penetration * contact.thickness:
-                    yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes the force"
-                           f" by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
+                    yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes"
+                           f" the force by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {contact.contact.label!r}, which has no friction and cannot"
                            f" hold it: it is behind the tool")

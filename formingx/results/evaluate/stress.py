@@ -296,7 +296,7 @@ class Stresses:
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
         if number not in self._raw:
-            parts = self._parts(*forms.bodies[number])
+            parts = self._parts(forms.bodies[number][1])
             metadata = parts[-1][1]                       # rule of the volume term
             if "quadrature_points" in metadata:
                 points, weights = metadata["quadrature_points"], metadata["quadrature_weights"]
@@ -316,11 +316,11 @@ class Stresses:
                              for e, n in ((values, _COUNT), (where, 3)))
         return where[..., :-1], values, where[..., -1] * weights
 
-    def _parts(self, material: Any, names: list[str]) -> list[tuple[Any, dict]]:
+    def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
         """Return [(entries of S (UFL), quadrature metadata)]: of the material, and of the volume term."""
         F = ufl.variable(self.problem.forms.F)
         parts = []
-        for density, metadata in self.problem.forms.energy_densities(material, names, F):
+        for density, metadata in self.problem.forms.energy_densities(names, F):
             S = self.problem.forms.ratio_before * ufl.inv(F) * ufl.diff(density, F)
             parts.append(([S[i] for i in _S], metadata))
         return parts
@@ -340,7 +340,7 @@ class Stresses:
         rhs: Any = 0
         column = {name: k for k, name in enumerate(self.cells)}
         for body in bodies:
-            parts = self._parts(*body)
+            parts = self._parts(body[1])
             for name in body[1]:
                 k, dx = column[name], forms.dx(mesh.layers[name])
                 mass += trial[k] * test[k] * dx
