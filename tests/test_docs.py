@@ -138,6 +138,8 @@ def test_sphinx_warns_of_nothing(tmp_path):
     assert [name for name, thing in public().items() if not any(
         f'id="{place}"' in page for place in (f"formingx.{name}", f"{thing.__module__}.{thing.__qualname__}"))] == []
 
+    assert [f"{base}.{member}" for base, member in inherited() if f'.{base}.{member}"' not in page] == []
+
 
 def test_public_names_are_documented():
     assert all(thing.__doc__ for thing in public().values())
@@ -149,6 +151,15 @@ def public():
     rooms = {"": fx, "mesh.": fx.mesh, "tools.": fx.tools}
     return {prefix + name: getattr(room, name) for prefix, room in rooms.items() for name in dir(room)
             if not name.startswith("_") and callable(getattr(room, name)) and (room is fx or not hasattr(fx, name))}
+
+
+def inherited():
+    """[(class, method or property)] that public classes inherit from classes of the package."""
+    bases = {base for thing in public().values() for base in getattr(thing, "__mro__", ())[1:]
+             if base.__module__.startswith("formingx") and not base.__name__.startswith("_")
+             and base.__name__ not in {"Kinematics", "Model", "RunExtension"}}      # these are not for users
+    return [(base.__qualname__, member) for base in bases for member, value in vars(base).items()
+            if not member.startswith("_") and (callable(value) or isinstance(value, property))]
 
 
 def test_one_version():
