@@ -44,11 +44,20 @@ class ThermalProperties:
 
 
 class _Boundary:
-    """Law of heat at a face.
+    """Law of heat at a face, with parameters that are constant or vary with the reference radius R.
+
+    Args:
+        on: name of the boundary.
+        parameters: numbers or tables over R, by name.
 
     Attributes:
-        parameters: {name: number or Table over R}.
+        on: name of the boundary.
+        parameters: {name: number or `Table` over R}.
         temperatures: names of the parameters that are temperatures.
+        quadrature_degree: degree of the quadrature of the flux along an edge.
+
+    Raises:
+        InputError: a parameter that is neither a finite number nor a table.
     """
 
     parameters: dict[str, float | Table]
@@ -62,7 +71,7 @@ class _Boundary:
                            for name, value in parameters.items()}
 
     def _between(self, name: str, low: float, high: float = float("inf")) -> None:
-        """Raise an InputError unless all values of a parameter lie between two bounds."""
+        """Raise an InputError unless the values of the parameter `name` lie between `low` and `high`."""
         value = self.parameters[name]
         for number in value.y if isinstance(value, Table) else [value]:
             if not low <= number <= high:
@@ -70,7 +79,12 @@ class _Boundary:
                 raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError unless temperatures are above absolute zero and tables cover the boundary."""
+        """Raise an InputError unless temperatures are above absolute zero and tables cover the boundary.
+
+        Args:
+            mesh: the `Mesh`, which must have the boundary.
+            absolute_zero: absolute zero in the unit of temperatures.
+        """
         for name, value in self.parameters.items():
             if name in self.temperatures:
                 self._between(name, absolute_zero)
@@ -102,12 +116,12 @@ class Convection(_Boundary):
         self._between("h", 0.0)
 
     def flux(self, T, absolute_zero, h, air):
-        """Return the heat flux into the face.
+        """Return the heat flux h (air - T) into the face.
 
         Args:
-            T: temperature (UFL scalar).
+            T: temperature of the face (UFL scalar).
             absolute_zero: not used.
-            h: heat transfer coefficient (UFL scalar).
+            h: heat transfer coefficient (UFL scalar), heat per time, area and degree.
             air: temperature of the air (UFL scalar).
 
         Returns:
@@ -143,15 +157,15 @@ class Radiation(_Boundary):
         self._between("view_factor", 0.0, 1.0)
 
     def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
-        """Return the heat flux into the face.
+        """Return the heat flux from the heater into the face, less the radiation of the face.
 
         Args:
-            T: temperature (UFL scalar).
+            T: temperature of the face (UFL scalar).
             absolute_zero: absolute zero in the unit of temperatures.
-            emissivity: emissivity of the face (UFL scalar).
+            emissivity: emissivity of the face, from 0 to 1 (UFL scalar).
             heater: temperature of the heater (UFL scalar).
-            view_factor: view factor (UFL scalar).
-            stefan_boltzmann: Stefan-Boltzmann constant.
+            view_factor: view factor, from 0 to 1 (UFL scalar).
+            stefan_boltzmann: Stefan-Boltzmann constant in the units of the run.
 
         Returns:
             Flux (UFL scalar), heat per time and area.
@@ -175,21 +189,21 @@ class HeatFlux(_Boundary):
         super().__init__(on, flux=flux)
 
     def flux(self, T, absolute_zero, flux):
-        """Return the heat flux into the face.
+        """Return the prescribed heat flux into the face.
 
         Args:
             T: not used.
             absolute_zero: not used.
-            flux: the flux (UFL scalar).
+            flux: prescribed flux (UFL scalar), heat per time and area.
 
         Returns:
-            Flux (UFL scalar), heat per time and area.
+            The argument `flux`.
         """
         return flux
 
 
 class FixedTemperature(_Boundary):
-    """Face at a prescribed temperature from the start.
+    """Prescribed temperature of a face from the start of the run.
 
     Args:
         on: name of the boundary.
@@ -212,12 +226,15 @@ class Absorption:
 
     .. math:: s = q \, a \exp(-a x)
 
-    Radiation that leaves through the other face is lost.
+    Radiation that leaves through the opposite face is lost. For radiation from both sides give one law per face.
 
     Args:
-        on: name of the boundary through which the radiation enters; two laws for radiation from both sides.
+        on: name of the boundary through which the radiation enters.
         flux: incoming radiation q, heat per time and area.
         coefficient: absorption coefficient a, 1/length, positive.
+
+    Raises:
+        InputError: a negative flux, or a coefficient that is not positive.
 
     >>> fx.Absorption("top", flux=2e-3, coefficient=1.5)                           # W/mm2, 1/mm
     Absorption('top', flux=0.002, coefficient=1.5)

@@ -1,4 +1,4 @@
-"""Checks of a body that cools."""
+"""Checks of a scene with heat conduction (`Scene(heat=...)`), before and after a run."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -16,11 +16,11 @@ from .run import checked_materials
 
 _FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
            " glass")
-_RISES = 2.0               # modulus of the coldest over the modulus of the hottest body
-
+_RISES = 2.0
+"""Equilibrium modulus at the lowest over the modulus at the highest temperature, above which `springs_back` warns."""
 
 _ALLOWED = 0.01
-"""Error of the temperature, over the span of temperatures, above which the check warns."""
+"""Error of the temperature, over the span of temperatures, for which `layers_needed` asks."""
 _ONE_LAYER = 0.14
 """Error over the span of temperatures with one layer of elements, for a face that is chilled suddenly.
 
@@ -30,48 +30,48 @@ This and the next two constants were measured with one to eight equal layers, af
 _ORDER = 1.75
 """Order of the error in the number of layers."""
 _WEAK = 2.0
-"""Biot number, conductance times wall over conductivity, at which the error is half as large."""
+"""Biot number (conductance times wall over conductivity) at which the error is half the error at an infinite one."""
 
 
 def error_of_layers(layers: float, biot: float) -> float:
-    """Return the relative temperature error in a sheet soon after a face is chilled.
+    """Return the relative temperature error in a sheet, due to coarse elements, soon after a face is chilled.
 
     Args:
-        layers: wall over the thickness of the elements at the face.
-        biot: conductance times wall over conductivity.
+        layers: thickness of the sheet over the thickness of the elements at the face.
+        biot: Biot number: conductance of the face times thickness of the sheet over conductivity.
 
     Returns:
-        Error over the span of temperatures.
+        Error over the difference between the highest and the lowest temperature.
     """
     return _ONE_LAYER * _share(biot) * layers ** -_ORDER
 
 
 def layers_needed(biot: float) -> int:
-    """Return the number of equal layers of elements for an error of 1 %.
+    """Return the number of equal layers of elements for a relative temperature error of 1 %, see `error_of_layers`.
 
     Args:
-        biot: conductance times wall over conductivity.
+        biot: Biot number: conductance of the chilled face times thickness of the sheet over conductivity.
 
     Returns:
-        Number of layers, see `error_of_layers`.
+        Number of layers through the thickness.
     """
     return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
 
 
 def _share(biot: float) -> float:
-    """Return the error of the temperature by coarse layers at a Biot number over the error at an infinite one."""
+    """Return the temperature error of coarse layers at a Biot number over their error at an infinite one."""
     return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
 
 
 @register("scene")
 def coarse_layers(body: Any) -> Iterator[Finding]:
-    """Find sheets with too few layers of elements below a chilled face.
+    """Find chilled faces of a sheet with too few layers of elements below them; collective.
 
     Args:
-        body: the examined body.
+        body: the `formingx.checks.sizes.Body`, with `scene` and the `thickness` of the sheet.
 
     Yields:
-        A finding for each such face.
+        A warning for the face with the largest error.
     """
     scene = body.scene
     if scene.heat is None:
@@ -86,14 +86,14 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
     if not found:
         return
     error, face, height, needed = max(found)
-    such = ""
+    advice = ""
     if face in ("bottom", "top"):
         sizes = graded(scene.mesh, [face], body.thickness / needed / height, np.inf)
-        such = f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
+        advice = f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
     yield Finding("warning", f"boundary {face!r}",
                   f"it is chilled, and the elements along it are {height:.3g} thick, in a wall of {body.thickness:.3g}:"
                   f" temperatures will be off by about {100 * error:.2g} % of their span: use {needed} layers of equal"
-                  f" elements, or thin ones at this face{such}")
+                  f" elements, or thin ones at this face{advice}")
 
 
 @register("scene")
@@ -104,10 +104,11 @@ def springs_back(body: Any) -> Iterator[Finding]:
     mould and shrank to a third of its height.
 
     Args:
-        body: the examined body.
+        body: the examined body, with its `scene`.
 
     Yields:
-        A finding for each such constant.
+        A warning for each material constant that is more than twice as large at the lowest temperature as at the
+        highest.
     """
     scene = body.scene
     if scene.heat is None:
@@ -122,7 +123,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
                 continue
             try:
                 cold, hot = value.clamped(np.array([low, high]))
-            except InputError:                              # it says so itself, if it reaches that
+            except InputError:                              # the run raises it, if it reaches the temperature
                 continue
             if cold > _RISES * hot > 0:
                 yield Finding("warning", f"layer {layer!r}",
@@ -134,13 +135,13 @@ def springs_back(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def beyond_limits(body: Any) -> Iterator[Finding]:
-    """Find temperatures that the body may reach by tools, air and heaters, but at which a constant is unknown.
+    """Find constants that are unknown at temperatures to which tools, air and heaters may bring the body; collective.
 
     Args:
-        body: the examined body.
+        body: the examined body, with its `scene`.
 
     Yields:
-        A finding for each such constant.
+        A warning for each constant and each end of its known range.
     """
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
@@ -149,32 +150,34 @@ def beyond_limits(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def were_beyond_limits(path: Any) -> Iterator[Finding]:
-    """Find temperatures of the run at which a constant is unknown, unless an earlier check has found them.
+    """Find constants that were unknown at temperatures of the run and not reported by a check before it; collective.
 
     Args:
         path: the computed `Path`.
 
     Yields:
-        A finding for each such constant.
+        A warning for each constant and each end of its known range.
     """
-    said = {finding.about for finding in path.record.findings}
+    reported = {finding.about for finding in path.record.findings}
     states = path.segments[-1].states
     for k, history in enumerate(path.problem.histories):
         if isinstance(history, CoolingHistory):
-            mine = [f(state.memory[k].temperature) for state in states if len(state.memory[k].temperature)
+            local = [f(state.memory[k].temperature) for state in states if len(state.memory[k].temperature)
                     for f in (np.min, np.max)]
-            ends = [value for part in path.problem.comm.allgather(mine) for value in part]
+            ends = [value for part in path.problem.comm.allgather(local) for value in part]
             found = _beyond(path.problem.scene, min(ends), max(ends), "the run brought it")
-            yield from (finding for finding in found if finding.about not in said)
+            yield from (finding for finding in found if finding.about not in reported)
 
 
 def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
-    """Yield findings for constants of materials, friction and expansion that are unknown between two temperatures.
+    """Yield warnings for functions of temperature that are unknown at one of two temperatures.
+
+    The functions are constants of materials, friction coefficients and specific volumes.
 
     Args:
-        scene: the scene.
-        low: lowest temperature.
-        high: highest temperature.
+        scene: the `Scene`.
+        low: lowest temperature of the body.
+        high: highest temperature of the body.
         cause: subject and verb of the message, such as "the run brought it".
     """
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
@@ -198,13 +201,13 @@ def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding
 
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
-    """Find discretisation errors of the temperature in states of the last mesh; collective.
+    """Find a discretisation error of the temperature that is too large, in the states on the last mesh; collective.
 
     Args:
         path: the computed `Path`.
 
     Yields:
-        A finding if the mesh is too coarse.
+        A warning if the mesh is too coarse.
     """
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):

@@ -33,17 +33,19 @@ from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, HeatContact
 from .vectors import HeatVectors
 
-_MOST_ITERATIONS = 20      # of Newton's method, of radiation and of constants by temperature
+_MOST_ITERATIONS = 20
+"""Largest number of Newton iterations in an implicit stage."""
 
 
 class Stage(NamedTuple):
-    """Result of an implicit stage.
+    """Result of an implicit stage y + change of a time step, for a body and the tools in contact with it.
 
     Attributes:
-        changes: change of T, locally owned entries, shape (n,), then of the lines of each tool contact, shape (nodes,
-            m).
-        rates: rates of heat M dT/dt at the end, of the same shapes.
-        heats: rate of heat through each boundary and source, of the whole body.
+        changes: changes of temperature: of the body, locally owned entries, shape (n,); then of each tool in contact,
+            along its depth, shape (nodes, m).
+        rates: rates of heat M dT/dt at the end of the stage, of the same shapes.
+        heats: heat per time into the whole body through each boundary and from each source, in the order of
+            `Conduction.names`, without faces of prescribed temperature.
     """
 
     changes: list[np.ndarray]
@@ -52,7 +54,11 @@ class Stage(NamedTuple):
 
 
 class Conduction(HeatVectors):
-    """Equations of heat conduction in an implicit stage of a time step.
+    """Finite element equations M dT/dt = R(T) of heat conduction in a body and in the tools that touch it.
+
+    A temperature state is a list. Its first array has the temperatures of the body at the n locally owned nodes. One
+    array follows per tool contact: temperatures above the back of the tool, shape (contact nodes, m), along the depth
+    of the tool. Entries of M and R of the body are divided by `capacity`: M sums to 1, and R is in degrees per time.
 
     Args:
         mesh: the `Mesh`.
@@ -61,19 +67,19 @@ class Conduction(HeatVectors):
         kinematics: the `Kinematics`.
         absolute_zero: absolute zero in the unit of temperatures.
         displacement: displacement of the body (UFL), length, or None.
-        degree: degree of the temperature in an element.
+        degree: polynomial degree of the temperature in an element.
 
     Attributes:
         mesh: the `Mesh`.
         comm: MPI communicator.
         space: function space of the temperature.
-        T: the temperature `Function` of the forms.
+        T: temperature `Function` in the forms.
         points: reference positions of the locally owned nodes, shape (n, 2), length.
         capacity: heat capacity of the whole body, heat per degree.
         volume: reference volume of the body.
         tool_contacts: a `HeatContact` for each `ContactWithTool`; call `update` after a change of its conductance.
-        power: heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
-        names: names of the boundaries and sources of heat, in the order of `Stage.heats`.
+        power: heat source, heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
+        names: names of the boundaries and sources of heat.
     """
 
     def __init__(self, mesh: Mesh, materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
@@ -109,26 +115,27 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the temperatures at the start of a time step, with prescribed values at fixed faces.
+        """Return the initial temperature state, with prescribed values at fixed faces.
 
         Returns:
-            [T of the nodes of the body, temperatures along the line into each tool, ...], locally owned entries.
+            Temperature state: temperatures of the body, set in `T` before; initial temperatures of each tool in
+                contact.
         """
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 
     def with_fixed_values(self, T: np.ndarray) -> np.ndarray:
-        """Return a temperature with the prescribed values at fixed faces.
+        """Return nodal temperatures, replaced by the prescribed values at faces of prescribed temperature.
 
         Args:
-            T: temperature, locally owned entries, shape (n,).
+            T: temperatures, locally owned entries, shape (n,).
 
         Returns:
-            Temperature, shape (n,).
+            Temperatures, shape (n,).
         """
         return np.where(self._fixed_mask, self._fixed_values.x.array[: self._n], T)
 
     def update(self) -> None:
-        """Update position and size of faces to a changed displacement or contact."""
+        """Update areas of tool contacts and depths of absorption after a change of displacement or contact."""
         self._factored_for = None
         for touch, area in zip(self.tool_contacts, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
@@ -138,13 +145,13 @@ class Conduction(HeatVectors):
             depth.x.scatter_forward()
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        """Return the rates of heat in a state.
+        """Return the rates of heat of body and tools at given temperatures.
 
         Args:
-            state: [T, *lines].
+            state: temperature state, see the class.
 
         Returns:
-            Rates and heats, as in `Stage`.
+            Rates of heat, arrays as in `state`; heat per time into the body, as `Stage.heats`.
         """
         R = self._body_rate(state[0])
         found, through = [R], []
@@ -156,18 +163,18 @@ class Conduction(HeatVectors):
         return found, self._heats(through)
 
     def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> Stage:
-        r"""Solve an implicit stage for the body and all lines.
+        r"""Solve an implicit stage of a time step for body and tools with Newton's method.
 
         .. math:: M \Delta = k + c R(y + \Delta)
 
         Args:
-            state: state y, [T, *lines], at the start.
-            known: known parts k, of the same shapes.
-            c: factor of the rates, time.
-            guess: initial guess of the change of T, shape (n,).
+            state: temperature state y at the start of the step.
+            known: known heats k, arrays as in `state`.
+            c: factor c of the rates, time.
+            guess: initial guess of the change of T, locally owned entries, shape (n,).
 
         Returns:
-            Result of the stage.
+            The changes, rates and heats.
 
         Raises:
             ConvergenceError: Newton's method found no solution.
@@ -178,11 +185,11 @@ class Conduction(HeatVectors):
         for iteration in range(_MOST_ITERATIONS):
             R = self._body_rate(T + change)
             for touch, answer in zip(self.tool_contacts, answers):
-                at = (T + change)[touch.dofs]
-                R[touch.dofs] += touch.area * answer.g * (answer.free - at)
-            left = known[0] + c * R - self._mass(change)
-            self._factorise(c, answers, afresh=iteration % 4 == 3)        # a tangent serves the next ones too
-            correction = self._solve(left)
+                T_face = (T + change)[touch.dofs]
+                R[touch.dofs] += touch.area * answer.g * (answer.free - T_face)
+            residual = known[0] + c * R - self._mass(change)
+            self._factorise(c, answers, afresh=iteration % 4 == 3)        # modified Newton: a tangent serves 4 times
+            correction = self._solve(residual)
             change += correction
             size, last = self._largest(change), self._largest(correction)
             if last <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
@@ -192,50 +199,51 @@ class Conduction(HeatVectors):
         raise ConvergenceError("heat: Newton's method did not converge in a step")
 
     def difference(self, known: list[np.ndarray], c: float) -> float:
-        r"""Return the largest change of body and tools by known heat in an implicit step.
+        r"""Return the largest temperature change that given heats cause in a linearised implicit step.
 
         .. math:: (M - c R') \Delta = k
 
         The tangent of the last `stage` is reused if it had the same c; otherwise it is assembled at the last T.
 
         Args:
-            known: known parts k, as in `stage`.
+            known: heats k of body and tools, arrays as in a temperature state.
             c: factor of the rates, time.
 
         Returns:
-            Largest absolute change, degrees.
+            Largest absolute change of body and tools over all ranks, degrees.
         """
         answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, answers, afresh=False)
-        left = known[0].copy()
+        rhs = known[0].copy()
         for touch, answer in zip(self.tool_contacts, answers):
-            left[touch.dofs] += c * touch.area * answer.g * answer.free
-        change = self._solve(left)
+            rhs[touch.dofs] += c * touch.area * answer.g * answer.free
+        change = self._solve(rhs)
         sizes = [self._largest(change)]
         for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
             sizes.append(self._largest(touch.finish(answer, k, change[touch.dofs], c)[1]))
         return max(sizes)
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
-        """Return dT/dt from rates of heat M dT/dt.
+        """Return dT/dt of the body from its rates of heat M dT/dt.
 
         Args:
-            rate: rates of heat, locally owned entries, shape (n,).
+            rate: rates of heat M dT/dt, locally owned entries, shape (n,).
 
         Returns:
-            dT/dt, shape (n,); 0 where the temperature is prescribed.
+            dT/dt, shape (n,), degrees per time; 0 where the temperature is prescribed.
         """
         self._factorise(0.0, [], afresh=True)
         return self._solve(rate)
 
     def through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
-        """Return the heat through each face of prescribed temperature.
+        """Return the heat that flows into the body through each face of prescribed temperature.
 
         Args:
-            missing: missing heat at the nodes, locally owned entries, shape (n,).
+            missing: heat that the nodes store less the heat that they receive otherwise, over `capacity`, locally owned
+                entries, shape (n,).
 
         Returns:
-            Heat of each face.
+            Heat through each face, in the order of the last `names`, summed over ranks.
         """
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
 
@@ -246,7 +254,7 @@ class Conduction(HeatVectors):
 
     def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 answers: list[Any]) -> Stage:
-        """Return the result of a stage from its converged temperature."""
+        """Return changes, rates and heats of a stage whose temperature T + change has converged."""
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
         for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
@@ -258,12 +266,17 @@ class Conduction(HeatVectors):
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, through_touches: list[float]) -> np.ndarray:
-        """Return the rates of heat at the last T, in the order of `names`, without fixed faces."""
+        """Return heat per time into the body at the last T, over all ranks: through each law, source and tool contact.
+        """
         local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
 
     def _deform(self) -> None:
-        """Set `_weight`, `_area` (deformed face per reference length), `_carry` (Grad T to grad T) and `_J`."""
+        """Set the UFL factors of deformation.
+
+        `_weight` is the volume per reference section area, `_area` the deformed face area per reference length. `_J` is
+        det F, and `_carry` maps Grad T to grad T (None without displacement).
+        """
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._carry = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
@@ -275,11 +288,11 @@ class Conduction(HeatVectors):
             self._area = ufl.sqrt(ufl.inner(area, area))
 
     def _gradient(self, f: Any) -> Any:
-        """Return the spatial gradient of a function (UFL)."""
+        """Return the spatial gradient grad f of a scalar (UFL vector)."""
         return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
 
     def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """Return a list of (properties, measure); layers with the same properties object share a measure."""
+        """Return [(ThermalProperties, UFL measure of their layers)]; layers that share one object share a measure."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -287,12 +300,12 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the form of stored heat (UFL)."""
+        """Return the form (UFL) of the heat that the body stores at temperature T, tested by v."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layers(materials))
 
     def _compile(self, materials: Mapping[str, ThermalProperties]) -> None:
-        """Compile the forms of mass, rate and tangent."""
+        """Compile the forms of mass, rate and tangent, and create the matrix and its solver."""
         T, v, J = self.T, self._v, self._J
         R = -sum(self._scale * self.constant(m.conductivity) * J * self._weight
                  * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layers(materials))
@@ -319,16 +332,16 @@ class Conduction(HeatVectors):
         self._solver = DirectSolver(self._matrix, symmetric=False)
 
     def _number(self, value: float | Table) -> Any:
-        """Return a number or a table over R as a coefficient of the forms."""
+        """Return the parameter of a law, a number or a table over R, as a UFL coefficient."""
         return value(self._X[0]) if isinstance(value, Table) else self.constant(value)
 
     def _ds(self, boundary: str, metadata: dict) -> ufl.Measure:
-        """Return the measure of a boundary."""
+        """Return the UFL measure of a boundary with quadrature metadata."""
         ds = ufl.Measure("ds", self.mesh.domain, subdomain_data=self.mesh.facets)
         return ds(self.mesh.boundaries[boundary], metadata=metadata)
 
     def _dofs(self, boundary: str) -> np.ndarray:
-        """Return the local unknowns of a boundary, with ghosts."""
+        """Return the local temperature unknowns on a boundary, with ghosts."""
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
     def _fix(self, fixed: list[FixedTemperature]) -> None:
@@ -346,7 +359,7 @@ class Conduction(HeatVectors):
             taken[own] = self._fixed_mask[own] = True
 
     def _tool_contact(self, contact: ContactWithTool) -> HeatContact:
-        """Return the nodes and lines of a contact with a tool."""
+        """Return the `HeatContact` of the locally owned nodes on the face of a `ContactWithTool`."""
         dofs = self._dofs(contact.on)
         own = dofs[dofs < self._n]
         return HeatContact(contact, own, self.points[own])
@@ -369,7 +382,7 @@ class Conduction(HeatVectors):
 
     @staticmethod
     def _moved(points: np.ndarray, u: Any) -> np.ndarray:
-        """Return deformed positions, shape (n, 2), length."""
+        """Return deformed positions points + u, shape (n, 2), length; u = None: the points themselves."""
         return points if u is None else points + u
 
     def _face_line(self, boundary: str) -> np.ndarray:
@@ -385,7 +398,7 @@ class Conduction(HeatVectors):
         return line + u[cKDTree(X).query(line)[1]]
 
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """Factorise the tangent M - c R' at the last T, with contact; reuse one with the same c unless `afresh`."""
+        """Factorise the tangent M - c R' of body and tools at the last T; keep one with the same c unless `afresh`."""
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c
@@ -402,8 +415,8 @@ class Conduction(HeatVectors):
         if not self._solver.factorise():
             raise ConvergenceError("heat: the matrix of a step is singular")
 
-    def _solve(self, left: np.ndarray) -> np.ndarray:
-        """Return the solution of the factorised tangent, locally owned entries, shape (n,)."""
-        self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, left)
+    def _solve(self, rhs: np.ndarray) -> np.ndarray:
+        """Return the solution of the factorised tangent for a right-hand side, locally owned entries, shape (n,)."""
+        self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, rhs)
         self._solver.solve(self._rhs, self._out)
         return self._out.array_r.copy()

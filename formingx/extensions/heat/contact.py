@@ -1,16 +1,17 @@
-r"""Heat through a contact conductance into a tool at a given temperature, or into a conducting tool.
+r"""Heat through a contact conductance into a tool of prescribed temperature, or into a conducting tool.
 
 At each node of the face the flux into the body is
 
 .. math:: q = h (T_{tool} - T)
 
-with the conductance h. A conducting tool has a one-dimensional line below each node, along its depth y:
+with the conductance h. In a conducting tool heat flows in one dimension along the depth y below each node (its *line*).
+The temperature w satisfies
 
 .. math:: C \frac{\partial w}{\partial t} = k \frac{\partial^2 w}{\partial y^2}, \qquad
           -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = w_{back} \text{ at the back}
 
-In an implicit stage T + c dT/dt = known the line responds linearly, w_face = free - z q, with one z for all lines. The
-line is therefore condensed:
+In an implicit stage M w' = known + c rate the line responds linearly to q: its face has w = w_free - z q, with one z
+for all lines. The line is therefore condensed:
 
 .. math:: q = g (w_{free} - T), \qquad g = \frac{h}{1 + z h}
 """
@@ -28,11 +29,11 @@ class ConductingTool:
 
     Args:
         thickness: thickness of the wall, length.
-        conductivity: heat per time, length and degree.
+        conductivity: thermal conductivity, heat per time, length and degree.
         heat_capacity: heat capacity per volume and degree (density times specific heat capacity).
-        back: prescribed temperature of its back.
-        start: initial temperature; default `back`.
-        elements: number of quadratic elements through its thickness.
+        back: prescribed temperature of the back of the wall.
+        start: initial temperature of the wall; default `back`.
+        elements: number of quadratic elements through the thickness.
         finest: size of the element at the face over the thickness; sizes grow geometrically from the face.
 
     Raises:
@@ -56,7 +57,7 @@ class ConductingTool:
 
     @property
     def depths(self) -> np.ndarray:
-        """Depths of the nodes from the face to the back, shape (2 elements + 1,), length."""
+        """Distances of the nodes of the wall from its face, to the back, shape (2 elements + 1,), length."""
         from scipy.optimize import brentq
         n, small = self.elements, self.finest
         ratio = 1.0
@@ -66,17 +67,17 @@ class ConductingTool:
         return np.interp(np.arange(2 * n + 1) / 2, np.arange(n + 1), self.thickness * ends / ends[-1])
 
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the matrices of a line per area, for temperatures above `back`, without the last node.
+        """Return capacity and conductivity matrices along the depth, per contact area, without the node at the back.
 
         Returns:
-            Capacity and conductivity, shape (2 elements, 2 elements) each.
+            Capacity and conductivity matrix, shape (2 elements, 2 elements) each, for temperatures above `back`.
         """
         y = self.depths
         M, K = np.zeros((2, len(y), len(y)))
         for e in range(0, len(y) - 1, 2):
-            h, at = y[e + 2] - y[e], np.ix_(range(e, e + 3), range(e, e + 3))
-            M[at] += self.heat_capacity * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
-            K[at] += self.conductivity / (3 * h) * np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]])
+            h, block = y[e + 2] - y[e], np.ix_(range(e, e + 3), range(e, e + 3))
+            M[block] += self.heat_capacity * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
+            K[block] += self.conductivity / (3 * h) * np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]])
         return M[:-1, :-1], K[:-1, :-1]
 
     def __repr__(self) -> str:
@@ -85,12 +86,15 @@ class ConductingTool:
 
 
 class ContactWithTool:
-    """Face in complete contact with a tool from the start.
+    """Face in complete contact with a tool from the start of a run.
 
     Args:
         on: name of the boundary.
         conductance: contact conductance, heat per time, area and degree.
-        tool: a temperature, or a `ConductingTool`.
+        tool: a prescribed temperature, or a `ConductingTool`.
+
+    Raises:
+        InputError: a negative conductance, or a tool that is neither a number nor a `ConductingTool`.
 
     >>> fx.ContactWithTool("bottom", conductance=1e-3, tool=40.0)
     ContactWithTool('bottom', conductance=0.001, tool=40.0)
@@ -104,10 +108,10 @@ class ContactWithTool:
         self.tool = tool if isinstance(tool, ConductingTool) else finite(f"ContactWithTool({on!r}): tool", tool)
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError unless the tool is above absolute zero.
+        """Raise an InputError unless the temperatures of the tool are above absolute zero.
 
         Args:
-            mesh: the mesh.
+            mesh: not used.
             absolute_zero: absolute zero in the unit of temperatures.
 
         Raises:
@@ -123,13 +127,15 @@ class ContactWithTool:
 
 
 class Answer(NamedTuple):
-    """Response of the lines in a stage: q = g (free - T); their change is `change` - q `column`.
+    """Response of n lines of a conducting tool, with m nodes each, to the flux q into the body in an implicit stage.
+
+    The flux is q = g (free - T) with the temperature T of the body. The lines change by `change` - q `column`.
 
     Attributes:
-        free: temperature of the tool's face without a flux, shape (n,).
-        g: conductance of contact and line, shape (n,).
-        change: change of the lines without a flux, shape (n, m).
-        column: decrease of a line per flux, shape (m,).
+        free: temperature of the face of the tool without a flux, shape (n,).
+        g: conductance of contact and line in series, heat per time, area and degree, shape (n,).
+        change: change of temperature of the lines without a flux, shape (n, m).
+        column: decrease of the temperatures of a line per flux q, shape (m,).
     """
 
     free: np.ndarray
@@ -139,23 +145,24 @@ class Answer(NamedTuple):
 
 
 class HeatContact:
-    """The n nodes of this rank on a face under a tool, and the lines of the tool below them.
+    """Contact nodes of a face with a tool, and the temperatures in the tool below them.
 
-    Lines are temperatures above the tool's back at m nodes, shape (n, m), the face first; m = 0 for a tool at a given
-    temperature.
+    The face has n locally owned nodes. A line has the temperatures at m depths below a node, above the temperature of
+    the back of the tool, the face first. All lines have the shape (n, m); m = 0 for a tool of prescribed temperature.
 
     Args:
         contact: the `ContactWithTool`.
-        dofs: local unknowns of the nodes, shape (n,).
+        dofs: local numbers of the nodes, shape (n,).
         points: reference positions of the nodes, shape (n, 2), length.
 
     Attributes:
-        dofs: local unknowns of the nodes, shape (n,).
+        on: name of the boundary.
+        dofs: local numbers of the nodes, shape (n,).
         points: reference positions of the nodes, shape (n, 2), length.
-        area: tributary deformed area of each node, shape (n,).
+        area: tributary deformed area of each node over the heat capacity of the body, shape (n,); set by `Conduction`.
         conductance: contact conductance of each node, shape (n,); 0 without contact.
-        back: temperature of the tool's back, or of a tool at a given temperature.
-        depths: depths of the nodes of a line with the back, shape (m + 1,), length.
+        back: temperature of the back of a conducting tool, or prescribed temperature of the tool.
+        depths: distances from the face of the m nodes of a line and of the back, shape (m + 1,), length.
     """
 
     def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
@@ -173,22 +180,22 @@ class HeatContact:
 
     @property
     def conducts(self) -> bool:
-        """True if the tool conducts heat, so that it has lines."""
+        """True if the tool is a `ConductingTool`."""
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """Return the initial lines.
+        """Return the initial temperatures of the lines above the back of the tool.
 
         Returns:
-            Lines, shape (n, m).
+            Lines, shape (n, m), degrees.
         """
         return np.full((len(self.dofs), len(self._M)), self._above)
 
     def face(self, lines: np.ndarray) -> np.ndarray:
-        """Return the temperature of the tool's face at the nodes.
+        """Return the temperature of the face of the tool at each contact node.
 
         Args:
-            lines: temperatures above the tool's back, shape (n, m).
+            lines: temperatures of the lines above the back of the tool, shape (n, m).
 
         Returns:
             Temperatures, shape (n,).
@@ -196,14 +203,14 @@ class HeatContact:
         return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
     def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates of heat of the contact.
+        """Return the flux into the body and the rates of heat of the lines.
 
         Args:
-            lines: temperatures above the tool's back, shape (n, m).
-            T: temperatures of the body at the nodes, shape (n,).
+            lines: temperatures of the lines above the back of the tool, shape (n, m).
+            T: temperatures of the body at the contact nodes, shape (n,).
 
         Returns:
-            Flux q into the body, shape (n,); heat per time and area into the nodes of the lines, shape (n, m).
+            Flux q into the body, shape (n,); rates of heat M dw/dt at the nodes of the lines per area, shape (n, m).
         """
         q = self.conductance * (self.face(lines) - T)
         rate = -lines @ self._K
@@ -211,13 +218,13 @@ class HeatContact:
         return q, rate
 
     def answer(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> Answer:
-        """Return the response of the lines in a stage M w' = known + c rate(lines + w').
+        """Return the response of the lines to a flux in an implicit stage M w' = known + c rate(lines + w').
 
         Args:
-            lines: temperatures above the tool's back, shape (n, m).
-            known: known part, shape (n, m).
+            lines: temperatures of the lines above the back of the tool, shape (n, m).
+            known: known heat per area at the nodes of the lines, shape (n, m).
             c: factor of the rate, time.
-            absolute: False if lines are differences of temperatures, with a back of 0.
+            absolute: False if all temperatures are differences, so that the back has 0.
 
         Returns:
             The response.
@@ -231,22 +238,23 @@ class HeatContact:
                       change, column)
 
     def finish(self, answer: Answer, known: np.ndarray, T: np.ndarray, c: float) -> tuple[Any, Any, Any]:
-        """Return the contact at the end of a stage.
+        """Return the flux and the change of the lines at the end of a stage.
 
         Args:
-            answer: response of the lines.
-            known: known part, shape (n, m).
-            T: temperatures of the body at the nodes, shape (n,).
+            answer: response of the lines, from `answer`.
+            known: known heat per area at the nodes of the lines, shape (n, m).
+            T: temperatures of the body at the contact nodes, shape (n,).
             c: factor of the rate, time.
 
         Returns:
-            Flux q, shape (n,); change of the lines and their rate, shape (n, m) each.
+            Flux q into the body, shape (n,); change of the lines and their rates of heat, shape (n, m) each.
         """
         q = answer.g * (answer.free - T)
         change = answer.change - np.outer(q, answer.column)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the factorised matrix of a line for a factor c, and its response to a flux."""
+        """Return the inverse of M + c K of a line, shape (m, m), and c times its first column, the response to a flux.
+        """
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

@@ -1,5 +1,4 @@
-"""Temperature during forming: the heat equation is solved once per accepted step, in the body halfway through the step.
-"""
+"""Heat conduction of a body during forming: the declaration `Cooling` of a scene."""
 
 from __future__ import annotations
 
@@ -17,9 +16,10 @@ from .cooling_history import CoolingHistory
 from .run import checked_boundaries, checked_materials
 
 _CONTINUOUS = 1e4
-"""Conductance of a suddenly chilled face, over conductivity/thickness.
+"""Conductance that replaces a suddenly prescribed temperature, over conductivity/thickness.
 
-The shrinkage of a part differs by 0.1 % from its limit (with 1e3: 0.6 %, with 1e2: 2.5 %; tests/test_released.py).
+The shrinkage of a part differs by 0.1 % from the limit of an infinite conductance (with 1e3: 0.6 %, with 1e2: 2.5 %;
+tests/test_released.py).
 """
 
 _TOOLS = "a dict of (conductance, tool) by the names of contacts"
@@ -30,7 +30,7 @@ class ToolHeat(NamedTuple):
 
     Attributes:
         conductance: contact conductance, heat per time, area and degree.
-        tool: a temperature, or a `ConductingTool`.
+        tool: a prescribed temperature, or a `ConductingTool`.
     """
 
     conductance: float
@@ -38,17 +38,17 @@ class ToolHeat(NamedTuple):
 
     @classmethod
     def of(cls, name: str, given: Any) -> ToolHeat:
-        """Return the heat exchange from a user's pair for a contact.
+        """Return the heat exchange from the pair that a user gave for a contact.
 
         Args:
-            name: name of the contact.
+            name: name of the contact, for the message.
             given: pair (conductance, tool).
 
         Returns:
             The heat exchange.
 
         Raises:
-            InputError: the argument is no such pair.
+            InputError: `given` is no such pair.
         """
         try:
             return cls(*given)
@@ -65,13 +65,17 @@ class Cooling:
 
     Args:
         materials: {layer: `ThermalProperties`}, or one for all layers.
-        boundaries: laws of faces, see `formingx.heat`.
+        boundaries: laws of faces and heat sources, as in `formingx.heat`.
         unit: unit of all temperatures, "C" or "K".
-        tools: {name of a contact of the scene: (conductance, tool)}, see `ToolHeat`.
+        tools: {name of a contact of the scene: (conductance, tool)}. The conductance is heat per time, area and degree;
+            the tool is a prescribed temperature or a `ConductingTool`.
         tolerance: largest estimated error of one time step of the heat equation, degrees.
         work_to_heat: heat per dissipated work of the materials, in the units of both: 1 in SI, 1e-3 for MPa, mm and W.
             It is less if part of the work is stored. None: no heating by work. The work of friction on tools is never
             included.
+
+    Raises:
+        InputError: an argument that is not allowed.
 
     >>> air = fx.Convection("top", h=2e-5, air=20.0)
     >>> polymer = fx.ThermalProperties(conductivity=0.2e-3, density=1e-3, heat_capacity=2.0)
@@ -91,17 +95,18 @@ class Cooling:
 
     def __repr__(self) -> str:
         tools = {name: (tool.conductance, tool.tool) for name, tool in self.tools.items()}
-        more = f", work_to_heat={self.work_to_heat!r}" * (self.work_to_heat is not None)
-        return f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r}{more})"
+        work = f", work_to_heat={self.work_to_heat!r}" * (self.work_to_heat is not None)
+        return f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r}{work})"
 
     def check(self, scene: Any) -> None:
-        """Raise an InputError unless the cooling fits a scene.
+        """Raise an InputError unless this heat conduction fits a scene.
 
         Args:
             scene: the `Scene`.
 
         Raises:
-            InputError: a law, a tool or a material that does not fit.
+            InputError: the scene has no temperature or is a membrane, or a law, tool, material or `work_to_heat` does
+                not fit.
         """
         if scene.temperature is None:
             raise InputError("Scene: heat: the body needs a temperature to begin with: temperature=...")
@@ -115,18 +120,19 @@ class Cooling:
         checked_boundaries(scene.mesh, [*self.boundaries, *self.contacts_with_tools(scene)], zero)
 
     def without_tools(self, mesh: Any, thickness: float, boundaries: Any) -> Cooling:
-        """Return the same cooling without tools, with other laws at the faces of a body.
+        """Return a copy without tools, with other laws at the faces, for a part that has left its tools.
 
-        A face whose temperature jumps changes the stress by a finite amount in any step, however short. A fixed
-        temperature therefore acts through a large conductance (`_CONTINUOUS`).
+        A prescribed temperature that differs from the present one would change the stress by a finite amount in any
+        step, however short. It is replaced by convection with a large conductance (`_CONTINUOUS`
+        conductivity/thickness).
 
         Args:
-            mesh: mesh of the body.
-            thickness: its largest wall, length.
-            boundaries: laws, or {boundary: prescribed temperature}.
+            mesh: `Mesh` of the body.
+            thickness: largest wall of the body, length.
+            boundaries: list of laws, or {boundary: prescribed temperature}.
 
         Returns:
-            The cooling.
+            The `Cooling`.
         """
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
             boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
@@ -137,51 +143,52 @@ class Cooling:
         return Cooling(self.materials, laws, unit=self.unit, tolerance=self.tolerance, work_to_heat=self.work_to_heat)
 
     def time_through(self, mesh: Any, thickness: float) -> float:
-        r"""Return the largest diffusion time of the layers of a mesh.
+        r"""Return the time in which heat diffuses through a wall, in the layer of smallest diffusivity.
 
         .. math:: t = \frac{h^2}{a}
 
         Args:
-            mesh: the mesh.
-            thickness: thickness h, length.
+            mesh: the `Mesh`, for its layers.
+            thickness: wall h, length.
 
         Returns:
-            Time, for the diffusivity a of the slowest layer.
+            Time t for the diffusivity a.
         """
         return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
     def history(self, problem: Any) -> CoolingHistory:
-        """Return the history of the temperature.
+        """Return the history variables of the temperature for a run.
 
         Args:
-            problem: the `Problem`.
+            problem: the `Problem` of the run.
 
         Returns:
-            A `formingx.forms.history.History`.
+            A `CoolingHistory`.
         """
         return CoolingHistory(self, problem)
 
     def extremes(self, scene: Any) -> tuple[float, float]:
-        """Return the bounds of the temperature of the body, without heating by work; collective.
+        """Return bounds of the temperature that the body can reach by its laws, without heating by work; collective.
 
         Args:
-            scene: the `Scene`.
+            scene: the `Scene`, whose temperature is the initial one.
 
         Returns:
-            Lowest and highest temperature.
+            Lowest and highest temperature; -inf and inf with a heat flux or a source.
         """
         first = scene.temperature.T.x.array
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
         return _extremes([*np.ravel(ends)], [*self.boundaries, *self.contacts_with_tools(scene)])
 
     def conductances(self, scene: Any) -> dict[str, float]:
-        """Return the largest conductance of the laws of each boundary.
+        """Return the largest conductance among the laws of each boundary.
 
         Args:
             scene: the `Scene`.
 
         Returns:
-            {boundary: conductance, heat per time, area and degree}; infinite for a fixed temperature.
+            {boundary: conductance, heat per time, area and degree}; infinite for a prescribed temperature. Boundaries
+                without conductance are left out.
         """
         found: dict[str, float] = {}
         for law in [*self.boundaries, *self.contacts_with_tools(scene)]:
@@ -192,24 +199,27 @@ class Cooling:
         return {on: value for on, value in found.items() if value}
 
     def conducts(self, contact: Any) -> bool:
-        """Check whether heat flows through a contact of the scene.
+        """Check whether the tool of a contact exchanges heat with the body.
 
         Args:
             contact: the `Contact`.
 
         Returns:
-            True if it does.
+            True if `tools` has its name.
         """
         return contact.name in self.tools
 
     def contacts_with_tools(self, scene: Any) -> list[ContactWithTool]:
-        """Return the contacts with tools that exchange heat.
+        """Return the contacts of a scene that exchange heat, as laws of faces in complete contact.
 
         Args:
             scene: the `Scene`.
 
         Returns:
-            A `ContactWithTool` for each contact of the scene with heat exchange.
+            A `ContactWithTool` for each contact named in `tools`, in the order of the scene.
+
+        Raises:
+            InputError: `tools` names a contact that the scene does not have.
         """
         names = [contact.name for contact in scene.contacts]
         for name in self.tools:
@@ -220,9 +230,10 @@ class Cooling:
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
-    """Return the bounds of the temperature of a body under these laws, by the maximum principle."""
+    """Return lowest and highest temperature of a body (maximum principle), from its initial ones and its laws of heat.
+    """
     for law in laws:
-        if not getattr(law, "temperatures", ()):            # heat from elsewhere
+        if not getattr(law, "temperatures", ()):            # a flux without a temperature has no bound
             return -np.inf, np.inf
         touches = isinstance(law, ContactWithTool)
         for value in [law.tool] if touches else [law.parameters[name] for name in law.temperatures]:

@@ -1,4 +1,4 @@
-"""History of the temperature during forming: one solution of the heat equation per accepted step."""
+"""History of the temperature during forming: the heat equation is solved once per accepted step of the run."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ _MOST_STEPS = 10_000
 """Largest number of steps of the heat equation in one step of the run."""
 
 _WARNS = 2e-3
-"""Discretisation error over the span of temperatures above which a run warns: the promised accuracy of stresses."""
+"""Discretisation error of the temperature, over its span, above which a run warns: the promised accuracy of stresses.
+"""
 
-_LOOKS = 8
+_CHECKED_STATES = 8
 """Number of states in which the discretisation error is estimated, besides the ends of stages."""
 
 _NEAR = 1e-2
@@ -38,15 +39,17 @@ middle by less.
 
 
 class HeatState(NamedTuple):
-    """State of the heat equation.
+    """State of the heat equation at the end of a step of the run.
 
     Attributes:
         time: process time.
-        temperature: temperatures, locally owned entries, shape (n,).
-        lines: temperatures of the lines of each tool, see `HeatContact`.
-        step: time step to continue with, or None.
-        power: heat of dissipated work (`Conduction.power`), locally owned entries, or None.
-        before: an earlier time and its temperature, or None.
+        temperature: temperatures of the body, locally owned entries, shape (n,).
+        lines: for each tool contact, temperatures in the tool, above its back, shape (contact nodes, m); see
+            `HeatContact`.
+        step: length of the next time step of the heat equation, or None.
+        power: heat per time of the dissipated work over the heat capacity of the body, locally owned entries, shape
+            (n,), or None.
+        before: (time, temperatures) at the start of the step, or None.
     """
 
     time: float
@@ -58,11 +61,11 @@ class HeatState(NamedTuple):
 
 
 class CoolingHistory:
-    """History of the temperature.
+    """History variables of the temperature: body and conducting tools, as a `formingx.forms.history.History`.
 
     Args:
-        cooling: the `Cooling`.
-        problem: the `Problem`.
+        cooling: the `Cooling` of the scene.
+        problem: the `Problem` of the run.
     """
 
     def __init__(self, cooling: Any, problem: Any):
@@ -80,33 +83,33 @@ class CoolingHistory:
         self.start()
 
     def _conduction(self, degree: int = 2) -> Conduction:
-        """Return the heat equation of the body for a degree of the temperature."""
+        """Return the heat equation of the deformed body with temperatures of a polynomial degree in each element."""
         scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
         laws = [*self._cooling.boundaries, *self._cooling.contacts_with_tools(scene)]
         return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
     def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
-        """Return (heat contact, contact, conductance in contact) of each tool that exchanges heat."""
+        """Return (`HeatContact`, contact of the problem, its nodal conductances) of each tool that exchanges heat."""
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
         return [(touch, contact, touch.conductance.copy())
                 for touch, contact in zip(body.tool_contacts, contacts, strict=True)]
 
     def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
-        """Return the estimated discretisation errors of temperatures in states; collective.
+        """Estimate the discretisation errors of the temperature in states of the run; collective.
 
         Args:
-            states: the states.
+            states: accepted states.
 
         Returns:
-            Largest error in each state, degrees.
+            Largest error in each state, degrees, shape (states,).
         """
         finer, power, found = self._conduction(degree=3), self._body.power, []
         estimator, touches = SpaceError(self._body, finer), self._tool_contacts(finer)
         try:
             for state in states:
                 with self._problem.state_context(state):
-                    self._body.power = 0.0                  # of both, or of none
+                    self._body.power = 0.0                  # as in `finer`, which has none
                     for body, touching in ((self._body, self._touches), (finer, touches)):
                         _set_conductances(body, touching, state.control)
                         body.update()
@@ -117,19 +120,22 @@ class CoolingHistory:
         return np.array(found)
 
     def findings(self, states: Sequence[Any]) -> list[Finding]:
-        """Return a finding if the mesh is too coarse for the temperatures in states; collective.
+        """Return a warning if the mesh is too coarse for the temperatures of a run; collective.
+
+        The error is estimated in at most eight states and at the ends of stages.
 
         Args:
-            states: the states.
+            states: accepted states, in order.
 
         Returns:
-            List of the finding, or an empty list.
+            List with one warning, or an empty list.
         """
         states = [state for state in states if state.time > 0]
         if not states:
             return []
         begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
-        looked = sorted({*np.linspace(0, len(states) - 1, _LOOKS).astype(int).tolist(), *(k - 1 for k in begun)})
+        looked = sorted({*np.linspace(0, len(states) - 1, _CHECKED_STATES).astype(int).tolist(),
+                         *(k - 1 for k in begun)})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
         errors = self.errors_in_space([states[k] for k in looked])
         temperatures = [states[k].memory[-1].temperature for k in looked]          # the memory of heat is the last one
@@ -142,13 +148,13 @@ class CoolingHistory:
             return []
         low, high = self._cooling.extremes(scene)
         most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
-        error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be their whole span, {most:.3g}"
+        error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
         return [Finding("warning", "temperature", f"The error of the temperature in space {error} degrees at time"
                         f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
                         f" lose heat{_such_as(scene, min(errors[worst], most) / allowed, duration)}.")]
 
     def start(self) -> None:
-        """Set the initial temperature."""
+        """Set the initial temperatures of body and tools, at time 0."""
         self._time = 0.0
         self._dt: float | None = None
         self._power: Any = None if self._dissipated is None else np.zeros(self._n)
@@ -157,14 +163,14 @@ class CoolingHistory:
         self._take()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Solve the heat equation over the step in the body halfway through the step.
+        """Solve the heat equation over an accepted step, in the body halfway through the step.
 
         A point whose contact status changes in the step has half its conductance, which makes the step of second order.
 
         Args:
             x: unknowns at the end of the step, locally owned entries.
-            control: control at the end.
-            start: state at the beginning, or None.
+            control: control at the end of the step.
+            start: state at the start of the step; None: the body stays as it is at the end.
         """
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
@@ -188,7 +194,7 @@ class CoolingHistory:
         self._take()
 
     def _integrate(self, until: float) -> None:
-        """Take steps of the heat equation, in the body at a fixed position, up to a time."""
+        """Take time steps of the heat equation in the body at a fixed position, up to the time `until`."""
         dt, tolerance = self._dt or 1e-3 * (until - self._time), self._cooling.tolerance
         for _ in range(_MOST_STEPS):
             trial = stepping.fitted(dt, until - self._time)
@@ -203,7 +209,7 @@ class CoolingHistory:
         raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MOST_STEPS} steps")
 
     def get(self) -> HeatState:
-        """Return the state of the heat equation.
+        """Return the present state of the heat equation.
 
         Returns:
             The state.
@@ -212,10 +218,10 @@ class CoolingHistory:
                       self._power, self._before)
 
     def put(self, memory: HeatState) -> None:
-        """Set the state of the heat equation.
+        """Set the present state of the heat equation.
 
         Args:
-            memory: the state.
+            memory: result of `get`.
         """
         self._time, self._dt, self._power, self._before = memory.time, memory.step, memory.power, memory.before
         self._state = [memory.temperature.copy(), *(lines.copy() for lines in memory.lines)]
@@ -225,10 +231,10 @@ class CoolingHistory:
         """Return a state of the heat equation as plain data, the same on all ranks; collective.
 
         Args:
-            memory: the state.
+            memory: result of `get`.
 
         Returns:
-            The data.
+            Data for `load`.
         """
         plain = partial(gathered, self._problem.comm)
         return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
@@ -239,16 +245,16 @@ class CoolingHistory:
                           for touch, lines in zip(self._body.tool_contacts, memory.lines, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
-        """Return the state of this rank from the result of `save`.
+        """Return the state of the heat equation of this rank from stored data.
 
         Args:
             data: result of `save`.
 
         Returns:
-            The state.
+            A state for `put`.
 
         Raises:
-            InputError: the data do not match the scene.
+            InputError: the data belong to another mesh or another `work_to_heat`.
         """
         rows = _rows(self._body.points, data["points"])
         if ("power" in data) != (self._dissipated is not None):
@@ -261,17 +267,17 @@ class CoolingHistory:
 
     def carry(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
-        """Interpolate the state on another mesh; the material histories have been transferred before.
+        """Interpolate a state of the heat equation on another mesh to this one, after the material histories.
 
         Args:
-            source: history on the other mesh.
+            source: history of the temperature on the other mesh.
             memory: its state.
             x: unknowns of this problem, locally owned entries.
             control: control of the state.
-            mapping: function from reference points of the other mesh, shape (n, 2), to points of this mesh.
+            mapping: function from reference points of the other mesh, shape (n, 2), to reference points of this mesh.
 
         Returns:
-            The state on this mesh.
+            A state for `put`.
         """
         comm, before = self._problem.comm, memory.before
         to_body = Carrier(comm, mapping(source._body.points), self._body.points).fitted
@@ -283,7 +289,7 @@ class CoolingHistory:
                       before and (before[0], to_body(before[1])))
 
     def _take(self) -> None:
-        """Set the temperature of the problem and the coefficients that depend on it."""
+        """Pass the present and the previous temperature to the problem, and update temperature-dependent constants."""
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
         if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
@@ -300,7 +306,13 @@ class CoolingHistory:
 
 
 def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
-    """Set the conductance of the nodes in contact, and 0 where no tool is in contact with the deformed body."""
+    """Set the conductance of each contact node: 0 unless the tool is present and near the node of the deformed body.
+
+    Args:
+        body: heat equation of the body.
+        touches: (`HeatContact`, contact of the problem, conductances in contact) of each tool.
+        control: control of the state, which gives the travel of the tools.
+    """
     u = body.displacements()
     for touch, contact, conductance in touches:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
@@ -308,7 +320,10 @@ def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.nda
 
 
 def _such_as(scene: Any, times: float, duration: float) -> str:
-    """Return the advice on elements that reduce an error by a factor (of third order)."""
+    """Return advice on element sizes that reduce the temperature error by a factor `times`, or "" if none is known.
+
+    The error is of third order. The duration is the time over which heat has penetrated.
+    """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
     if not faces or len(scene.mesh.layers) > 1:
@@ -319,13 +334,13 @@ def _such_as(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Return True if two (time, temperature, before) are equal."""
+    """Return True if two triples (time, temperatures, (earlier time, temperatures) or None) are equal."""
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 
 
 def _rows(points: np.ndarray, others: Any) -> np.ndarray:
-    """Return the row of `others` at the position of each point, shape (n,); raise an InputError if there is none."""
+    """Return the row of `others` at each point, shape (n,); raise an InputError if a point has none."""
     from scipy.spatial import cKDTree
     others = np.reshape(others, (-1, points.shape[-1]))
     if not len(points):

@@ -57,7 +57,7 @@ class ThermalExpansion:
 
         Args:
             temperature: temperatures, any shape.
-            clamped: True to use, beyond the ends of a table, its end value, as in a run.
+            clamped: True to use the end value of a table for temperatures beyond it, as a run does.
 
         Returns:
             Stretches, the same shape.

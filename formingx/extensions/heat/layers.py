@@ -2,9 +2,10 @@
 
 By a time t heat penetrates to a depth sqrt(a t), with the diffusivity a, and elements there must be smaller. The
 thickness of a layer at a depth y is a given part of y/3 or, if larger, of the penetration depth at the first time of
-interest. Later and deeper profiles are therefore resolved too. Shared edges are cut for both neighbours. Triangles are
-cut into
-rows between the cuts of their edges, in the shape of the original element.
+interest. Later and deeper profiles are therefore resolved too.
+
+An edge between two elements is cut once, for both. Triangles are cut into rows between the cuts of their edges, in the
+shape of the original element.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,16 +24,17 @@ _REACH = 7.0
 _SPARE = 0.2
 """Part of a layer by which the required number of layers is reduced before it is rounded up."""
 _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
+"""Positions along an edge, from 0 to 1, at which the required thickness of layers is integrated."""
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """Cut the elements of a mesh into layers below faces; collective.
+    """Cut the elements of a mesh into layers below faces that exchange heat; collective.
 
     Args:
         mesh: the mesh.
         depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
-        moved: function from reference to deformed positions, shape (n, 2), between which depths are measured; None: the
-            reference positions.
+        moved: function from reference to deformed positions, both of shape (n, 2), length; depths are distances between
+            deformed positions. None: depths in the reference configuration.
 
     Returns:
         The new mesh; the given mesh if its elements are thin enough, or too curved to be cut.
@@ -46,16 +48,18 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
 
 def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
-    """Return the relative sizes of layers from the bottom up, graded towards faces by a factor of 1.26; collective.
+    """Return relative sizes of layers of elements through a sheet, from the bottom up; collective.
+
+    Sizes grow by a factor of 1.26 per layer with the distance from the given faces.
 
     Args:
-        mesh: the mesh.
+        mesh: mesh of the sheet.
         faces: "bottom", "top" or both.
-        part: largest thickness of a layer at a face, over the present elements there.
-        depth: penetration depth of heat, length; a layer at a face is at most `_PART` of it.
+        part: largest allowed thickness of the layer at a face, over the thickness of the present elements there.
+        depth: penetration depth of heat, length; the layer at a face is at most `_PART` of it.
 
     Returns:
-        Sizes.
+        Sizes, for `elements=(n, sizes)` of a mesh.
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_along(grid, face) for face in faces))
@@ -66,7 +70,7 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
 
 
 def height_at(mesh: Mesh, face: str) -> float:
-    """Return the median height of the elements along a boundary; collective.
+    """Return the median height of the elements along a boundary, perpendicular to it; collective.
 
     Args:
         mesh: the mesh.
@@ -92,7 +96,10 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
     """Return {ends of a cut edge, the end of smaller (R, Z) first: positions of the cuts, from 0 to 1}.
 
-    points: positions of the nodes between which depths are measured, shape (n, 2), length.
+    Args:
+        grid: the grid.
+        depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
+        points: positions of the nodes between which depths are measured, shape (n, 2), length.
     """
     if not depths:
         return {}
@@ -116,7 +123,10 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the distance of points from the edges of a boundary, shape (n,), length."""
+    """Return the distance of each point from the edges of a boundary, shape (n,), length.
+
+    edges: numbers of the two ends of each edge in `points`, shape (m, 2).
+    """
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
         along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
@@ -125,14 +135,22 @@ def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return edges, shape (n, 2), each from its end of smaller R (at equal R of smaller Z)."""
+    """Return edges (pairs of point numbers, shape (n, 2)), each from its end of smaller R (at equal R of smaller Z)."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
     return np.where(swap[:, None], edges[:, ::-1], edges)
 
 
 class _Nodes:
-    """Nodes of the cut mesh: the old nodes, and new ones on edges and inside triangles."""
+    """Nodes of the cut grid: the nodes of the grid, and new ones on cut edges and inside triangles.
+
+    Args:
+        grid: the grid before the cut.
+        cuts: {ends of an edge: positions of its cuts, from 0 to 1}, from `_cuts`.
+
+    Attributes:
+        points: positions of all nodes so far, length.
+    """
 
     def __init__(self, grid: Grid, cuts: dict[tuple[int, int], np.ndarray]):
         self._old, self._cuts = grid.points, cuts
@@ -141,7 +159,10 @@ class _Nodes:
         self._middles: dict[tuple[int, int], int] = {}
 
     def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
-        """Return (nodes, positions from 0 to 1) of an edge from a to b along a curve of 2 or 3 nodes, ends first."""
+        """Return (numbers of the nodes along an edge from a to b, their positions from 0 to 1), with new nodes at cuts.
+
+        curve: positions of the nodes of the uncut edge: its ends, and its middle if it is quadratic, shape (2 or 3, 2).
+        """
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
         places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])
@@ -152,24 +173,24 @@ class _Nodes:
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
-        """Return the node in the middle of an edge; the first call creates it at `point`."""
+        """Return the number of the node in the middle of an edge from a to b; the first call adds it at `point`."""
         key = min(a, b), max(a, b)
         if key not in self._middles:
             self._middles[key] = self._new(point)
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """Keep the middle node of an edge that is not cut."""
+        """Store the number of the existing middle node of an edge from a to b that is not cut."""
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
-        """Add a node and return its number."""
+        """Add a node at a point and return its number."""
         self.points.append(point)
         return len(self.points) - 1
 
 
 def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return points of a straight edge (two nodes) or of a quadratic one (ends, then middle), shape (n, 2)."""
+    """Return points at s (0 to 1) of a straight edge (2 nodes) or a quadratic one (ends, middle), shape (n, 2)."""
     s = np.asarray(s, dtype=float)[:, None]
     if len(curve) == 2:
         return (1 - s) * curve[0] + s * curve[1]
@@ -177,14 +198,14 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the point of a triangle with 3 or 6 nodes at area coordinates x, shape (3,)."""
+    """Return the point at area coordinates x, shape (3,), of a triangle with the positions of its 3 or 6 nodes."""
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
 
 
 def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
-    """Return the grid with its edges cut."""
+    """Return the grid with its edges cut at the positions of `_cuts`, and its triangles cut between them."""
     nodes = _Nodes(grid, cuts)
     quadratic = next(iter(grid.layers.values())).shape[1] == 6
     layers, boundaries = {}, {}
@@ -201,12 +222,19 @@ def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
 
 
 def _rows(table: np.ndarray) -> list[list[int]]:
-    """Return the rows of a table as lists."""
+    """Return the rows of an integer table as lists of int."""
     return [list(map(int, row)) for row in table]
 
 
 def _parts(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """Return the pieces of a triangle of the grid as rows of node numbers."""
+    """Return the pieces of one triangle as lists of node numbers.
+
+    Args:
+        grid: the grid before the cut.
+        nodes: nodes of the cut grid; new ones are added.
+        row: node numbers of the triangle.
+        quadratic: True if triangles have 6 nodes.
+    """
     element, at = grid.points[row], {row[k]: np.eye(3)[k] for k in range(3)}      # area coordinates of nodes
     sides = {}
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):

@@ -1,4 +1,4 @@
-"""Result of a heating run."""
+"""Result of a run of `heat`: temperatures of a body over time."""
 
 from typing import Any, NamedTuple
 
@@ -16,12 +16,12 @@ _POINTS = 201
 
 
 class Spot(NamedTuple):
-    """Hottest or coldest node of a body.
+    """Node of a body with the highest or lowest temperature.
 
     Attributes:
-        temperature: its temperature.
-        R: reference radius, length.
-        Z: reference height, length.
+        temperature: temperature of the node.
+        R: reference radius of the node, length.
+        Z: reference height of the node, length.
     """
 
     temperature: float
@@ -30,11 +30,11 @@ class Spot(NamedTuple):
 
 
 class Window(NamedTuple):
-    """Times at which a body enters and leaves a range of temperatures.
+    """Times at which the temperatures of a body enter and leave a range.
 
     Attributes:
         reached: time from which the whole body is in the range, or None.
-        left: time at which a part of the body leaves the range, or None.
+        left: time at which a part of the body leaves the range again, or None.
     """
 
     reached: float | None
@@ -42,21 +42,22 @@ class Window(NamedTuple):
 
 
 class HeatRun:
-    """Temperatures of a body over time, at every accepted step.
+    """Temperatures of a body over time, at every accepted step of `heat`.
 
     Between two steps the temperature is a cubic in time; output times are ends of steps.
 
     Args:
-        body: the heat equation.
+        body: heat equation of the body.
         unit: unit of temperatures, "C" or "K".
-        outputs: requested output times.
+        outputs: requested output times, shape (k,).
 
     Attributes:
         mesh: mesh of the computation: the given mesh, with elements cut into layers below faces that exchange heat.
-        outputs: requested output times.
-        errors_in_space: estimated largest discretisation error of the temperature at these times, degrees.
+        outputs: requested output times, shape (k,).
+        errors_in_space: estimated largest discretisation error of the temperature at these times, shape (k,), degrees.
         unit: unit of temperatures, "C" or "K".
-        states: for each step [T of the nodes, locally owned entries, then the lines of each conducting tool].
+        states: for each step a list of temperatures: of the body at its locally owned nodes, then in each tool in
+            contact (see `HeatContact`).
     """
 
     def __init__(self, body: Conduction, unit: str, outputs: np.ndarray):
@@ -68,10 +69,10 @@ class HeatRun:
         self.errors_in_space: np.ndarray = np.zeros(len(outputs))
 
     def record(self, time: float, step: Any) -> None:
-        """Append an accepted step.
+        """Append an accepted step to the run.
 
         Args:
-            time: time at its end.
+            time: time at the end of the step.
             step: the `formingx.extensions.heat.stepping.Step`.
         """
         self.states.append(step.state)
@@ -82,12 +83,12 @@ class HeatRun:
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the steps, from 0, shape (n,)."""
+        """Times at the ends of the n steps, the first 0, shape (n,)."""
         return np.array(self._times)
 
     @property
     def errors(self) -> np.ndarray:
-        """Estimated error of each step, degrees, shape (n,)."""
+        """Estimated time integration error of each step, degrees, shape (n,); the first is 0."""
         return np.array(self._errors)
 
     @property
@@ -97,24 +98,27 @@ class HeatRun:
 
     @property
     def heat_through(self) -> dict[str, np.ndarray]:
-        """{boundary or source: heat into the body in each step, shape (n,)}; per unit depth in plane strain."""
+        """{boundary or source: heat that enters the body there in each step, shape (n,)}.
+
+        In plane strain heats are per unit depth.
+        """
         return dict(zip(self._unique_names(), np.array(self._heats).T))
 
     @property
     def balance(self) -> np.ndarray:
-        """Heat stored minus heat supplied in each step, over the largest of both, shape (n,)."""
+        """Heat stored minus heat supplied in each step, over the largest of all heats of the step, shape (n,)."""
         heats = np.array(self._heats)
         largest = np.abs(np.column_stack([heats, self._stored])).max(1)
         return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)
 
     def temperature(self, time: float | None = None) -> fem.Function:
-        """Return the temperature at a time.
+        """Return the temperature of the body at a time.
 
         Args:
-            time: the time; default the end.
+            time: the time; default the end of the run.
 
         Returns:
-            P2 Function on the mesh.
+            P2 Function on `mesh`.
         """
         T = fem.Function(self._body.space, name="temperature")
         T.x.array[: len(self._body.points)] = self._at(time)[0]
@@ -122,7 +126,7 @@ class HeatRun:
         return T
 
     def at(self, points: Any, times: Any = None) -> np.ndarray:
-        """Return temperatures at points and times.
+        """Return temperatures of the body at points and times.
 
         Args:
             points: reference positions (R, Z), shape (n, 2), length, the same on all ranks.
@@ -143,23 +147,26 @@ class HeatRun:
 
         Args:
             times: times; default `outputs`.
-            line: its two ends (R, Z), length; default from `bottom` to `top` (or `inner` to `outer`) at their first
-                nodes.
-            points: number of points.
+            line: reference positions (R, Z) of the two ends of the line, length. Default: from the first node of
+                `bottom` to the first node of `top` (or from `inner` to `outer`).
+            points: number of equidistant points on the line.
 
         Returns:
             Distances from the first end, shape (points,), length; temperatures, shape (times, points).
+
+        Raises:
+            InputError: a point outside the body, a time outside the run, or no default line.
         """
         first, last = np.array(self._ends() if line is None else line, dtype=float).reshape(2, 2)
         s = np.linspace(0, 1, points)
         return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
 
     def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
-        """Return the mean temperature along a line as in `through`, by Simpson's rule.
+        """Return the mean temperature along a straight line through the body, by Simpson's rule.
 
         Args:
             times: times; default `outputs`.
-            line: its two ends (R, Z), length.
+            line: reference positions (R, Z) of its two ends, length; default as in `through`.
 
         Returns:
             Temperatures, shape (times,).
@@ -170,36 +177,36 @@ class HeatRun:
         return T @ (weights / weights.sum())
 
     def hottest(self, time: float | None = None) -> Spot:
-        """Return the hottest node at a time.
+        """Return the node of highest temperature at a time.
 
         Args:
-            time: the time; default the end.
+            time: the time; default the end of the run.
 
         Returns:
-            The node.
+            Temperature and reference position of the node.
         """
         return self._extreme(self._at(time)[0], 1)
 
     def coldest(self, time: float | None = None) -> Spot:
-        """Return the coldest node at a time.
+        """Return the node of lowest temperature at a time.
 
         Args:
-            time: the time; default the end.
+            time: the time; default the end of the run.
 
         Returns:
-            The node.
+            Temperature and reference position of the node.
         """
         return self._extreme(self._at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
-        """Return the times at which the whole body enters a range of temperatures, and at which it leaves the range.
+        """Return when all temperatures of the body have entered a range, and when the first leaves it again.
 
         Args:
-            low: lowest temperature of the range.
-            high: highest temperature of the range.
+            low: lower bound of the range.
+            high: upper bound of the range.
 
         Returns:
-            Both times.
+            The two times.
 
         Raises:
             InputError: `low` is not below `high`.
@@ -218,15 +225,15 @@ class HeatRun:
         return Window(reached, self._first(lambda t: -out(t), later, from_time=reached))
 
     def tool_profile(self, on: str, at: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Return the temperature along the depth of a conducting tool, below the node of a face nearest to a point.
+        """Return temperatures along the depth of a conducting tool, below the contact node nearest to a point.
 
         Args:
-            on: name of the boundary.
-            at: reference position (R, Z), length.
-            time: the time; default the end.
+            on: name of the boundary in contact with the tool.
+            at: reference position (R, Z) of the point, length.
+            time: the time; default the end of the run.
 
         Returns:
-            Depths from the tool's face, shape (m,), length; temperatures, shape (m,).
+            Depths from the face of the tool, shape (m,), length; temperatures, shape (m,).
 
         Raises:
             InputError: no conducting tool is in contact with the boundary.
@@ -242,10 +249,12 @@ class HeatRun:
         return touch.depths, touch.back + np.append(line, 0.0)
 
     def to_csv(self, file: Any) -> None:
-        """Write one row per step: time, error, coldest, hottest, heat stored, heat through each boundary (rank 0).
+        """Write a CSV file with one row per step (rank 0 writes).
+
+        Columns are time, estimated error, coldest and hottest temperature, stored heat, and heat through each boundary.
 
         Args:
-            file: name of the file.
+            file: path of the file.
         """
         header = ["time", f"estimated_error [{self.unit}]", f"coldest [{self.unit}]", f"hottest [{self.unit}]",
                   "heat_stored", *(f"heat of {name}" for name in self._unique_names())]
@@ -255,11 +264,13 @@ class HeatRun:
         files.write_rows(file, header, rows, self._comm)
 
     def field_to_csv(self, file: Any, time: float | None = None) -> None:
-        """Write the temperature at a time as CSV with columns R, Z, T, for `start` (rank 0).
+        """Write the nodal temperatures at a time as a CSV file with columns R, Z, T (rank 0 writes).
+
+        `heat(start=...)` reads the file.
 
         Args:
-            file: name of the file.
-            time: the time; default the end.
+            file: path of the file.
+            time: the time; default the end of the run.
         """
         table = np.column_stack([self._body.points, self._at(time)[0]])
         rows = gathered(self._comm, table)
@@ -267,14 +278,14 @@ class HeatRun:
 
     def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
                      **style: Any) -> Any:
-        """Draw the temperature through the thickness at times.
+        """Draw the temperature along a line through the body, one curve per time.
 
         Args:
             times: times; default `outputs`.
-            line: see `through`.
-            scale: factor of lengths.
+            line: reference positions (R, Z) of its two ends, length; default as in `through`.
+            scale: factor of the distances on the axis, such as 1000 for mm.
             axes: matplotlib axes; default a new figure.
-            style: options of the lines.
+            style: options of the matplotlib lines.
 
         Returns:
             The matplotlib axes.
@@ -290,16 +301,20 @@ class HeatRun:
         return axes
 
     def _unique_names(self) -> list[str]:
-        """Return the names of boundaries and sources, numbered where they are equal."""
+        """Return the names of boundaries and sources of heat; equal names are numbered."""
         names = self._body.names
         return [n if names.count(n) == 1 else f"{n} {names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
     def _chosen(self, times: Any) -> np.ndarray:
-        """Return the times as an array; default `outputs`."""
+        """Return times as an array; None: `outputs`."""
         return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
 
     def _ends(self) -> list[np.ndarray]:
-        """Return the ends of the default line through the body."""
+        """Return the reference positions of the two ends of the default line through the body.
+
+        Raises:
+            InputError: the mesh has neither `bottom` and `top` nor `inner` and `outer`.
+        """
         for low, high in (("bottom", "top"), ("inner", "outer")):
             if {low, high} <= set(self.mesh.boundaries):
                 return [self.mesh.line_of(low)[0], self.mesh.line_of(high)[0]]
@@ -307,7 +322,10 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _at(self, time: float | None) -> list[np.ndarray]:
-        """Return the state at a time, between steps by Hermite's cubic with slopes of parabolas through three steps."""
+        """Return the temperatures of body and tools at a time, as an entry of `states`.
+
+        Between two steps they follow Hermite's cubic, with slopes of the parabolas through three steps.
+        """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -324,7 +342,7 @@ class HeatRun:
                 for va, vb, da, db in zip(a, b, slope_a, slope_b)]
 
     def _slope(self, k: int) -> list[np.ndarray]:
-        """Return the time derivative at a step of the parabola through it and its neighbours."""
+        """Return the time derivative of temperatures at step k, from the parabola through three neighbouring steps."""
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]
@@ -334,14 +352,20 @@ class HeatRun:
         return [sum(w * v for w, v in zip(weights, parts)) for parts in zip(*self.states[i - 1: i + 2])]
 
     def _extreme(self, T: np.ndarray, sign: int) -> Spot:
-        """Return the node of the largest (sign 1) or smallest (sign -1) temperature."""
+        """Return the node of the largest (sign 1) or smallest (sign -1) nodal temperature T, over all ranks."""
         k = int(np.argmax(sign * T)) if len(T) else -1
         mine = (sign * T[k], *self._body.points[k].tolist()) if len(T) else (-np.inf, 0.0, 0.0)
         value, R, Z = max(self._comm.allgather(mine))
         return Spot(float(sign * value), R, Z)
 
     def _first(self, out: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """Return the first time at which `out` is not positive, found between steps."""
+        """Return the first time at which the function `out` of time is not positive, or None.
+
+        Args:
+            out: function of time.
+            times: times of steps to examine, in order; a root between two of them is located.
+            from_time: time before the first of them, or None.
+        """
         from scipy.optimize import brentq
         before = from_time
         for t in times:
@@ -355,6 +379,6 @@ _DEGREES = {"C": "°C", "K": "K"}
 
 
 def _shade(k: int, n: int) -> Any:
-    """Return the colour of curve k of n."""
+    """Return the colour of curve k of n curves."""
     from matplotlib import colormaps
     return colormaps["viridis"](0.9 * (1 - k / max(n - 1, 1)))

@@ -24,7 +24,7 @@ from .result import HeatRun
 from .space_error import SpaceError
 
 PROMISE = 3e-4
-"""Allowed discretisation error over the span of temperatures in a run."""
+"""Discretisation error, over the span of temperatures in a run, above which a warning is logged."""
 _EARLY = 0.01
 """Earliest time, over the duration of a run, at which temperatures are as accurate as at the output times."""
 
@@ -43,7 +43,8 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
             `Absorption`; several on one boundary add up.
         start: initial temperature: a number, a `table` over R, a function of arrays (R, Z), or a CSV file with columns
             R, Z, T. Also an earlier `HeatRun` (its end), or a DOLFINx Function.
-        times: output times, positive and increasing, or the end alone; the run ends at the last one. Steps end there.
+        times: output times, positive and increasing, or the end alone. Steps end at these times, and the run at the
+            last.
         unit: unit of all temperatures, "C" or "K".
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`.
         displacement: (u_r, u_z) of a deformed body, a Function or UFL expression on the mesh, length; None: the
@@ -106,7 +107,12 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
 
 
 class _Displaced:
-    """Displacement on a mesh, at points of the body and on another mesh of it; collective."""
+    """Displacement of a body as a P2 Function, evaluated at points or on another mesh of the body; collective.
+
+    Args:
+        displacement: (u_r, u_z), a Function or UFL expression, length.
+        mesh: the mesh on which it is given.
+    """
 
     def __init__(self, displacement: Any, mesh: Mesh):
         space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
@@ -115,12 +121,12 @@ class _Displaced:
         self._mesh, self._parts = mesh, [u.sub(k).collapse() for k in (0, 1)]
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed positions of points, shape (n, 2), length."""
+        """Return the deformed positions of reference points, both of shape (n, 2), length."""
         return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
                                          for part in self._parts])
 
     def on(self, mesh: Mesh) -> fem.Function:
-        """Return the displacement as a P2 Function on another mesh."""
+        """Return the displacement as a P2 Function on another mesh of the body."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
         points = of_space(u.function_space)
         u.x.array[:] = (self(points) - points).ravel()
@@ -141,7 +147,15 @@ def _begin(body: Conduction, start: Any, unit: str) -> None:
 
 
 def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
-    """Integrate over the output times with steps that the error estimate allows."""
+    """Integrate from time 0 over the output times; record accepted steps in the run.
+
+    Args:
+        run: the run, whose last state is the initial one.
+        body: heat equation of the body.
+        outputs: output times.
+        tolerance: largest estimated error of one step, degrees.
+        max_steps: maximum number of steps.
+    """
     state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
     for end in outputs:
         while t < end:
@@ -162,7 +176,7 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
-    """Estimate the discretisation error at the output times, and warn if it exceeds the promised one."""
+    """Estimate the discretisation error at the output times; log a warning if it exceeds `PROMISE` and `tolerance`."""
     try:
         run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])
@@ -178,11 +192,11 @@ def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
-    """Return the thermal properties of each layer.
+    """Check the materials argument of `heat` and `Cooling`.
 
     Args:
-        mesh: the mesh.
-        materials: the user's argument.
+        mesh: the mesh, for its layers.
+        materials: {layer: `ThermalProperties`}, or one for all layers, as the user gave it.
 
     Returns:
         {layer: `ThermalProperties`}.
@@ -204,15 +218,15 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
-    """Return the user's laws of the faces as a list.
+    """Check the laws of faces that a user gave to `heat` or `Cooling`.
 
     Args:
-        mesh: the mesh.
-        boundaries: the user's argument.
+        mesh: the mesh, for its boundaries.
+        boundaries: laws of faces and heat sources.
         absolute_zero: absolute zero in the unit of temperatures.
 
     Returns:
-        The laws.
+        List of the laws.
 
     Raises:
         InputError: a law that is not allowed.

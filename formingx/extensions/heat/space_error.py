@@ -17,11 +17,11 @@ from .contact import HeatContact
 
 
 class SpaceError:
-    """Estimator of the discretisation error of a body.
+    """Estimator of the discretisation error of the temperatures of a body with quadratic elements.
 
     Args:
-        body: the heat equation of the run.
-        finer: the same equation of degree 3; `destroy` frees it.
+        body: heat equation of the run.
+        finer: the same equation with cubic elements; `destroy` frees it.
     """
 
     def __init__(self, body: Conduction, finer: Conduction):
@@ -29,13 +29,13 @@ class SpaceError:
         self._values, self._raised_values = fem.Function(body.space), fem.Function(finer.space)
 
     def largest(self, state: list[np.ndarray], time: float) -> float:
-        """Estimate the largest error of a state; collective.
+        """Estimate the largest discretisation error of the temperature in a state; collective.
 
-        The faces of tools keep their temperatures; their lines respond to the correction.
+        The faces of tools keep their temperatures; the tools respond to the correction along their depth.
 
         Args:
-            state: [T, *lines].
-            time: time after which the state was reached.
+            state: temperature state of `Conduction`: of the body, then in each tool in contact.
+            time: time since the start of the run.
 
         Returns:
             Error, degrees.
@@ -44,15 +44,21 @@ class SpaceError:
         slope = body.slope(body.rates(state)[0][0])
         lines = [self._faces(*each) for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
         rates, _ = finer.rates([self._raised(state[0]), *lines])
-        left = time * (rates[0] - finer.mass(self._raised(slope)))
-        return finer.difference([left, *(np.zeros_like(line) for line in lines)], time)
+        residual = time * (rates[0] - finer.mass(self._raised(slope)))
+        return finer.difference([residual, *(np.zeros_like(line) for line in lines)], time)
 
     def destroy(self) -> None:
-        """Free the PETSc objects (collective)."""
+        """Free the PETSc objects of `finer` (collective)."""
         self._finer.destroy()
 
     def _faces(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
-        """Return lines at the nodes of the finer space, with the temperature of the tool's face and 0 below it."""
+        """Return temperatures of a tool at the contact nodes of `finer`, interpolated at its face and 0 below it.
+
+        Args:
+            touch: contact of the tool in `body`.
+            finer: the same contact in `finer`.
+            lines: temperatures of the tool above its back in `body`, shape (nodes, m).
+        """
         found = np.zeros((len(finer.dofs), lines.shape[1]))
         if touch.conducts:
             values = np.zeros(len(self._body.points))
@@ -61,7 +67,7 @@ class SpaceError:
         return found
 
     def _raised(self, own: np.ndarray) -> np.ndarray:
-        """Return a P2 function, locally owned entries, in the finer space, locally owned entries."""
+        """Return the P3 nodal values of a P2 function, both locally owned entries."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._raised_values.interpolate(self._values)

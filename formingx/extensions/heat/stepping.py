@@ -17,13 +17,13 @@ _ERROR = WEIGHTS - np.array([1 - _W, 3 * _W + 1, _D]) / 3
 
 
 class Step(NamedTuple):
-    """Result of a trial step.
+    """Result of a trial time step.
 
     Attributes:
-        state: [T, *lines] at its end.
+        state: temperature state of `Conduction` at the end of the step: of the body, then in each tool in contact.
         error: estimated error of the step, degrees.
-        stored: heat that the body stores in the step.
-        heats: heat through each boundary and source, in the order of `Conduction.names`.
+        stored: heat that the whole body stores in the step.
+        heats: heat that enters the body in the step by each boundary and source, in the order of `Conduction.names`.
     """
 
     state: list[np.ndarray]
@@ -33,15 +33,15 @@ class Step(NamedTuple):
 
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
-    """Take one step of TR-BDF2 from a state.
+    """Take one time step by TR-BDF2.
 
     Args:
-        body: the heat equation.
-        state: [T, *lines].
+        body: heat equation of the body.
+        state: temperature state of `Conduction` at the start of the step.
         dt: length of the step, time.
 
     Returns:
-        Result of the step.
+        State, error and heats at the end of the step.
 
     Raises:
         ConvergenceError: Newton's method found no solution in a stage.
@@ -62,11 +62,13 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
 
 
 def next_length(dt: float, error: float, tolerance: float) -> float:
-    """Return the length of the step that just meets the tolerance, with a safety factor, at most five times the last.
+    r"""Return the length of the next step from the error of the last one, with a safety factor of 0.9.
+
+    .. math:: dt \; \min(\max(0.9 (tolerance/error)^{1/3}, 0.1), 5)
 
     Args:
         dt: length of the last step, time.
-        error: its estimated error, degrees.
+        error: estimated error of the last step, degrees.
         tolerance: largest allowed error, degrees.
 
     Returns:
@@ -76,14 +78,14 @@ def next_length(dt: float, error: float, tolerance: float) -> float:
 
 
 def fitted(dt: float, left: float) -> float:
-    """Return the length of a step that leaves no short remainder before a time that must be hit.
+    """Return the length of a step that ends at a given time or leaves no short remainder before it.
 
     Args:
         dt: length that the error allows, time.
-        left: time until then.
+        left: time from now until the given time.
 
     Returns:
-        Length, about `dt`.
+        `left` if dt reaches it, otherwise at most half of it and at most dt.
     """
     return left if dt >= left * (1 - 1e-9) else min(dt, left / 2)
 

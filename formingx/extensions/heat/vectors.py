@@ -14,14 +14,16 @@ from ...mesh.mesh import Mesh
 
 
 class HeatVectors:
-    """Vectors and forms of the heat equation; `Conduction` sets the attributes.
+    """Assembly of vectors of the heat equation M dT/dt = R(T); the subclass `Conduction` sets the attributes.
+
+    Entries of M and R are divided by `capacity`, so that M sums to 1 and R is in degrees per time.
 
     Attributes:
         mesh: the `Mesh`.
         comm: MPI communicator.
-        T: the temperature `Function` of the forms.
+        T: temperature `Function` in the forms.
         capacity: heat capacity of the whole body, heat per degree.
-        power: heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
+        power: heat source, heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
     """
 
     mesh: Mesh
@@ -38,21 +40,21 @@ class HeatVectors:
     _mass_form: Any
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a number for use in forms; a new value does not compile the forms again.
+        """Return a UFL constant, whose value can change without a new compilation of the forms.
 
         Args:
             value: initial value.
 
         Returns:
-            The `Constant`.
+            The DOLFINx `Constant`.
         """
         return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
 
     def stored(self, change: np.ndarray) -> float:
-        """Return the heat that the whole body stores by a change of temperature.
+        """Return the heat that the whole body stores by a change of temperature, summed over ranks.
 
         Args:
-            change: change of T, locally owned entries, shape (n,).
+            change: change of T, locally owned entries, shape (n,), degrees.
 
         Returns:
             Heat.
@@ -60,21 +62,22 @@ class HeatVectors:
         return self.capacity * self._sum(self._mass(change))
 
     def mass(self, change: np.ndarray) -> np.ndarray:
-        """Return M times a change of temperature.
+        """Return the product M dT of the mass matrix and a change of temperature.
 
         Args:
-            change: change of T, locally owned entries, shape (n,).
+            change: change of T, locally owned entries, shape (n,), degrees.
 
         Returns:
-            Locally owned entries, shape (n,).
+            Locally owned entries, shape (n,), degrees.
         """
         return self._mass(change)
 
     def source(self, make: Any) -> Any:
-        """Return a compiled form of a heat source for `assembled`.
+        """Compile the form of a heat source, to be assembled by `assembled`.
 
         Args:
-            make: function of a test function v that returns the integral (UFL) of heat per time, times v.
+            make: function of a UFL test function v that returns the integral (UFL) of heat per time and volume, times
+                v.
 
         Returns:
             The compiled form.
@@ -82,18 +85,18 @@ class HeatVectors:
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """Return the values of a form of `source` at the nodes, for `power`.
+        """Return the nodal values of a heat source, as `power` has them.
 
         Args:
-            form: compiled form.
+            form: result of `source`.
 
         Returns:
-            Locally owned entries, shape (n,).
+            Heat per time over `capacity`, locally owned entries, shape (n,).
         """
         return self._assemble(form)
 
     def _form(self, form: Any) -> Any:
-        """Return a compiled form."""
+        """Return the compiled form of a UFL form."""
         return _compat.compile_form(form)
 
     def _integral(self, form: Any) -> float:
@@ -101,25 +104,25 @@ class HeatVectors:
         return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
 
     def _assemble(self, form: Any) -> np.ndarray:
-        """Return the locally owned entries of a compiled linear form, shape (n,)."""
+        """Return the locally owned entries of an assembled linear form, shape (n,)."""
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Return the residual R(T) of heat conduction without contact, locally owned entries; set `self.T` to T."""
+        """Set `self.T` to T; return R(T) of the body without tool contacts, locally owned entries, shape (n,)."""
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
-        """Return M times a change of T, locally owned entries, shape (n,)."""
+        """Return the mass matrix M times a change of T, locally owned entries, shape (n,)."""
         self._change.x.array[: self._n] = change
         self._change.x.scatter_forward()
         return self._assemble(self._mass_form)
 
     def _largest(self, values: np.ndarray) -> float:
-        """Return the largest absolute value over all ranks."""
+        """Return the largest absolute entry of an array over all ranks."""
         return float(self.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
 
     def _sum(self, values: np.ndarray) -> float:
-        """Return the sum over all ranks."""
+        """Return the sum of the entries of an array over all ranks."""
         return float(self.comm.allreduce(values.sum(), MPI.SUM))
