@@ -194,6 +194,9 @@ def test_ring_under_outer_pressure():
     found = path.stability(range(4))
     assert found.first.number == 2 and len(found.bifurcations) == 1
     assert found.first.control == pytest.approx(0.0112425992232, rel=2e-5)      # `exact.tube(0.8, 2)`
+    assert repr(found.first).startswith("CriticalPoint(n=2, lost at pressure 0.0112")
+    with pytest.raises(InputError, match="CriticalPoint.view3d: file 'mode.svg'"):
+        found.first.view3d("mode.svg")
 
 
 def test_what_is_formed_is_silent():

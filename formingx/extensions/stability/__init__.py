@@ -1,4 +1,4 @@
-"""Loss of stability and buckling modes of axisymmetric bodies."""
+"""Loss of stability and buckling modes of axisymmetric and plane-strain bodies, imperfections, and top loads."""
 
 from . import hoop
 from .imperfection import with_imperfection

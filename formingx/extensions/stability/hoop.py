@@ -20,13 +20,13 @@ _THROUGH = 4               # Gauss points of a layer
 
 @dataclass(frozen=True, repr=False)
 class HoopResultants(Sheet):
-    """Hoop stress resultants at n positions of a sheet, from the axis to the rim, in one state.
+    """Hoop stress resultants of a sheet in one state, at n points of its middle line from the axis to the rim.
 
-    Compression is necessary for wrinkles, not sufficient: a thick sheet may stay stable (`Path.stability`). A membrane,
-    which has no bending stiffness, wrinkles there.
+    A negative resultant is necessary for wrinkles, not sufficient: a thick sheet may stay stable (`Path.stability`). A
+    membrane, which has no bending stiffness, wrinkles there.
 
     Attributes:
-        points: reference positions (R, Z) on the middle line, at the middle of its elements, shape (n, 2), length.
+        points: reference positions (R, Z) of the points, in the middle of the elements, shape (n, 2), length.
         resultant: hoop component of the first Piola-Kirchhoff stress P, integrated through the reference thickness,
             shape (n,), force per reference length of the middle line.
         comm: MPI communicator of the run.
@@ -38,12 +38,12 @@ class HoopResultants(Sheet):
 
     @property
     def compressed(self) -> np.ndarray:
-        """Mask of places in hoop compression, shape (n,)."""
+        """Mask of the points with a negative resultant, shape (n,)."""
         return self.resultant < 0
 
     @property
     def least(self) -> tuple[float, float]:
-        """(smallest resultant, its reference radius)."""
+        """Smallest resultant, and the reference radius of its point, length."""
         k = int(np.argmin(self.resultant))
         return float(self.resultant[k]), float(self.points[k, 0])
 
@@ -65,7 +65,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
         state: a state of the path; default the last.
 
     Returns:
-        The `HoopResultants`.
+        The resultants at points of the middle line.
 
     Raises:
         InputError: plane strain, a sheet in three dimensions, or a mesh that is no sheet.

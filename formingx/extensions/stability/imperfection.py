@@ -13,12 +13,12 @@ from .instability import CriticalPoint
 
 
 def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
-    """Return a stress-free mesh whose nodes are moved along a mode; collective.
+    """Return a stress-free mesh with its nodes moved along a buckling mode; collective.
 
     Args:
         mesh: the perfect mesh.
-        mode: a `CriticalPoint` with n = 0 of a run on this mesh, or on a mesh with the same nodes.
-        amplitude: the largest displacement of a node, length; negative: against the mode.
+        mode: a `CriticalPoint` whose mode is axisymmetric (n = 0), of a run on this mesh or one with the same nodes.
+        amplitude: largest displacement of a node, length; negative: against the mode.
 
     Returns:
         The new mesh.
@@ -29,8 +29,8 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     >>> column = fx.mesh.disc(radius=1.0, thickness=3.0, elements=(1, 4))
     >>> pressed = fx.Scene(mesh=column, materials=fx.NeoHookean(c10=0.5), supports=[
     ...     fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", "z")])
-    >>> loss = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
-    >>> bent = fx.with_imperfection(column, loss, 0.01)
+    >>> point = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
+    >>> bent = fx.with_imperfection(column, point, 0.01)
     """
     instance("with_imperfection: mesh", mesh, Mesh, "a mesh")
     mode = instance("with_imperfection: mode", mode, CriticalPoint, "a CriticalPoint that Path.stability found")

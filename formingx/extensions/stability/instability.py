@@ -25,22 +25,24 @@ from .modes import Kind, Located, Modes
 class CriticalPoint:
     """Point of a path at which one mode becomes unstable, or stable again.
 
+    The mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta); in plane strain with k x3 in place
+    of n theta.
+
     Attributes:
         path: the computed `Path`.
-        found: the located point, see `Located`.
-        number: circumferential wave number n, cos(n theta); in plane strain the wave number along the depth, 1/length.
-        flipped: name of the symmetry plane under which the mode is antisymmetric, or None.
-        left: state of the path before the point.
-        right: state of the path behind the point.
-        state: the state at the critical point, with its output quantities `measures`.
-        gained: False if the body is stable again behind this point.
+        found: the located point, a `formingx.extensions.stability.modes.Located`.
+        number: circumferential wave number n; in plane strain the wave number k along the depth, 1/length.
+        flipped: name of the symmetry plane about which the mode is antisymmetric, or None.
+        left: last state of the path before the point.
+        right: first state of the path behind the point.
+        state: state at the point, with its output quantities `measures`.
+        gained: True if the mode becomes unstable, False if it becomes stable again.
         control: value of the controlled quantity (pressure, travel, time), the user's units.
         driven: name of the controlled quantity.
         limit_point: True if the point is a limit point of the controlled quantity (n = 0). No branch begins there.
-        solved: True if `state` is a converged solution, False if it is interpolated between its neighbours.
+        solved: True if `state` is a converged solution, False if it is interpolated between `left` and `right`.
         points: reference positions (R, Z) of the m nodes of all ranks, shape (m, 2), length.
-        amplitudes: mode (U, W, V) at these nodes, shape (m, 3): u_r = U cos, u_z = W cos, u_hoop = V sin; the largest
-            is 1.
+        amplitudes: (U, W, V) of the mode at these nodes, shape (m, 3); the largest displacement is 1.
     """
 
     path: Any
@@ -53,12 +55,12 @@ class CriticalPoint:
 
     @property
     def number(self) -> float:
-        """Wave number of the mode, see the class."""
+        """Wave number of the mode: n round the axis; in plane strain k along the depth, 1/length."""
         return self.found.kind.number
 
     @property
     def flipped(self) -> str | None:
-        """Symmetry plane under which the mode is antisymmetric, or None."""
+        """Name of the symmetry plane about which the mode is antisymmetric, or None."""
         return self.found.kind.flipped
 
     left = property(lambda self: self.found.left)
@@ -69,7 +71,7 @@ class CriticalPoint:
 
     @property
     def at(self) -> tuple[float, ...]:
-        """Reference position (R, Z) of the largest amplitude, length."""
+        """Reference position (R, Z) of the node with the largest displacement in the mode, length."""
         return without_round_off(self.points[np.argmax(np.linalg.norm(self.amplitudes, axis=1))], self.points)
 
     def branch(self, sense: int) -> Any:
@@ -78,10 +80,10 @@ class CriticalPoint:
         `trace(scene, start=...)` continues it on the bifurcated branch (n = 0).
 
         Args:
-            sense: 1 or -1, along the mode or against it.
+            sense: 1 for the direction of the mode, -1 for the opposite one.
 
         Returns:
-            The path.
+            The path up to this point.
 
         Raises:
             InputError: the mode varies round the axis (its branch is three-dimensional), or the point is a limit point.
@@ -96,8 +98,8 @@ class CriticalPoint:
         curve, problem = segment.curve, segment.problem
         start = State(self.state.x.copy(), self.state.control, self.found.x, 0.0, kind="branch point",
                       memory=self.left.memory, stage=self.left.stage, setting=self.left.setting, time=self.state.time)
-        rest = State(0 * start.x, 0.0, 0 * start.x, 0.0)
-        start.direction = sense * self.found.x / curve.moved(rest, State(self.found.x, 0.0, rest.x, 0.0))
+        zero = State(0 * start.x, 0.0, 0 * start.x, 0.0)
+        start.direction = sense * self.found.x / curve.moved(zero, State(self.found.x, 0.0, zero.x, 0.0))
         record = Record(problem, curve)
         states = segment.states
         record.segments[-1].states += [*states[: states.index(self.left) + 1], start]
@@ -107,61 +109,71 @@ class CriticalPoint:
         return path
 
     def view3d(self, file: Any, scale: float = 0.15) -> Picture:
-        """Draw the body with the mode as a PNG (rank 0 draws).
+        """Draw the deformed body with the mode to a PNG file (rank 0 draws).
 
         Args:
             file: path of the PNG file.
-            scale: largest amplitude of the mode over the size of the body.
+            scale: largest displacement of the mode over the size of the body.
 
         Returns:
             The picture.
 
         Raises:
-            InputError: neither a screen nor Xvfb is available, or the mesh is no sheet.
+            InputError: the name does not end in .png, the scale is not positive, or neither a screen nor Xvfb is
+                available.
         """
-        from . import show as modes
-        modes.draw(self, file, scale)
+        from . import show
+        show.draw(self, file, scale)
         return Picture(file)
 
     def __repr__(self) -> str:
-        return f"Loss(n={self.number:g}, {_shown(self)})"
+        return f"CriticalPoint(n={self.number:g}, {_shown(self)})"
 
 
 class Stability:
-    """Stability of states of a path.
+    """Stability of the examined states of a path; prints a table.
+
+    Args:
+        path: the computed `Path`.
+        numbers: examined wave numbers.
+        states: examined states, in order.
+        counts: number of unstable modes of each kind in each state.
+        critical_points: points at which a mode becomes unstable or stable, in order.
 
     Attributes:
-        numbers: the wave numbers examined.
-        states: the states examined, in order.
-        counts: {(number, flipped): number of unstable modes in each state, shape (states,)}.
+        path: the computed `Path`.
+        numbers: examined wave numbers.
+        states: examined states, in order.
+        counts: {(wave number, symmetry plane or None): number of unstable modes in each state, shape (states,)}. Modes
+            with a symmetry plane are antisymmetric about it.
         critical_points: the `CriticalPoint` objects, in order along the path.
     """
 
     def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
-                 losses: list[CriticalPoint]):
-        self.path, self.numbers, self.states, self.critical_points = path, numbers, states, losses
+                 critical_points: list[CriticalPoint]):
+        self.path, self.numbers, self.states, self.critical_points = path, numbers, states, critical_points
         self.counts = {tuple(kind): np.array(found) for kind, found in counts.items()}
 
     @property
     def bifurcations(self) -> list[CriticalPoint]:
-        """Critical points that are no limit points."""
-        return [loss for loss in self.critical_points if loss.gained and not loss.limit_point]
+        """Critical points at which a mode becomes unstable, without limit points."""
+        return [point for point in self.critical_points if point.gained and not point.limit_point]
 
     @property
     def first(self) -> CriticalPoint | None:
-        """First bifurcation on the path, or None if there is none."""
+        """First bifurcation on the path, or None if the path has none."""
         return next(iter(self.bifurcations), None)
 
     def first_of(self, number: float) -> CriticalPoint | None:
-        """Return the first bifurcation with a wave number, or None.
+        """Return the first bifurcation whose mode has a given wave number.
 
         Args:
-            number: wave number.
+            number: wave number: n round the axis; in plane strain k along the depth, 1/length.
 
         Returns:
             The critical point, or None.
         """
-        return next((loss for loss in self.bifurcations if loss.number == number), None)
+        return next((point for point in self.bifurcations if point.number == number), None)
 
     def __str__(self) -> str:
         problem = self.path.problem
@@ -172,25 +184,25 @@ class Stability:
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
-        lines += [f"  {unit} = {loss.number:g}: {_shown(loss)}" for loss in self.critical_points]
+        lines += [f"  {unit} = {point.number:g}: {_shown(point)}" for point in self.critical_points]
         return "\n".join(lines if len(lines) > 1 else [*lines, "  no mode is unstable"])
 
     __repr__ = __str__
 
 
-def _shown(loss: CriticalPoint) -> str:
-    """Return a critical point as a line of text."""
-    states = loss.path.states
-    what = "limit point" if loss.limit_point else "lost" if loss.gained else "regained"
-    R, Z = loss.at
-    parts = [f"{what} at {loss.driven} {loss.control:.6g}",
-             f"between states {states.index(loss.left)} and {states.index(loss.right)}",
-             f"largest at R = {R:.4g}, Z = {Z:.4g}", "solved for" if loss.solved else "interpolated"]
-    return ", ".join(parts + [f"antisymmetric about {loss.flipped!r}"] * bool(loss.flipped))
+def _shown(point: CriticalPoint) -> str:
+    """Return kind, control and position of a critical point as a line of text."""
+    states = point.path.states
+    what = "limit point" if point.limit_point else "lost" if point.gained else "regained"
+    R, Z = point.at
+    parts = [f"{what} at {point.driven} {point.control:.6g}",
+             f"between states {states.index(point.left)} and {states.index(point.right)}",
+             f"largest at R = {R:.4g}, Z = {Z:.4g}", "solved for" if point.solved else "interpolated"]
+    return ", ".join(parts + [f"antisymmetric about {point.flipped!r}"] * bool(point.flipped))
 
 
-class Watch:
-    """Stability examination of the states of one path; created once.
+class StabilityAnalysis:
+    """Counts unstable modes in states of one path; keeps the matrices of each mesh.
 
     Args:
         path: the `Path`.
@@ -199,54 +211,62 @@ class Watch:
     def __init__(self, path: Any):
         self._path, self._modes = path, {}                              # type: ignore[var-annotated]
 
-    def of(self, segment: Any) -> Modes:
-        """Return the modes of a segment's problem.
+    def modes_of(self, segment: Any) -> Modes:
+        """Return the unstable modes of the problem of a segment, created at the first call.
 
         Args:
-            segment: part of the path on one mesh.
+            segment: the part of the path on one mesh.
 
         Returns:
-            The modes.
+            The `Modes`.
         """
         key = id(segment.problem)
         if key not in self._modes:
             self._modes[key] = Modes(segment.curve)
         return self._modes[key]
 
-    def look(self, modes: Iterable[float], states: Any) -> Stability:
-        """Examine states of the path; see `Path.stability`.
+    def examine(self, modes: Iterable[float], states: Any) -> Stability:
+        """Count unstable modes in states of the path, and locate the critical points between them.
 
         Args:
             modes: wave numbers.
-            states: see `Path.stability`.
+            states: number of states, "all", or states of the path, as in `Path.stability`.
 
         Returns:
-            The stability of the states.
+            Counts and critical points.
         """
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _chosen(self._path, states)
         counts: dict[Kind, list[int]] = {}
-        losses: list[CriticalPoint] = []
+        critical_points: list[CriticalPoint] = []
         known: dict[tuple[int, Kind], int] = {}
 
         def count_at(state: State, kind: Kind) -> int:
             """Return the number of unstable modes in a state, computed once."""
             key = id(state), kind
             if key not in known:
-                known[key] = self.of(self._path.segment(state)).count(state, kind)
+                known[key] = self.modes_of(self._path.segment(state)).count(state, kind)
             return known[key]
         kinds = [Kind(n, flipped) for n in numbers
-                 for flipped in (None, *self.of(self._path.segments[-1]).variation.mirrors)]
+                 for flipped in (None, *self.modes_of(self._path.segments[-1]).variation.mirrors)]
         for kind in kinds:
             counts[kind] = [count_at(state, kind) for state in chosen]
             for a, b in zip(chosen, chosen[1:]):
-                losses += self._between(a, b, kind, count_at)
+                critical_points += self._between(a, b, kind, count_at)
         order = self._path.states
-        losses.sort(key=lambda loss: (order.index(loss.left), abs(loss.state.control - loss.left.control)))
-        return Stability(self._path, numbers, chosen, counts, losses)
+        critical_points.sort(key=lambda point: (order.index(point.left),
+                                                abs(point.state.control - point.left.control)))
+        return Stability(self._path, numbers, chosen, counts, critical_points)
 
     def _between(self, a: State, b: State, kind: Kind, count_at: Any) -> list[CriticalPoint]:
-        """Return the critical points between two states, located between neighbours of the path."""
+        """Return the critical points of modes of one kind between two states, located between neighbours of the path.
+
+        Args:
+            a: the first state.
+            b: the second state.
+            kind: wave number and symmetry of the modes.
+            count_at: function of state and kind that returns the number of unstable modes.
+        """
         if count_at(a, kind) == count_at(b, kind):
             return []
         segment = self._path.segment(a)
@@ -261,24 +281,30 @@ class Watch:
             return []
         low, high = sorted((count_at(a, kind), count_at(b, kind)))
         expected = not kind.number and not kind.flipped and a.slope * b.slope < 0
-        found = [self.of(segment).locate(a, b, kind, index) for index in range(low, high)]
-        folds = [self._is_fold(segment, entry) for entry in found] if expected else [False] * len(found)
-        return [self._loss(segment, entry, fold) for entry, fold in zip(found, folds, strict=True)]
+        found = [self.modes_of(segment).locate(a, b, kind, index) for index in range(low, high)]
+        limits = [self._is_limit_point(segment, entry) for entry in found] if expected else [False] * len(found)
+        return [self._critical_point(segment, entry, limit) for entry, limit in zip(found, limits, strict=True)]
 
-    def _is_fold(self, segment: Any, found: Located) -> bool:
-        """Return True if the mode is nearly parallel to the tangent of the path, as at a limit point."""
+    def _is_limit_point(self, segment: Any, found: Located) -> bool:
+        """Return True if the mode of a located point is nearly parallel to the tangent of the path: a limit point."""
         x, direction = found.x, found.left.direction
         problem = segment.problem
-        a, b, c = problem.x.duplicate(), problem.x.duplicate(), problem.x.duplicate()
+        a, b = problem.x.duplicate(), problem.x.duplicate()
         a.array_w[:], b.array_w[:] = x, direction
-        alike = abs(problem.inner(a, b)) / np.sqrt(problem.inner(a, a) * problem.inner(b, b))
-        for vector in (a, b, c):
+        cosine = abs(problem.inner(a, b)) / np.sqrt(problem.inner(a, a) * problem.inner(b, b))
+        for vector in (a, b):
             vector.destroy()
-        return bool(alike > 0.5)
+        return bool(cosine > 0.5)
 
-    def _loss(self, segment: Any, found: Located, fold: bool) -> CriticalPoint:
-        """Return a located critical point with its mode on the nodes of all ranks."""
-        comm, nodes = segment.problem.comm, self.of(segment).variation.nodes
+    def _critical_point(self, segment: Any, found: Located, limit: bool) -> CriticalPoint:
+        """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks and output quantities.
+
+        Args:
+            segment: the part of the path on one mesh.
+            found: the located point.
+            limit: True for a limit point.
+        """
+        comm, nodes = segment.problem.comm, self.modes_of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)
         amplitudes = amplitudes / size.max()
@@ -290,12 +316,12 @@ class Watch:
                                     for name in before.keys() & behind.keys()}
         with segment.problem.state_context(found.left):
             driven, control = segment.problem.shown(found.state.control)
-        return CriticalPoint(self._path, found, float(control), driven, fold, points, amplitudes)
+        return CriticalPoint(self._path, found, float(control), driven, limit, points, amplitudes)
 
 
 @method_of(Path)
 def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
-    """Examine states of a path for stability, and locate the critical points between them.
+    """Examine states of a path for stability, and locate the critical points between them; collective.
 
     Args:
         path: the path of a solid; the second variation of all its loads must be known.
@@ -303,38 +329,38 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
         states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
 
     Returns:
-        The `Stability`, which prints a table.
+        Counts of unstable modes and critical points; prints a table.
 
     Raises:
-        InputError: a membrane, or a load without a second variation.
+        InputError: a membrane, an elastic support, or a load without a second variation.
     """
     path.section_only("stability")
-    watch: Watch = vars(path).setdefault("_stability_watch", Watch(path))      # keeps its matrices
-    return watch.look(modes, states)
+    analysis = vars(path).setdefault("_stability_analysis", StabilityAnalysis(path))        # keeps its matrices
+    return analysis.examine(modes, states)
 
 
 class InstabilityCondition(RunExtension):
     """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`.
 
     Args:
-        modes: wave numbers.
+        modes: wave numbers: n round the axis; in plane strain k along the depth, 1/length.
     """
 
     def __init__(self, modes: Any):
         self.modes = modes
 
     def attach(self, path: Any) -> None:
-        """Examine the last state whenever a step of the path is complete.
+        """Let the run count unstable modes in its last state after each step, and end when one has become unstable.
 
         Args:
-            path: the `Path`.
+            path: the `Path` that the run continues.
         """
-        watch, numbers = Watch(path), wave_numbers(path.problem.scene, self.modes)
+        analysis, numbers = StabilityAnalysis(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[Kind, int] = {}
 
-        def look() -> None:
+        def examine() -> None:
             state = path.last
-            modes = watch.of(path.segment(state))
+            modes = analysis.modes_of(path.segment(state))
             for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):
                 count = modes.count(state, kind)
                 if not (kind.number or kind.flipped):
@@ -343,11 +369,11 @@ class InstabilityCondition(RunExtension):
                     path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
                                          f" path.stability(modes=[{kind.number:g}]) finds where")
                     return
-        path.record.hooks.on_step.append(look)
+        path.record.hooks.on_step.append(examine)
 
 
 def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
-    """Return a condition for `trace(stop_at=...)`: stop once a mode is unstable that was stable at the first state.
+    """Return a stopping condition for `trace(stop_at=...)`: a mode is unstable that was stable at the first state.
 
     It costs about two iterations per mode and state. `Path.ended` names the mode, `Path.stability` locates the critical
     point.
@@ -365,23 +391,23 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
-    """Return the wave numbers of `Path.stability` as a list without duplicates.
+    """Return the wave numbers that a user gave as a list without duplicates.
 
     Args:
         scene: the `Scene`.
-        modes: the user's argument.
+        modes: wave numbers: n round the axis; in plane strain k along the depth, 1/length.
 
     Returns:
-        Wave numbers.
+        List of wave numbers.
 
     Raises:
-        InputError: wave numbers that are not allowed.
+        InputError: a negative or fractional number of waves, or waves shorter than the edges of the elements.
     """
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
         raise InputError(f"stability: modes = {modes!r}: must be several numbers of waves, such as range(9)") from None
-    axisymmetric, most = scene.kinematics.axisymmetric, _most_waves(scene)
+    axisymmetric, most = scene.kinematics.axisymmetric, _max_wave_number(scene)
     for n in numbers:
         if n < 0 or axisymmetric and n != int(n):
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
@@ -395,7 +421,12 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 
 
 def _chosen(path: Any, states: Any) -> list[State]:
-    """Return the states to examine: evenly spaced ones with both ends of the path, or the given states."""
+    """Return the states to examine, in order along the path, without limit points unless they are given.
+
+    Args:
+        path: the `Path`.
+        states: number of evenly spaced states, with both ends of the path; "all"; or states of the path.
+    """
     regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
@@ -410,8 +441,8 @@ def _chosen(path: Any, states: Any) -> list[State]:
     return [regular[k] for k in picked]
 
 
-def _most_waves(scene: Any) -> float:
-    """Return the number of waves as long as the shortest edge of an element, at the largest radius."""
+def _max_wave_number(scene: Any) -> float:
+    """Return the largest wave number: waves at the largest radius are as long as the shortest edge of an element."""
     domain = scene.mesh.domain
     domain.topology.create_connectivity(1, domain.topology.dim)
     edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)

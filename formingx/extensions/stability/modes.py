@@ -1,7 +1,8 @@
 """Unstable modes of a state: their number (inertia), their shapes (inverse iteration), and their critical points.
 
-The second variation K of a mixed formulation, with pressures and Lagrange multipliers, is a saddle-point matrix. K = L
-D L^T has one negative pivot for each of them, and one more for each unstable mode (Sylvester's law of inertia).
+The second variation K of a mixed formulation is a saddle-point matrix with pressures and Lagrange multipliers. Its
+factors K = L D L^T have one negative pivot for each of these, and one more for each unstable mode (Sylvester's law of
+inertia).
 """
 
 from __future__ import annotations
@@ -21,14 +22,13 @@ from .second_variation import SecondVariation
 
 @dataclass(frozen=True)
 class Lanczos:
-    """Settings of the Lanczos method with the inverse of K, which computes the modes.
+    """Settings of the Lanczos method, which computes modes with the inverse of the second variation K.
 
     Attributes:
         steps: maximum number of steps, each a solve with the stored LU factors.
         accurate: relative error of an eigenvalue at which the iteration ends.
         exhausted: norm of the remainder of a new vector, over the largest eigenvalue of the inverse, that is round-off.
-            Then all modes are found.
-        steps: maximum number of steps, each a solve with the stored LU factors.
+            All modes are then found.
     """
 
     steps: int = 80
@@ -42,28 +42,29 @@ class Locating:
 
     Attributes:
         states: maximum number of states to solve for.
-        located: tolerance of its position, relative to the distance of the two states.
-        beside: distance on either side at which counts of unstable modes verify it, relative to the same distance.
+        located: tolerance of the position of the point, relative to the distance of the two states.
+        offset: distance on either side of the point at which the number of unstable modes is counted, relative as
+            above.
         patience: number of steps without halving of the bracket after which it is bisected.
-        alike: scalar product of two normalised modes above which they are the same mode.
-        astray: largest distance of a state from the cubic between the two states, over their distance. A state further
-            away lies on another branch.
+        min_overlap: scalar product of two normalised modes above which they are the same mode.
+        max_deviation: largest distance of a state from the cubic between the two states, over their distance. A state
+            further away lies on another branch.
     """
 
     states: int = 60
     located: float = 1e-8
-    beside: float = 1e-6
+    offset: float = 1e-6
     patience: int = 3
-    alike: float = 0.7
-    astray: float = 0.1
+    min_overlap: float = 0.7
+    max_deviation: float = 0.1
 
 
 class Kind(NamedTuple):
     """Wave number and symmetry of a class of modes.
 
     Attributes:
-        number: circumferential wave number; in plane strain the wave number along the depth.
-        flipped: name of the symmetry plane under which the modes are antisymmetric, or None (see `SecondVariation`).
+        number: circumferential wave number n; in plane strain the wave number k along the depth, 1/length.
+        flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
     """
 
     number: float
@@ -71,18 +72,18 @@ class Kind(NamedTuple):
 
 
 class Located(NamedTuple):
-    """Critical point at which a mode becomes unstable, or stable again.
+    """Critical point between two states, at which a mode becomes unstable or stable again.
 
     Attributes:
         kind: wave number and symmetry of the mode.
         left: state before the point.
         right: state behind the point.
         state: state at the point.
-        fraction: position between left (0) and right (1).
-        mode: amplitudes (U, W, V) at `nodes` of the second variation, locally owned entries.
-        x: U and W of the mode as unknowns of the problem, locally owned entries.
-        gained: True if the body is less stable behind the point.
-        solved: True if `state` is a converged solution, False if it lies on the cubic between left and right.
+        fraction: position of the point between `left` (0) and `right` (1).
+        mode: amplitudes (U, W, V) at the `nodes` of the `SecondVariation`, locally owned entries, shape (m, 3).
+        x: U, W and pressures of the mode as unknowns of the problem, locally owned entries.
+        gained: True if the mode is unstable behind the point.
+        solved: True if `state` is a converged solution, False if it lies on the cubic between `left` and `right`.
     """
 
     kind: Kind
@@ -96,15 +97,15 @@ class Located(NamedTuple):
     solved: bool
 
 
-class _Look(NamedTuple):
-    """Number of unstable modes and the modes nearest to zero in a state between two others.
+class _Sample(NamedTuple):
+    """Number of unstable modes, and the modes nearest to the stability limit, in a state between two others.
 
     Attributes:
-        fraction: position between the two states, from 0 to 1.
-        state: a `State` of the path.
+        fraction: position of the state between the two others, from 0 to 1.
+        state: the state.
         unstable: number of unstable modes.
-        values: eigenvalues nearest to 0, ascending, dimensionless.
-        modes: their modes, locally owned entries.
+        values: k eigenvalues nearest to 0, ascending, shape (k,), dimensionless.
+        modes: modes of these eigenvalues, locally owned entries, shape (k, n).
     """
 
     fraction: float
@@ -115,80 +116,89 @@ class _Look(NamedTuple):
 
 
 class Modes:
-    """Unstable modes of the states of a problem; created once.
+    """Unstable modes of the states of a problem, and critical points between its states.
 
     Args:
-        curve: the `Curve` that solves for states.
+        curve: the `Curve` of the problem, which solves for states.
         lanczos: settings of the eigenvalue solver.
-        locating: settings for critical points.
+        locating: settings for the location of critical points.
+
+    Attributes:
+        curve: the `Curve`.
+        problem: the `Problem`.
+        variation: the `SecondVariation` of the problem.
 
     Raises:
-        InputError: as `SecondVariation`.
+        InputError: a membrane, an elastic support, or a load without a second variation.
     """
 
     def __init__(self, curve: Curve, lanczos: Lanczos | None = None, locating: Locating | None = None):
         self.curve, self.problem = curve, curve.problem
-        self._by, self._how = lanczos or Lanczos(), locating or Locating()
+        self._settings, self._locating = lanczos or Lanczos(), locating or Locating()
         self.variation = SecondVariation(curve.problem)
         self._solver = DirectSolver(self.variation.matrix, True, inertia=True)
         self._in, self._out = self.variation.matrix.createVecs()
 
     def count(self, state: State, kind: Kind) -> int:
-        """Return the number of unstable modes with a wave number and symmetry.
+        """Return the number of unstable modes with a wave number and symmetry in a state.
 
         Args:
-            state: a `State` of the path.
+            state: state of the path.
             kind: wave number and symmetry.
 
         Returns:
-            Number of unstable modes.
+            Number of modes.
         """
         with self.problem.state_context(state):
             return self._count(kind)
 
     def _count(self, kind: Kind) -> int:
-        """Return the number of unstable modes at the state last set."""
+        """Return the number of unstable modes of a kind at the present state of the problem.
+
+        Raises:
+            Failure: the second variation is singular.
+        """
         self.variation.fill(*kind)
         if not self._solver.factorise():
             raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
         return self._solver.negative_pivots() - self.variation.negative
 
     def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
-        """Locate the zero of the eigenvalue number `index` (in ascending order) between two states.
+        """Locate the critical point between two states at which an eigenvalue of the second variation is 0.
 
         Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode. The
         mode is tracked by its shape, because eigenvalues of other modes cross it.
 
         Args:
-            a: state before the zero.
+            a: state before the point.
             b: state behind it.
-            kind: wave number and symmetry.
-            index: number of the eigenvalue.
+            kind: wave number and symmetry of the mode.
+            index: number of the eigenvalue in ascending order, from 0.
 
         Returns:
             The critical point.
         """
-        looks = [self._look(0.0, a, kind, index), self._look(1.0, b, kind, index)]
-        (low, high), how = looks, self._how
+        samples = [self._sample(0.0, a, kind, index), self._sample(1.0, b, kind, index)]
+        (low, high), settings = samples, self._locating
         gained, solved, shrunk = high.unstable > low.unstable, True, 0
         while True:
-            values = self._follow(looks, high if gained else low, index)
-            guess = _root(values, low.fraction, high.fraction) if shrunk < how.patience else None
+            values = self._track(samples, high if gained else low, index)
+            guess = _root(values, low.fraction, high.fraction) if shrunk < settings.patience else None
             fraction, shrunk = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, shrunk)
-            nearest = min(looks, key=lambda look: abs(look.fraction - fraction))
+            nearest = min(samples, key=lambda sample: abs(sample.fraction - fraction))
             width = high.fraction - low.fraction
-            if width < 2 * how.beside or len(looks) == how.states:
+            if width < 2 * settings.offset or len(samples) == settings.states:
                 break
-            if abs(nearest.fraction - fraction) < how.located:     # the root may belong to another mode
-                fraction = low.fraction + how.beside if nearest is low else high.fraction - how.beside
+            if abs(nearest.fraction - fraction) < settings.located:     # the root may belong to another mode
+                fraction = low.fraction + settings.offset if nearest is low else high.fraction - settings.offset
             try:
-                looks.append(new := self._look(fraction, self._between(a, b, fraction), kind, index))
+                samples.append(new := self._sample(fraction, self._between(a, b, fraction), kind, index))
             except Failure:
                 solved = False
                 break
             low, high = (low, new) if (new.unstable > index) is gained else (new, high)
             shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
-        state, exact = nearest.state, width < 2 * how.beside
+        state, exact = nearest.state, width < 2 * settings.offset
         if exact:
             fraction = nearest.fraction
         else:
@@ -197,33 +207,39 @@ class Modes:
                           time=self.problem.time_at(control))
         with self.problem.state_context(nearest.state):
             self.variation.fill(*kind)
-            x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._of_index(nearest, index)
+            x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._mode_of_index(nearest, index)
             mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
         return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
-    def _look(self, fraction: float, state: State, kind: Kind, index: int) -> _Look:
-        """Return the number of unstable modes and the modes nearest to zero in a state."""
+    def _sample(self, fraction: float, state: State, kind: Kind, index: int) -> _Sample:
+        """Return the number of unstable modes of a kind in a state, and enough modes around eigenvalue `index`."""
         with self.problem.state_context(state):
             count = self._count(kind)
-            return _Look(fraction, state, count, *self._lanczos(4 + abs(count - index)))
+            return _Sample(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
-    def _of_index(self, look: _Look, index: int) -> Array:
-        """Return the mode with a given number of lower eigenvalues, or the nearest known one."""
-        negative = np.flatnonzero(look.values < 0)
-        k = (negative[-1] + 1 if len(negative) else 0) + index - look.unstable
-        return look.modes[min(max(k, 0), len(look.modes) - 1)]
+    def _mode_of_index(self, sample: _Sample, index: int) -> Array:
+        """Return the mode of eigenvalue number `index` (ascending) in a sample, or the nearest one that it has."""
+        negative = np.flatnonzero(sample.values < 0)
+        k = (negative[-1] + 1 if len(negative) else 0) + index - sample.unstable
+        return sample.modes[min(max(k, 0), len(sample.modes) - 1)]
 
-    def _follow(self, looks: list[_Look], end: _Look, index: int) -> list[tuple[float, float]]:
-        """Track the mode that is unstable at an end of the bracket; return its (fraction, eigenvalue) pairs."""
-        mode, found = self._of_index(end, index), []
-        for look in looks:
-            alike = [abs(self._inner(mode, other)) for other in look.modes]
-            if max(alike) > self._how.alike:
-                found.append((look.fraction, float(look.values[np.argmax(alike)])))
+    def _track(self, samples: list[_Sample], end: _Sample, index: int) -> list[tuple[float, float]]:
+        """Return (fraction, eigenvalue) of one mode in all samples that have it.
+
+        Args:
+            samples: samples between the two states.
+            end: end of the bracket at which the mode is unstable.
+            index: number of its eigenvalue there.
+        """
+        mode, found = self._mode_of_index(end, index), []
+        for sample in samples:
+            overlaps = [abs(self._inner(mode, other)) for other in sample.modes]
+            if max(overlaps) > self._locating.min_overlap:
+                found.append((sample.fraction, float(sample.values[np.argmax(overlaps)])))
         return found
 
     def _between(self, a: State, b: State, fraction: float) -> State:
-        """Solve for the state at a fraction between two states.
+        """Solve for the state at a fraction (0 to 1) between two states of the path.
 
         Raises:
             Failure: no convergence, or convergence to another branch.
@@ -236,15 +252,17 @@ class Modes:
         state.stage, state.setting, state.memory = a.stage, a.setting, a.memory
         x, control = self.curve.interpolate(a, b, fraction)
         guess = State(x, control, a.direction, a.slope)
-        if self.curve.distance(guess, state) > self._how.astray * self.curve.distance(a, b):
+        if self.curve.distance(guess, state) > self._locating.max_deviation * self.curve.distance(a, b):
             raise Failure("the state that was found lies on another branch", [])
         return state
 
     def _lanczos(self, number: int) -> tuple[Array, Array]:
-        """Return the eigenvalues nearest to 0 of K x = value M x, and their modes, by full reorthogonalisation.
+        """Return the eigenvalues of K x = value M x nearest to 0, ascending, and their modes, shape (number, n).
 
-        M is the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1 M.
-        Rigid motions are removed.
+        M is the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1 M. Rigid motions are
+        removed, and vectors are orthogonalised fully.
+
+        number: number of eigenvalues.
         """
         variation = self.variation
         out: list[Array] = []
@@ -262,34 +280,34 @@ class Modes:
             w = self._clean(self._clean(w, out + basis), out + basis)
             size = np.sqrt(max(self._inner(w, w), 0.0))
             T = np.diag(alpha) + np.diag(beta, 1) + np.diag(beta, -1)
-            theta, ways = np.linalg.eigh(T)
+            theta, vectors = np.linalg.eigh(T)
             best = np.argsort(-abs(theta))[:number]
-            rest = size * abs(ways[-1, best])
-            accurate = len(alpha) >= number and np.all(rest < self._by.accurate * abs(theta[best]))
-            if accurate or len(alpha) == self._by.steps or size < self._by.exhausted * abs(theta).max():
+            residuals = size * abs(vectors[-1, best])
+            accurate = len(alpha) >= number and np.all(residuals < self._settings.accurate * abs(theta[best]))
+            if accurate or len(alpha) == self._settings.steps or size < self._settings.exhausted * abs(theta).max():
                 break
             beta.append(size)
             basis.append(w / size)
         best = best[np.argsort(1 / theta[best])]
-        modes = ways[:, best].T @ np.array(basis)
+        modes = vectors[:, best].T @ np.array(basis)
         return 1 / theta[best], modes
 
     def _invert(self, x: Array) -> Array:
-        """Return K^-1 M x."""
+        """Return K^-1 M x for the second variation K and the lumped mass M, locally owned entries."""
         self._in.array_w[:] = self.variation.mass(x)
         self._solver.solve(self._in, self._out)
         return self._out.array_r.copy()
 
     def _inner(self, x: Array, y: Array) -> float:
-        """Return the inner product of two modes with the lumped mass, all ranks."""
+        """Return the scalar product x M y of two modes with the lumped mass M, over all ranks."""
         return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
 
     def _normal(self, x: Array) -> Array:
-        """Return a mode normalised to unit inner product."""
+        """Return a mode x over the root of its scalar product x M x."""
         return x / np.sqrt(self._inner(x, x))
 
     def _clean(self, x: Array, others: list[Array]) -> Array:
-        """Return x without its components along other vectors, which are orthogonal to each other."""
+        """Return x without its components along other vectors, which are orthonormal in the lumped mass."""
         if not others:
             return x
         basis = np.array(others)
@@ -305,7 +323,13 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Return the root of the polynomial (fraction over eigenvalue) through the values nearest to 0, if inside."""
+    """Return the fraction at which an eigenvalue is 0, by inverse interpolation, or None if it is out of bounds.
+
+    Args:
+        values: (fraction, eigenvalue) pairs of one mode; at most four with the smallest eigenvalues are used.
+        low: lower bound of the fraction.
+        high: upper bound of the fraction.
+    """
     known = sorted(values, key=lambda entry: abs(entry[1]))[:4]
     for n in range(len(known), 1, -1):
         s, f = (np.array([entry[k] for entry in known[:n]]) for k in (0, 1))

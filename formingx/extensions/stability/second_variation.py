@@ -5,8 +5,9 @@ A mode is
 .. math:: u_r = U \cos n\theta, \quad u_z = W \cos n\theta, \quad u_\theta = V \sin n\theta, \quad
     p = Q \cos n\theta
 
-and in plane strain the same with k x3 for n theta. Modes of different n are not coupled. By reflection, changes of F
-within its blocks (from U, W and the hoop stretch) and across them are not coupled at second order, so
+and in plane strain the same with k x3 for n theta. Modes of different n are not coupled. The change H of F by a mode is
+split by reflection: its entries within the blocks of F (from U, W and the hoop stretch) and across them are not coupled
+at second order, so
 
 .. math:: \delta^2 E = \delta^2 E(F + H_{within}) + \delta^2 E(F + H_{across})
 
@@ -15,7 +16,7 @@ serves all n. At n = 0, V is torsion, and U and W give the tangent of the path. 
 (the mean of cos^2 round the axis is 1/2, not 1).
 
 A follower pressure and friction have no energy: the symmetric part of their tangents is used. A sliding point is free
-round the axis, which is a bound. A relaxing material has its instantaneous stiffness.
+round the axis, which gives a lower bound of critical loads. A relaxing material has its instantaneous stiffness.
 
 The unknowns are (U, W, V + m U, Q), with m = 1 for n = 1 and 0 else. So the quantity that vanishes on the axis is an
 unknown.
@@ -36,12 +37,19 @@ from ...forms.matrix import ExtendedMatrix
 from ...physics.kinematics import BLOCK
 from ...physics.supports import Constrained, Symmetry
 
-_AT_REST = 1e-6
-"""Relative force of a rigid motion (over the forces of its single unknowns) below which it is unconstrained."""
+_FORCE_FREE = 1e-6
+"""Force that a rigid motion causes, over the forces of its single unknowns, below which the motion is free."""
 
 
-class _ModedBody(LoadedBody):
-    """Body with a circumferential mode, for `Load.mode_work`."""
+class _BodyWithMode(LoadedBody):
+    """Loaded body with a circumferential mode, as `Load.mode_work` expects it.
+
+    Args:
+        forms: forms of the body.
+        mode: displacement amplitudes (u_r, u_z, u_hoop) (UFL, shape (3,), length).
+        dmode: variation of these amplitudes (UFL, shape (3,), length).
+        H: change of F by the mode (UFL, shape (3, 3)).
+    """
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
         super().__init__(forms)
@@ -49,18 +57,22 @@ class _ModedBody(LoadedBody):
 
 
 class SecondVariation:
-    """Second variation of the energy of a problem at its present state; created once.
+    """Second variation of the energy of a solid at the present state of its problem, for one wave number at a time.
+
+    The unknowns of a mode are its amplitudes U, W, V + m U and its pressures, see the module. A mode antisymmetric
+    about a symmetry plane is possible if the support has `mirror=True`.
 
     Args:
         problem: the `Problem` of a solid.
 
     Attributes:
-        matrix: symmetric matrix for the modes of the last `fill`. One unknown of each free rigid motion is constrained.
-            This leaves other modes unchanged and makes the matrix regular.
-        rigid: free rigid motions, locally owned entries.
+        matrix: symmetric PETSc matrix for the modes of the last `fill`. One unknown of each free rigid motion is
+            constrained. This leaves other modes unchanged and makes the matrix regular.
+        rigid: rigid motions that the supports and contacts leave free, each a mode of locally owned entries, shape
+            (n,).
         negative: number of negative pivots of `matrix` in a stable state.
         nodes: reference positions of the locally owned nodes, shape (m, 2), length.
-        mirrors: names of the symmetry planes.
+        mirrors: names of the symmetry planes about which modes may be antisymmetric.
 
     Raises:
         InputError: a membrane, an elastic support, or a load without a second variation.
@@ -78,46 +90,46 @@ class SecondVariation:
         self.problem, self.comm, self._forms = problem, problem.comm, forms
         self.space = forms.mode_space()
         self._axisymmetric = problem.scene.kinematics.axisymmetric
-        self._number, self._turned = forms.constant(0.0), forms.constant(0.0)
+        self._number, self._m = forms.constant(0.0), forms.constant(0.0)
         self._number_unknowns()
         self.mirrors = [s.on for s in problem.scene.supports if isinstance(s, Symmetry) and s.mirror]
         self._means = list(self._mean_rows())
         self._matrix = ExtendedMatrix(forms.compile(self._form()), self.space.dofmap.index_map, [],
                                       [(row != 0) + (u != 0) for _, row, u in self._means], self.comm, True)
         self.matrix = self._matrix.mat
-        self._held = np.zeros(0, dtype=np.int32)
+        self._constrained = np.zeros(0, dtype=np.int32)
 
     def fill(self, number: float, flipped: str | None = None) -> Any:
-        """Assemble `matrix` for a wave number.
+        """Assemble `matrix` at the present state for the modes of a wave number and symmetry.
 
         Args:
-            number: circumferential wave number; in plane strain the wave number along the depth.
-            flipped: name of the symmetry plane under which the modes are antisymmetric, or None.
+            number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
+            flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
 
         Returns:
             `matrix` with new values.
         """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
-        self._number.value, self._turned.value = number, m
-        self._held = self._find_held(number, flipped)
-        own = self._held[self._held < self._own]
-        not_active, rows = problem.setting.inactive, []
-        for number_of_item, row, u in self._means:
-            rows.append((row - m * u) * (number_of_item not in not_active))
+        self._number.value, self._m.value = number, m
+        self._constrained = self._find_constrained(number, flipped)
+        own = self._constrained[self._constrained < self._own]
+        inactive, rows = problem.setting.inactive, []
+        for item_number, row, u in self._means:
+            rows.append((row - m * u) * (item_number not in inactive))
             rows[-1][own] = 0
-        self._matrix.constrain([fem.dirichletbc(fem.Function(self.space), self._held)], rows)
+        self._matrix.constrain([fem.dirichletbc(fem.Function(self.space), self._constrained)], rows)
         self._rows = rows
         self.negative = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
         fields = problem.x.array_r[: problem.n_owned]
-        blocks = [self._of_contact(contact, fields, m) for contact in problem.present]
-        guided = [self._of_guided(fields, m)] if self._axisymmetric else []
+        blocks = [self._contact_stiffness(contact, fields, m) for contact in problem.present]
+        guided = [self._guided_stiffness(fields, m)] if self._axisymmetric else []
         self._matrix.fill([*blocks, *guided])
         self.rigid = self._find_rigid()
         self._pin()
         return self.matrix
 
     def mass(self, x: np.ndarray) -> np.ndarray:
-        """Return the lumped mass times a mode, locally owned entries.
+        """Return the product of the lumped mass matrix and a mode; pressures have no mass.
 
         Args:
             x: mode, locally owned entries, shape (n,).
@@ -126,51 +138,54 @@ class SecondVariation:
             Locally owned entries, shape (n,).
         """
         U, W, V = self._unknowns.T
-        m, out = self._turned.value, np.zeros_like(x)
+        m, out = self._m.value, np.zeros_like(x)
         round_axis = self._lumped * (x[V] - m * x[U])
         out[V], out[W], out[U] = round_axis, self._lumped * x[W], self._lumped * x[U] - m * round_axis
-        out[self._held[self._held < self._own]] = 0
+        out[self._constrained[self._constrained < self._own]] = 0
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """Return the amplitudes (U, W, V) of a mode at `nodes`.
+        """Return the displacement amplitudes (U, W, V) of a mode at `nodes`.
 
         Args:
             x: mode, locally owned entries, shape (n,).
 
         Returns:
-            Amplitudes, shape (m, 3).
+            Amplitudes, shape (m, 3), dimensionless.
         """
         U, W, V = self._unknowns[~self._bubble].T
-        return np.column_stack([x[U], x[W], x[V] - self._turned.value * x[U]])
+        return np.column_stack([x[U], x[W], x[V] - self._m.value * x[U]])
 
     def plane(self, x: np.ndarray) -> np.ndarray:
-        """Return U, W and pressures of a mode as unknowns of the problem.
+        """Return the amplitudes U, W and the pressures of a mode as unknowns of the problem.
 
         Args:
             x: mode, locally owned entries, shape (n,).
 
         Returns:
-            Locally owned entries of the problem's x.
+            Locally owned entries in the order of `Problem.x`.
         """
         found = np.zeros(self.problem.x.getLocalSize())
         found[: self.problem.n_owned] = x[self._to_mode[: self.problem.n_owned]]
         return found
 
     def _find_rigid(self) -> list[np.ndarray]:
-        """Return the unconstrained rigid motions of the body, normalised, locally owned entries."""
-        kinematics, own = self.problem.scene.kinematics, self._held[self._held < self._own]
+        """Return the rigid motions of the present wave number that constraints leave free and that cause no force.
+
+        They are modes of unit Euclidean norm, locally owned entries.
+        """
+        kinematics, own = self.problem.scene.kinematics, self._constrained[self._constrained < self._own]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
             return []
-        kept = [self.comm.allreduce(R[:, own] @ R[:, own].T)]
-        kept += [np.outer(v, v) for v in (self.comm.allreduce(R[:, : self._own] @ row) for row in self._rows)]
-        size, ways = np.linalg.eigh(sum(kept))
-        free = [way @ R for s, way in zip(size, ways.T) if s < 1e-14]
+        penalty = [self.comm.allreduce(R[:, own] @ R[:, own].T)]
+        penalty += [np.outer(v, v) for v in (self.comm.allreduce(R[:, : self._own] @ row) for row in self._rows)]
+        size, vectors = np.linalg.eigh(sum(penalty))
+        free = [vector @ R for s, vector in zip(size, vectors.T) if s < 1e-14]
         return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
 
     def _moves_freely(self, mode: np.ndarray) -> bool:
-        """Return True if a rigid motion causes no force."""
+        """Return True if a rigid motion (a mode, locally owned entries) causes no force in `matrix`."""
         x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
         x.array_w[:] = mode
         self.matrix.mult(x, y)
@@ -179,10 +194,11 @@ class SecondVariation:
         single = diagonal.norm()
         for vector in (x, y, diagonal):
             vector.destroy()
-        return bool(forces < _AT_REST * single)
+        return bool(forces < _FORCE_FREE * single)
 
     def _pin(self) -> None:
-        """Constrain the largest unknown of each rigid motion, the earlier motions being constrained already."""
+        """Constrain in `matrix` one unknown of each free rigid motion, the largest after those before are constrained.
+        """
         first, rest = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid]
         rows = []
         while rest:
@@ -197,18 +213,18 @@ class SecondVariation:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
     def _sum(self, values: np.ndarray) -> float:
-        """Return the sum over all ranks."""
+        """Return the sum of the entries of an array over all ranks."""
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
-        """Return the bilinear form of the second variation, dimensionless."""
+        """Return the bilinear form (UFL) of the second variation of energy and loads, dimensionless."""
         forms, kinematics = self._forms, self.problem.scene.kinematics
         h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
 
         def displacement(mode: Any) -> Any:
             """Return the displacement amplitudes (U, W, V) of a mode (UFL, length)."""
             U, W, V = (ufl.split(mode)[0][i] for i in range(3))
-            return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._turned * U])
+            return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._m * U])
 
         def gradient(mode: Any) -> Any:
             """Return the change H of F by a mode (UFL)."""
@@ -231,12 +247,13 @@ class SecondVariation:
         half = forms.constant(0.5 / (forms.stress * forms.volume))
         for load, value in forms.load_values:
             for a, b in ((v, w), (w, v)):
-                work = load.mode_work(_ModedBody(forms, displacement(b), displacement(a), gradient(b)), value)
+                work = load.mode_work(_BodyWithMode(forms, displacement(b), displacement(a), gradient(b)), value)
                 form = form if work is None else form - half * work
         return form
 
     def _number_unknowns(self) -> None:
-        """Set the nodes, their unknowns, and the corresponding unknowns of the problem."""
+        """Set the nodes, the unknowns (U, W, V) of each node, and the unknown of the mode for each one of the problem.
+        """
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
@@ -279,7 +296,12 @@ class SecondVariation:
         self._pressures = int(self.comm.allreduce(mine))
 
     def _dofs(self, component: int, item: Any) -> np.ndarray:
-        """Return the local numbers of the constrained unknowns of a displacement component."""
+        """Return the local numbers of the unknowns that a support constrains, with ghosts.
+
+        Args:
+            component: 0, 1, 2 for U, W, V + m U.
+            item: the `Constrained` boundary or point.
+        """
         space, forms = self.space.sub(0).sub(component), self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(space, 1, forms.mesh.facets_of(item.on))
@@ -287,20 +309,21 @@ class SecondVariation:
         return fem.locate_dofs_geometrical((space, space.collapse()[0]),
                                            lambda X: np.hypot(X[0] - point[0], X[1] - point[1]) < near)[0]
 
-    def _find_held(self, number: float, flipped: str | None) -> np.ndarray:
-        """Return the local numbers of the constrained unknowns, with ghosts.
+    def _find_constrained(self, number: float, flipped: str | None) -> np.ndarray:
+        """Return the local numbers of the constrained unknowns of the modes of a wave number and symmetry, with ghosts.
 
-        Constraints in r and in z also act round the axis: a clamped rim, a node, a face with a prescribed displacement.
+        A boundary or node that is constrained in r and in z is also constrained round the axis: a clamped rim, a fixed
+        node, a face with prescribed displacement.
         """
-        problem, held, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
+        problem, constrained, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
             items = [] if i in problem.setting.inactive else self._forms.constraints(scene_item)
             for item in items:
                 if isinstance(item, Constrained):
                     if isinstance(scene_item, Symmetry) and scene_item.mirror and scene_item.on == flipped:
-                        held += [self._dofs(c, item) for c in (1 - item.component, 2)]
+                        constrained += [self._dofs(c, item) for c in (1 - item.component, 2)]
                     else:
-                        held.append(self._dofs(item.component, item))
+                        constrained.append(self._dofs(item.component, item))
                         places[item.component].append(item)
         empty = np.zeros(0, dtype=np.int32)
         facets = [np.concatenate([empty, *(self._forms.mesh.facets_of(item.on) for item in found
@@ -310,7 +333,7 @@ class SecondVariation:
         gripped += [self._dofs(2, item) for item in places[0] if item.on is None
                     and any(item.point == other.point for other in places[1])]
         marks = np.zeros(len(self._V_of), dtype=bool)
-        marks[np.concatenate(held + gripped)] = True
+        marks[np.concatenate(constrained + gripped)] = True
         U, W, V = self._axis.T
         fixed = marks[V]
         marks[V] = True
@@ -318,7 +341,11 @@ class SecondVariation:
         return np.flatnonzero(marks).astype(np.int32)
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Return (item number, row of a mean constraint, correction for m) of each mean and of the mean of V."""
+        """Yield (number of the item in the scene, row, correction) for each constraint of a mean displacement.
+
+        The row for wave number n is row - m correction; both have the shape (locally owned unknowns,). A support that
+        constrains both mean components also constrains the mean of V.
+        """
         forms, problem = self._forms, self.problem
         n = problem.n_owned
         for number, scene_item in enumerate(problem.scene.items):
@@ -333,8 +360,14 @@ class SecondVariation:
                     round_axis[self._V_of[: self._own][row != 0]] = row[row != 0]
                     yield number, round_axis, row
 
-    def _of_contact(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (unknowns, stiffness) of the points of a contact, for `ExtendedMatrix.fill`."""
+    def _contact_stiffness(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return (unknowns, stiffness matrices) of the points of a contact, for `ExtendedMatrix.fill`.
+
+        Args:
+            contact: the contact of the problem.
+            fields: locally owned unknowns of the problem.
+            m: factor m of V + m U.
+        """
         control = self.problem.control
         plane = contact.stiffness(fields, control)
         plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.stiffness_round(fields, control)
@@ -347,15 +380,19 @@ class SecondVariation:
         values[:, k:, k:] = turn
         return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
 
-    def _of_guided(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (unknowns, stiffness) of nodes with a constrained radius that are free round the axis.
+    def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return (unknowns, stiffness matrices) of nodes with a constrained radius that are free round the axis.
 
         The outward force f on such a node acts along a circle: its second variation is -f V^2/r.
+
+        Args:
+            fields: locally owned unknowns of the problem.
+            m: factor m of V + m U.
         """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
-        held = np.zeros(len(self._V_of), dtype=bool)
-        held[self._held] = True
-        guided = held[self._unknowns[:, 0]] & ~held[self._unknowns[:, 2]]
+        constrained = np.zeros(len(self._V_of), dtype=bool)
+        constrained[self._constrained] = True
+        guided = constrained[self._unknowns[:, 0]] & ~constrained[self._unknowns[:, 2]]
         force = self.problem.forces(self.problem.x, self.problem.control)[self._old[guided, 0]]
         turn = -self._forms.length * force / r[guided]
         values = np.zeros((len(turn), 3, 3))
@@ -364,13 +401,16 @@ class SecondVariation:
         return self._unknowns[guided], values
 
     def _unknowns_of(self, mode: Any) -> np.ndarray:
-        """Return a rigid mode as unknowns, locally owned entries."""
+        """Return a rigid motion as a mode, locally owned entries.
+
+        mode: function from deformed positions, shape (k, 2), length, to amplitudes (U, W, V), shape (k, 3).
+        """
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]
         values = mode(self._X + u) / forms.length
         x = np.zeros(self.matrix.getLocalSize()[0])
         U, W, V = self._unknowns.T
-        x[U], x[W], x[V] = values[:, 0], values[:, 1], values[:, 2] + self._turned.value * values[:, 0]
+        x[U], x[W], x[V] = values[:, 0], values[:, 1], values[:, 2] + self._m.value * values[:, 0]
         return x
 
     def destroy(self) -> None:

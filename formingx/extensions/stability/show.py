@@ -1,4 +1,4 @@
-"""Drawings of buckling modes: the whole surface in three dimensions, and the section."""
+"""Pictures of buckling modes on the deformed surface of a body, for `CriticalPoint.view3d`."""
 
 from typing import Any
 
@@ -10,56 +10,66 @@ from ...results import files
 from ...results.show.views import plotted
 
 
-def draw(loss: Any, file: Any, scale: float) -> None:
-    """Draw the deformed body with a mode, see `CriticalPoint.view3d`.
+def draw(point: Any, file: Any, scale: float) -> None:
+    """Draw the deformed body with a buckling mode to a PNG file; collective.
 
-    The colour is the amplitude: blue towards the axis (or downwards, where that is larger), red away from it.
+    The colour is the radial amplitude, or the axial one where the radial is much smaller: red for positive values.
 
     Args:
-        loss: the `CriticalPoint`.
+        point: the `CriticalPoint` with the mode.
         file: path of the PNG file.
-        scale: largest amplitude of the mode over the size of the body.
+        scale: largest displacement of the mode over the size of the body.
     """
     file = files.named("CriticalPoint.view3d", file, ".png")
     scale = positive("CriticalPoint.view3d: scale", scale)
-    lines, comm = _outline(loss), loss.path.problem.comm
-    files.on_root(comm, lambda: _draw(loss, lines, file, scale))
+    lines, comm = _outline(point), point.path.problem.comm
+    files.on_root(comm, lambda: _draw(point, lines, file, scale))
 
 
-def _outline(loss: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (deformed points, shape (m, 2), amplitudes there, shape (m, 3)) of each boundary; collective."""
-    path, state = loss.path, loss.state
-    segment = path.segment(loss.left)
+def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return (deformed positions, shape (m, 2), length; mode (U, W, V), shape (m, 3)) of m points on each boundary.
+
+    The axis of an axisymmetric body is left out. Collective.
+    """
+    path, state = point.path, point.state
+    segment = path.segment(point.left)
     mesh = segment.problem.scene.mesh
     from ...forms.probes import probe
     lines = []
     for name in mesh.boundaries:
         at = mesh.line_of(name)
-        if loss.path.problem.scene.kinematics.axisymmetric and at[:, 0].max() < 1e-9 * np.ptp(mesh.nodes_of(name)):
+        if point.path.problem.scene.kinematics.axisymmetric and at[:, 0].max() < 1e-9 * np.ptp(mesh.nodes_of(name)):
             continue
         with segment.problem.state_context(state) as problem:
             moved = at + probe(problem, at).displacement(problem.x)
-        away = np.linalg.norm(at[:, None] - loss.points[None], axis=2)
-        lines.append((moved, loss.amplitudes[np.argmin(away, axis=1)]))
+        away = np.linalg.norm(at[:, None] - point.points[None], axis=2)
+        lines.append((moved, point.amplitudes[np.argmin(away, axis=1)]))
     return lines
 
 
-def _draw(loss: Any, lines: list, file: Any, scale: float) -> None:
-    """Draw surface and section to a file."""
+def _draw(point: Any, lines: list, file: Any, scale: float) -> None:
+    """Draw the surface that the outlines sweep round the axis, or along the depth in plane strain, to a PNG file.
+
+    Args:
+        point: the `CriticalPoint` with the mode.
+        lines: result of `_outline`.
+        file: path of the PNG file.
+        scale: largest displacement of the mode over the size of the body.
+    """
     pyvista = figures.pyvista()
-    axisymmetric = loss.path.problem.scene.kinematics.axisymmetric
+    axisymmetric = point.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])
     size = scale * np.ptp(everything, axis=0).max()
     turn = np.linspace(0, 2 * np.pi, 181) if axisymmetric else np.linspace(
-        0, 2 * np.pi / loss.number if loss.number else np.ptp(everything, axis=0).max(), 61)
+        0, 2 * np.pi / point.number if point.number else np.ptp(everything, axis=0).max(), 61)
     high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
     flat = high < 0.3 * wide
     with plotted(file, 500 if flat else 800) as plotter:
         for points, mode in lines:
             U, W, V = mode.T[..., None] * size
-            phase = loss.number * turn
+            phase = point.number * turn
             r = points[:, :1] + U * np.cos(phase)
-            z, v = points[:, 1:] + W * np.cos(phase), (V * np.sin(phase) if loss.number else V + 0 * phase)
+            z, v = points[:, 1:] + W * np.cos(phase), (V * np.sin(phase) if point.number else V + 0 * phase)
             place = ((r * np.cos(turn) - v * np.sin(turn), r * np.sin(turn) + v * np.cos(turn), z) if axisymmetric
                      else (r, turn + v, z))
             surface = pyvista.StructuredGrid(*(np.ascontiguousarray(c)[..., None] for c in place))

@@ -25,30 +25,26 @@ from ...units import NONE, Units
 from .instability import CriticalPoint, Stability, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
-"""Contact of the foot: enough points on a compliant plate to let the standing ring roll.
+"""Arguments of the `Contact` of the foot: enough points on a compliant plate to let the standing ring roll.
 
 The compliance is about a thousandth of the wall. On a rigid plate a contact line hops from point to point.
 """
 
 _STEP = 0.004
-"""Largest step length: a crushed wall snaps through along short arcs."""
+"""Default of `StepControl.largest`: a crushed wall snaps through along short arcs."""
 
 
 @dataclass(eq=False, repr=False)
 class TopLoad:
-    """Top load of a body that is pressed down onto a plate; prints a table.
+    """Force and buckling of a body that is pressed down onto a plate by its neck; prints a table.
 
     Attributes:
         path: the axisymmetric path.
-        stability: stability of its states, with the critical points.
-        travel: displacement of the neck at all n states, positive downwards, shape (n,), length.
-        force: its force, positive downwards, shape (n,), force.
-        largest_force: peak force of the axisymmetric path.
-        at_travel: travel at the peak force, length.
-        peak: False if the force is largest in the last state: it may grow further.
-        ended: why the path ended before the requested travel, as text, or "".
-        energy: work up to the first buckling or to the largest force, length force.
-        units: a `Units` for the labels.
+        stability: stability of the states of the path, with the critical points.
+        travel: displacement of the neck in the n states, positive downwards, shape (n,), length.
+        force: force on the neck in the n states, positive downwards, shape (n,), force.
+        ended: reason why the path ended before the requested travel, or "".
+        units: a `formingx.Units` for the labels.
     """
 
     path: Path
@@ -60,50 +56,50 @@ class TopLoad:
 
     @property
     def largest_force(self) -> float:
-        """Peak force of the axisymmetric path."""
+        """Largest force on the axisymmetric path."""
         return float(self.force.max())
 
     @property
     def at_travel(self) -> float:
-        """Travel at the peak force, length."""
+        """Travel of the neck at the largest force, length."""
         return float(self.travel[self.force.argmax()])
 
     @property
     def peak(self) -> bool:
-        """True if the force passes a maximum within the path."""
+        """True if the force has its maximum before the last state; otherwise it may grow further."""
         return bool(self.force.argmax() < len(self.force) - 1)
 
     @property
     def first(self) -> CriticalPoint | None:
-        """First buckling point, or None."""
+        """First critical point at which a mode buckles, or None."""
         return self.stability.first
 
     def of(self, number: float) -> CriticalPoint | None:
-        """Return the first buckling point with a number of waves; `buckling` returns its force and travel.
+        """Return the first critical point at which a mode with a number of waves buckles.
 
         Args:
-            number: number of waves.
+            number: number of waves round the axis.
 
         Returns:
-            The critical point, or None.
+            The critical point, or None; `buckling` returns its force and travel.
         """
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
-        """Return force and travel of the first buckling point with a number of waves.
+        """Return force and travel of the neck when a mode with a number of waves first buckles.
 
         Args:
-            number: number of waves.
+            number: number of waves round the axis.
 
         Returns:
-            (force, travel), or None.
+            (force, travel), or None if no such mode buckles.
         """
-        loss = self.of(number)
-        return None if loss is None else (loss.state.measures["support_force"], -loss.control)
+        point = self.of(number)
+        return None if point is None else (point.state.measures["support_force"], -point.control)
 
     @property
     def energy(self) -> float:
-        """Work up to the first buckling or to the largest force, length force."""
+        """Work of the force on the neck up to the first buckling, or else up to the largest force, length force."""
         first = self.first
         end = self.at_travel if first is None else -first.control
         last = int(np.argmax(self.travel >= end * (1 - 1e-12)))
@@ -113,19 +109,19 @@ class TopLoad:
         return float(np.trapezoid(F, x))
 
     def __str__(self) -> str:
-        def said(value: float, of: str, digits: int = 5) -> str:
-            return f"{value:.{digits}g} {self.units.of(of)}".rstrip()
+        def text(value: float, quantity: str, digits: int = 5) -> str:
+            return f"{value:.{digits}g} {self.units.of(quantity)}".rstrip()
 
-        def at(force: float, travel: float, between: str = ", ") -> str:
-            return f"{said(force, 'force')}{between}travel {said(travel, 'travel', 4)}"
-        what = "" if self.peak else " (the last state: it may grow further)"
+        def pair(force: float, travel: float, between: str = ", ") -> str:
+            return f"{text(force, 'force')}{between}travel {text(travel, 'travel', 4)}"
+        note = "" if self.peak else " (the last state: it may grow further)"
         lines = ["top load, elastic:",
-                 f"  axisymmetric path: largest force {at(self.largest_force, self.at_travel, ' at ')}{what}"]
+                 f"  axisymmetric path: largest force {pair(self.largest_force, self.at_travel, ' at ')}{note}"]
         for n in self.stability.numbers:
             if (found := self.buckling(n)) is not None:
-                lines.append(f"  n = {n:g}: buckles at force {at(*found)}")
+                lines.append(f"  n = {n:g}: buckles at force {pair(*found)}")
         lines.append("  no mode buckles" if self.first is None else
-                     f"  first: n = {self.first.number:g}; energy to it {said(self.energy, 'energy', 4)}")
+                     f"  first: n = {self.first.number:g}; energy to it {text(self.energy, 'energy', 4)}")
         return "\n".join([*lines, f"  the path ended before: {self.ended}"] if self.ended else lines)
 
     __repr__ = __str__
@@ -136,26 +132,26 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
              step: StepControl | None = None, units: Units | None = None) -> TopLoad:
     """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
-    The neck is constrained radially and round the axis. The contact compliance is about a thousandth of the wall,
-    so that the standing ring of a bottle rolls.
+    The neck is constrained radially and round the axis. The contact compliance is about a thousandth of the wall, so
+    that the standing ring of a bottle rolls.
 
     Args:
-        body: for example `Path.deformed_mesh()`.
-        material: as in `Scene`.
+        body: mesh of the body, for example `Path.deformed_mesh()`.
+        material: a material, or {layer: material}, as in `Scene`.
         travel: requested downward displacement of the neck, length. The run may end earlier, see `TopLoad.ended`.
-        floor: the plate; default: a plane at the lowest node of the body.
+        floor: the plate, a `Tool`; default: a plane at the lowest node of `foot`.
         modes: circumferential wave numbers to examine.
-        neck: boundary that is pressed down.
-        foot: boundary that stands on the plate.
-        step: default `StepControl(largest=0.004)`.
+        neck: name of the boundary that is pressed down.
+        foot: name of the boundary that stands on the plate.
+        step: control of the step length; default `StepControl(largest=0.004)`.
         units: a `formingx.Units`, for the labels.
 
     Returns:
-        The `TopLoad`.
+        Forces, travels and critical points of the run.
 
     Raises:
         InputError: an argument that is not allowed, or a foot that does not reach the floor.
-        ConvergenceError: the first state was not found.
+        ConvergenceError: the run failed before its second state.
 
     >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))
     >>> found = fx.top_load(tube, material=fx.NeoHookean(c10=1.0), travel=0.3, neck="top", foot="bottom", modes=[1],
