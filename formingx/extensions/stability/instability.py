@@ -131,14 +131,7 @@ class CriticalPoint:
 
 
 class Stability:
-    """Stability of the examined states of a path; prints a table.
-
-    Args:
-        path: the computed `Path`.
-        numbers: examined wave numbers.
-        states: examined states, in order.
-        counts: number of unstable modes of each kind in each state.
-        critical_points: points at which a mode becomes unstable or stable, in order.
+    """Stability of the examined states of a path, created by `Path.stability`; prints a table.
 
     Attributes:
         path: the computed `Path`.
@@ -146,7 +139,7 @@ class Stability:
         states: examined states, in order.
         counts: {(wave number, symmetry plane or None): number of unstable modes in each state, shape (states,)}. Modes
             with a symmetry plane are antisymmetric about it.
-        critical_points: the `CriticalPoint` objects, in order along the path.
+        critical_points: points at which a mode becomes unstable or stable again, in order along the path.
     """
 
     def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
