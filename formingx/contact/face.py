@@ -341,7 +341,7 @@ class FaceContact:
             arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
         self._take(Memory(touch, arrived, penalty))
 
-    def let_go(self, fields: np.ndarray, control: float) -> bool:
+    def separate(self, fields: np.ndarray, control: float) -> bool:
         """Return True if points under tension were separated from a tool in three dimensions; collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
@@ -354,7 +354,7 @@ class FaceContact:
                 distance=np.where(free, -2 * self.law.theta, touch.distance))))
         return found
 
-    def hold_late(self, fields: np.ndarray, control: float, most: float) -> bool:
+    def close_penetrated(self, fields: np.ndarray, control: float, most: float) -> bool:
         """Close the contact of points that penetrated a tool in three dimensions by more than `most` (length).
 
         Each point sticks or slides from the position where its path in the step met the tool. Collective.

@@ -271,7 +271,7 @@ class StepLimit:
         """
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
-    def let_go(self, new: Any) -> bool:
+    def separate(self, new: Any) -> bool:
         """Separate points under tension from tools in three dimensions, at a converged state.
 
         Args:
@@ -280,9 +280,9 @@ class StepLimit:
         Returns:
             True if any point separated, so that the state must be solved for again.
         """
-        return any([c.face.let_go(new.x[: self._n], new.control) for c in self.present])
+        return any([c.face.separate(new.x[: self._n], new.control) for c in self.present])
 
-    def hold_late(self, new: Any, at_target: bool, sweep: int) -> bool:
+    def close_penetrated(self, new: Any, at_target: bool, sweep: int) -> bool:
         """Close the contact of points that penetrated a tool in three dimensions during a step, at its converged state.
 
         At a target this applies to all tools, otherwise only to tools with friction. Friction then acts at these
@@ -297,7 +297,7 @@ class StepLimit:
             True if a contact status or a friction pressure changed, so that the state must be solved for again.
         """
         n, again = self._n, sweep < LIMITS.corrections
-        late = [c.face.hold_late(new.x[:n], new.control, LIMITS.near * c.face.thickness)
+        late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.near * c.face.thickness)
                 for c in self.present if at_target or c.lags]
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 

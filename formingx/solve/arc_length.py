@@ -364,7 +364,7 @@ class Curve:
         sense = float(np.sign(found.slope * new.slope)) or 1.0
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
 
-    def hold_late(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
+    def close_penetrated(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
         """Solve again for the first of `states`, found by a step from `old`, with points that penetrated a tool in
         contact.
 
@@ -381,10 +381,10 @@ class Curve:
             return states
         equation = fixed(new.control) if bound is None or new.met is None else bound.equation(new.met.value)
         for sweep in range(self.sweeps):
-            if not limit.hold_late(new, bound is not None, sweep):
+            if not limit.close_penetrated(new, bound is not None, sweep):
                 return [new, *rest]
             new = self.solve_again(new, equation, old)
-        raise Failure("points that are held bring others into their tool again and again", [])
+        raise Failure("points that come into contact late bring others into their tool again and again", [])
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

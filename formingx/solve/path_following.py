@@ -25,7 +25,7 @@ from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
 from .record import Record, Unusable
-from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, let_go, snap_through, snaps, was_passed
+from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separated, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -290,7 +290,7 @@ class Run:
             raise _Astray("the iteration fell back to a part of the path that was passed already", [])
         error, memory = self._error_in_time(new), self.problem.memory
         try:
-            new = let_go(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
+            new = separated(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
             states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
         except Failure:
             self.problem.memory = memory
@@ -365,7 +365,7 @@ class Run:
         else:
             raise failure
         self._ahead = min(10 * self._ahead, settings.furthest)
-        new = self.curve.hold_late(old, [replace(new, met=self.aim.met_by(new))], self.aim.open)[0]
+        new = self.curve.close_penetrated(old, [replace(new, met=self.aim.met_by(new))], self.aim.open)[0]
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
@@ -417,7 +417,7 @@ class Run:
                 state.met = target
                 found.append(state)
         found.sort(key=lambda state: self.curve.progress(old, state))
-        return self.curve.hold_late(old, [*found, new], self.aim.open)
+        return self.curve.close_penetrated(old, [*found, new], self.aim.open)
 
     def _accept(self, state: State) -> None:
         """Accept a state and close the targets that it meets."""

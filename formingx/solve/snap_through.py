@@ -401,7 +401,7 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
     return False
 
 
-def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
+def separated(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
     """Return a new state at the same control, without contact points in tension at tools in three dimensions.
 
     Args:
@@ -415,10 +415,10 @@ def let_go(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callabl
         Failure: no such state was found.
     """
     for _ in range(curve.sweeps):
-        if not limit.let_go(new):
+        if not limit.separate(new):
             return new
         try:
             new = curve.solve_again(new, fixed(new.control), old)
         except Failure:
             new = jump(new)
-    raise Failure("points that let go of a tool touch it again and again", [])
+    raise Failure("points that separate from a tool touch it again and again", [])
