@@ -211,7 +211,7 @@ def support_force(problem, state, component):
     x = problem.x.duplicate()
     x.setArray(state.x)
     values = problem.forces(x, state.control)
-    dofs = np.intersect1d(problem.forms.space.sub(0).sub(component).collapse()[1], problem.held)
+    dofs = np.intersect1d(problem.forms.space.sub(0).sub(component).collapse()[1], problem.constrained)
     forms = problem.forms
     return values[dofs].sum() * forms.stress * forms.volume / forms.length
 

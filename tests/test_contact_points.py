@@ -30,7 +30,7 @@ def test_tangent_is_derivative_of_residual(friction):
     assert np.sum(problem.contacts[0].tractions(x.array_r, 0.1).normal > 0) > 3
     out = problem.x.duplicate()
     problem.tangent(x, 0.1).mult(d, out)
-    free = np.setdiff1d(np.arange(len(out.array_r)), problem.held)
+    free = np.setdiff1d(np.arange(len(out.array_r)), problem.constrained)
     found = difference(residual(problem, 0.1), x, d, 1e-6)
     np.testing.assert_allclose(out.array_r[free], found[free], atol=2e-6 * np.abs(found).max())
 

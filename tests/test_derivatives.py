@@ -38,7 +38,7 @@ def random_state(problem, seed=1, size=0.004):
     x.setArray(size * rng.standard_normal(x.getLocalSize()))
     d.setArray(0.03 * rng.standard_normal(x.getLocalSize()))
     for v in (x, d):
-        v.array_w[problem.held] = 0
+        v.array_w[problem.constrained] = 0
     return x, d
 
 
@@ -129,7 +129,7 @@ def test_derivative_by_control(driven):
     control, h = 0.4, 1e-5
     # a held unknown follows the control in x as well as in the residual
     shift = np.zeros_like(x.array_r)
-    shift[problem.held] = problem.held_rate
+    shift[problem.constrained] = problem.constrained_rate
     plus, minus = x.duplicate(), x.duplicate()
     plus.setArray(x.array_r + (control + h) * shift)
     minus.setArray(x.array_r + (control - h) * shift)
@@ -138,10 +138,10 @@ def test_derivative_by_control(driven):
     exact = problem.x.duplicate()
     problem.control_derivative(x, control, exact)
     free = np.ones(len(shift), dtype=bool)
-    free[problem.held] = False
+    free[problem.constrained] = False
     assert np.abs(numeric - exact.array_r)[free].max() < 1e-6 * np.abs(exact.array_r).max()
     assert np.abs(exact.array_r[free]).max() > 1e-3
-    assert np.allclose(exact.array_r[problem.held], -problem.held_rate)
+    assert np.allclose(exact.array_r[problem.constrained], -problem.constrained_rate)
 
 
 @pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()], ids=lambda k: type(k).__name__)
@@ -173,7 +173,7 @@ def test_tangent_with_viscosity(support):
     def f(y):
         return plain(y) + drag.forces(y.array_r)
     assert_second_order(lambda h: np.abs(difference(f, x, d, h) - exact.array_r).max(), exact.array_r)
-    assert np.abs(drag.forces(x.array_r)).max() > 1e-3 and not drag.forces(x.array_r)[problem.held].any()
+    assert np.abs(drag.forces(x.array_r)).max() > 1e-3 and not drag.forces(x.array_r)[problem.constrained].any()
     drag.destroy()
 
 

@@ -99,7 +99,7 @@ def test_pressure_on_tools_has_its_derivatives():
     with path.problem.state_context(state) as problem:
         x, d, F, other = (problem.x.duplicate() for _ in range(4))
         d.array_w[:] = np.random.default_rng(0).normal(size=len(state.x))
-        d.array_w[problem.held] = 0
+        d.array_w[problem.constrained] = 0
 
         def change(by, control):
             found = []

@@ -187,17 +187,17 @@ def test_derivative_by_control_after_a_change_of_stage(number):
     plus, minus, exact, x = (problem.x.duplicate() for _ in range(4))
     for out, control in ((plus, h), (minus, -h)):
         x.setArray(state.x)
-        x.array_w[problem.held] += control * problem.held_rate
+        x.array_w[problem.constrained] += control * problem.constrained_rate
         problem.residual(x, control, out)
     x.setArray(state.x)
     problem.residual(x, 0.0, exact)
     assert exact.norm() < 1e-8 * problem.force_scale
     problem.control_derivative(x, 0.0, exact)
-    free = np.setdiff1d(np.arange(len(state.x)), problem.held)
+    free = np.setdiff1d(np.arange(len(state.x)), problem.constrained)
     numeric = (plus.array - minus.array) / (2 * h)
     assert np.abs(exact.array[free]).max() > 1e-4 or number == 2
     np.testing.assert_allclose(numeric[free], exact.array[free], atol=1e-5 * np.abs(exact.array).max())
-    assert np.array_equal(exact.array[problem.held], -problem.held_rate)
+    assert np.array_equal(exact.array[problem.constrained], -problem.constrained_rate)
 
 
 @pytest.mark.parametrize("friction", ["none", "stick", 0.3])
@@ -302,7 +302,7 @@ def test_supports_that_open_and_close():
     own = held.forms.space.dofmap.index_map.size_local
     assert same(end(path, "close"), plain.last, n=own)      # without the hinge's force
     held.enter(StepData(**end(path, "down").setting), end(path, "down").x, 0.0)
-    assert np.abs(end(path, "down").x - opened.x)[held.held].max() < 1e-14
+    assert np.abs(end(path, "down").x - opened.x)[held.constrained].max() < 1e-14
     assert end(path, "down").measures["pole_height"] > 0.1                  # the turned rim keeps it bent
     assert np.abs(path.last.x).max() < 1e-8
 

@@ -66,7 +66,7 @@ def test_residual_and_tangent(name, points, tmp_path):
     control = q / forms.control_scale
     problem.residual(x, control, out)
     force = forms.stress * forms.volume / forms.length                       # the scales of formingx/solid.py
-    free = np.setdiff1d(np.arange(u.size), np.flatnonzero(np.isin(dofs, problem.held)))
+    free = np.setdiff1d(np.arange(u.size), np.flatnonzero(np.isin(dofs, problem.constrained)))
     assert len(free) == u.size - 2
     ours = force * out.array_r[dofs]
     assert np.abs(ours - hand)[free].max() < 1e-10 * np.abs(hand).max()

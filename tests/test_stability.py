@@ -46,7 +46,7 @@ def test_no_waves_are_the_tangent(make, until):
     problem, variation = path.problem, SecondVariation(path.problem)
     with problem.state_context(path.last):
         n, free = problem.n_owned, np.ones(problem.n_owned, dtype=bool)
-        free[problem.held] = False
+        free[problem.constrained] = False
         K = sparse(problem.tangent(problem.x, problem.control))[:n][:, :n][free][:, free]
         variation.fill(0)
         to_mode = variation._to_mode[:n][free]

@@ -134,7 +134,7 @@ def assert_derivatives_by_state_and_control(problem, x, d, control=0.7):
     problem.control_derivative(x, control, exact)
     numeric = (residual(problem, control + 1e-4)(x) - residual(problem, control - 1e-4)(x)) / 2e-4
     free = np.ones(len(numeric), dtype=bool)
-    free[problem.held] = False
+    free[problem.constrained] = False
     size = np.abs(exact.array_r[free]).max()
     assert size > 1e-4 and np.abs(numeric - exact.array_r)[free].max() < 1e-6 * size
 
@@ -260,7 +260,7 @@ def test_derivatives_with_a_history(model, material):
     if not model.solid:                                          # a membrane without stretch has no stiffness
         problem.forms.w.sub(0).interpolate(lambda X: 0.1 * X[:2])
         problem.fill(x, problem.forms.w.x.array)
-        x.array_w[problem.held] = 0
+        x.array_w[problem.constrained] = 0
     problem.set_state(x, 0.3)
     problem.forms.histories[0].advance(x.array_r, 0.3)
     x.axpy(0.3, d)

@@ -153,7 +153,7 @@ def test_tangent_and_control_derivative_in_time(model):
         problem.enter(type(setting)(base, rate, []), last.x, last.control)
         x, d, out = (problem.x.duplicate() for _ in range(3))
         d.setArray(np.random.default_rng(3).standard_normal(d.getLocalSize()) * 0.01)
-        d.array_w[problem.held] = 0
+        d.array_w[problem.constrained] = 0
 
         def residual(step, ahead):
             x.array_w[:] = last.x + step * d.array_r

@@ -197,7 +197,7 @@ class RelaxingMaterial(Relaxing):
             {name: entries, shape (4,)} (UFL).
         """
         C = isochoric(F)
-        past, after = self._past(internal, time_step), self._next_step_data(C, internal, time_step)
+        past, after = self._past(internal, time_step), self._deformation_history(C, internal, time_step)
         for k, _, tau in self._branches(constants):
             name = f"{self._tensor}_{k}"
             after[name] = self._advanced(C, past, entries(internal[name]), time_step / tau)
@@ -308,7 +308,7 @@ class RelaxingMaterial(Relaxing):
         """Return the data of earlier states that a step of the branches needs, independent of tau."""
         return entries(internal["C"]) if self._stores_C else None
 
-    def _next_step_data(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
+    def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
         """Return the history variables besides the states of the branches that the next step needs."""
         return {"C": C} if self._stores_C else {}
 

@@ -138,7 +138,7 @@ class TransientNetwork(RelaxingMaterial):
         share = ufl.conditional(small, near * s / (1 + s), 0)
         return cofactor(entries(internal["C"])), tuple(s * c for c in change), share
 
-    def _next_step_data(self, C, internal, time_step):
+    def _deformation_history(self, C, internal, time_step):
         moves = ufl.gt(time_step, 0)
         return {"C": C, "change": plus(cofactor(C), cofactor(entries(internal["C"])), -1),
                 "pace": ufl.conditional(moves, 1 / ufl.conditional(moves, time_step, 1), 0)}

@@ -126,13 +126,13 @@ class Problem(Stages, Units):
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, stage.active.rows, strict=True):
             values += multiplier * row
-        constrained = self.held
+        constrained = self.constrained
         values[constrained] = fields[constrained] - stage.place - stage.rate * control
         self.fill(out, values, [self._dot(row, fields) - mean if present else multiplier
                                 for row, mean, present, multiplier in
                                 zip(stage.active.rows, stage.means, stage.active.present, multipliers, strict=True)])
-        if stage.left is not None:
-            out.array_w += (control - 1) * stage.left
+        if stage.unbalanced is not None:
+            out.array_w += (control - 1) * stage.unbalanced
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
         """Return the force of the body on a driven support, along its motion, all ranks.
@@ -252,7 +252,7 @@ class Problem(Stages, Units):
             values = F.array_r[: self._n].copy()
             for contact in self.present:
                 contact.linearise(values, x.array_r[: self._n], control)
-            values[self.held] = F.array_r[: self._n][self.held]
+            values[self.constrained] = F.array_r[: self._n][self.constrained]
             F.array_w[: self._n] = values
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
@@ -282,10 +282,10 @@ class Problem(Stages, Units):
         values = self._tangent.by_control(self.setting.rate, self.assemble, self._n)
         for contact in self.present:
             contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
-        values[self.held] = -self._stage.rate
+        values[self.constrained] = -self._stage.rate
         self.fill(out, values)
-        if self._stage.left is not None:
-            out.array_w += self._stage.left
+        if self._stage.unbalanced is not None:
+            out.array_w += self._stage.unbalanced
 
     def take_temperature(self) -> None:
         """Update constants and friction to a changed temperature; collective.

@@ -27,7 +27,7 @@ class _Stage(NamedTuple):
         place: values of the constrained owned unknowns at control 0, shape (n,).
         rate: their derivative with respect to the control, shape (n,).
         means: values of the constrained means.
-        left: unbalanced forces that fading removes, over 1 - control, locally owned entries of F; or None.
+        unbalanced: unbalanced forces that fading removes, over 1 - control, locally owned entries of F; or None.
     """
 
     setting: StepData
@@ -35,7 +35,7 @@ class _Stage(NamedTuple):
     place: np.ndarray
     rate: np.ndarray
     means: list[float]
-    left: np.ndarray | None = None
+    unbalanced: np.ndarray | None = None
 
 
 class Stages(Vectors):
@@ -82,12 +82,12 @@ class Stages(Vectors):
         return float(self.forms.control.value)
 
     @property
-    def held(self) -> np.ndarray:
+    def constrained(self) -> np.ndarray:
         return self._stage.active.dofs[self._stage.active.owned]
 
     @property
-    def held_rate(self) -> np.ndarray:
-        """Derivative of the constrained unknowns with respect to the control, in the order of `held`."""
+    def constrained_rate(self) -> np.ndarray:
+        """Derivative of the constrained unknowns with respect to the control, in the order of `constrained`."""
         return self._stage.rate
 
     @contextlib.contextmanager
@@ -134,7 +134,7 @@ class Stages(Vectors):
     @property
     def fading_forces(self) -> np.ndarray | None:
         """Forces on the body that vanish as the control goes from 0 to 1 in a fading piece, shape (n,), or None."""
-        return None if self._stage.left is None else self._stage.left[: self._n]
+        return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
 
     def motion(self, control: float) -> np.ndarray:
         """Return the values of the constrained unknowns for a control.
@@ -146,7 +146,7 @@ class Stages(Vectors):
             Vector with these values and 0 elsewhere, locally owned entries of x.
         """
         values = np.zeros(self.x.getLocalSize())
-        values[self.held] = self._stage.place + self._stage.rate * control
+        values[self.constrained] = self._stage.place + self._stage.rate * control
         return values
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
@@ -182,7 +182,7 @@ class Stages(Vectors):
             unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()
             unknowns.array_w[:] = x
             self.residual(unknowns, control, unbalanced)
-            self._stage = stage._replace(left=unbalanced.array_r / (1 - control))
+            self._stage = stage._replace(unbalanced=unbalanced.array_r / (1 - control))
             unknowns.destroy()
             unbalanced.destroy()
 

@@ -364,9 +364,9 @@ class Curve:
         sense = float(np.sign(found.slope * new.slope)) or 1.0
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
 
-    def close_penetrated(self, old: State, states: list[State], targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """Solve again for the first of `states`, found by a step from `old`, with points that penetrated a tool in
-        contact.
+    def close_penetrated(self, old: State, states: list[State],
+                         targets: Sequence[tuple[Target, Measure]]) -> list[State]:
+        """Solve again for the first of `states`, found by a step from `old`, with penetrating points in contact.
 
         For tools in three dimensions. A point stays in contact where it met the tool. If the state meets one of
         `targets`, pairs (target, output quantity), the points of all tools count, and the target is met again. Else the

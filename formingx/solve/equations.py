@@ -290,7 +290,7 @@ class ActiveSet(Protocol):
         return None
 
     @property
-    def held(self) -> Array:
+    def constrained(self) -> Array:
         """Local numbers of the locally owned unknowns that are constrained."""
         return np.zeros(0, dtype=np.int32)
 

@@ -189,7 +189,7 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
             units.append(unit.copy())
             unit[:] = 0
     E = np.array(units).reshape(-1, len(unit)).T
-    E[problem.held] = 0
+    E[problem.constrained] = 0
     return E
 
 

@@ -213,7 +213,7 @@ class Run:
         A failure halves the step. If short steps fail, or the path leads back, the body snaps through. It does so only
         after the smallest step near a snap-through without equilibrium, and at a first state with a history.
         """
-        first, failed, most, limit, held = self.step.length, 0, np.inf, self.problem.limit, None
+        first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._limit_rule, self._sense):
             return self._snap(old)
@@ -226,15 +226,15 @@ class Run:
             if length < self.step.length:
                 self._limited("contact arriving", length)
             try:
-                return self._take(old, length, target, bound, reach, held)
+                return self._take(old, length, target, bound, reach, end)
             except Cutback as cut:
-                most, held = cut.part * reach, cut.control if cut.lasts and most < np.inf else None
+                most, end = cut.part * reach, cut.control if cut.lasts and most < np.inf else None
                 self.step.length = most if cut.lasts else self.step.length
                 self._failed(str(cut), most)
                 if most < self.step.smallest:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {cut}")
             except Failure as failure:
-                self.step.length, held = length, None
+                self.step.length, end = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
                 self._failed(failure.reason, self.step.length)
@@ -261,10 +261,10 @@ class Run:
         self._progress.limited(why, length)
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
-              reach: float, held: float | None = None) -> list[State]:
+              reach: float, end: float | None = None) -> list[State]:
         """Return the states of one step of a length, or to a target within reach; raise `Failure` or `Cutback`.
 
-        bound: output quantity of the target. reach: arc length to it. held: control at the end of the step, or None.
+        bound: output quantity of the target. reach: arc length to it. end: control at the end of the step, or None.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._way._replace(length=reach), ends=True) if limit else None
@@ -272,8 +272,8 @@ class Run:
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is not None and bound is not None:
                 new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind, bend)
-            elif held is not None:
-                new = self.curve.step_to(old, reach, fixed(held), self._predictor, behind, bend, kind="step")
+            elif end is not None:
+                new = self.curve.step_to(old, reach, fixed(end), self._predictor, behind, bend, kind="step")
             else:
                 new = self.curve.step(old, length, self._predictor, behind, bend)
         if target is not None:

@@ -73,7 +73,7 @@ class Response:
             self._F.array_w[:] = values
         self._problem.begin()
         left = self._F.array_r.copy()
-        left[self._problem.held] = 0.0
+        left[self._problem.constrained] = 0.0
         found = self._by(left[:, None])
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 

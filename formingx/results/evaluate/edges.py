@@ -39,7 +39,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
     with path.problem.state_context(state) as problem:
         fields = problem.x.array_r.copy()
         free = np.ones(len(fields))
-        free[problem.held] = 0
+        free[problem.constrained] = 0
         for contact in problem.present:
             if contact.contact.lagged or contact.contact.sticks or not contact.contact.separates:
                 continue

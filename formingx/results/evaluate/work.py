@@ -228,7 +228,7 @@ class EnergyBalance:
                              for sign in (1, -1))
             change = scale * (forward - backward)[:n] / (2 * e)
             free = change.copy()
-            free[p.held] = 0                               # constrained unknowns
+            free[p.constrained] = 0                        # constrained unknowns
             for i, item in self._driven:
                 setting = p.setting
                 travel = forms.length * setting.amplitude(i, state.control)
