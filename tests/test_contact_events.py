@@ -10,7 +10,7 @@ from test_contact import cup, form
 from without import run_without
 
 import formingx as fx
-from formingx.contact.step_limit import Way
+from formingx.contact.step_limit import TrialStep
 from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Segment
 from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
 from formingx.extensions.contact_events.response import Response
@@ -56,9 +56,9 @@ def test_a_predicted_step_ends_near_its_state():
     point = int(np.flatnonzero(~touching & (problem.contacts[0].rule.area > 0))[0])
     with problem.state_context(old):
         length = curve.progress(old, new)
-        way = Way(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
-        problem.limit.length(way)
-        dx, dc = problem.limit.prepare(way)
+        trial = TrialStep(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
+        problem.limit.length(trial)
+        dx, dc = problem.limit.prepare(trial)
         V, steps = response_ahead(curve, old).to_points([np.array([point])])
         F = problem.x.duplicate()
         x = problem.x.duplicate()

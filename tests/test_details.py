@@ -13,7 +13,7 @@ from test_ledger import RELAXES, sheet
 
 import formingx as fx
 from formingx import Stage, tools
-from formingx.contact.step_limit import Way
+from formingx.contact.step_limit import TrialStep
 from formingx.measures.targets import Amplitude
 from formingx.problem.problem import Problem
 from formingx.results.evaluate.part import _strips
@@ -93,7 +93,7 @@ def test_a_step_may_not_bring_a_whole_region_into_touch():
     problem = Problem(scene)
     x = np.zeros(problem.n_owned)
     near, far = (d / problem.forms.length for d in (0.05, 0.11))
-    rest, close, deep = (Way(x, control, x, 0.0, 1.0) for control in (0.0, near, far))
+    rest, close, deep = (TrialStep(x, control, x, 0.0, 1.0) for control in (0.0, near, far))
     assert problem.limit.check(rest, close, 1.0) is None and "too many" in problem.limit.check(close, deep, 1.0).why
 
 

@@ -5,7 +5,7 @@ import pytest
 
 import formingx as fx
 from formingx import tools
-from formingx.contact.step_limit import Way
+from formingx.contact.step_limit import TrialStep
 
 
 def ball(radius, *, elements=12, friction="none", gap=0.0, **more):
@@ -58,8 +58,8 @@ def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
         for by, passes in ((0.0, False), (0.1, False), (10.0, True)):      # seen from the tool, across it
             other = x.copy()
             other[contact.rule.dofs[node, 1]] += by / problem.forms.length
-            ways = [Way(at, path.last.control, x, 0.0, 1.0) for at in (x, other)]
-            assert problem.limit.passes_through(*ways) == passes
+            trials = [TrialStep(at, path.last.control, x, 0.0, 1.0) for at in (x, other)]
+            assert problem.limit.passes_through(*trials) == passes
 
 
 def ridge(elements, at, points="nodes", width=30.0, fillet=0.0):

@@ -103,8 +103,10 @@ class EventPredictor(Protocol):
         """
 
 
-class Way(NamedTuple):
-    """Straight piece of a path: a step along the tangent of an accepted state.
+class TrialStep(NamedTuple):
+    """Straight trial step from an accepted state, such as a step along the tangent of the path.
+
+    At the arc length s, 0 <= s <= length, the unknowns are x + s direction, and the control is control + s slope.
 
     Attributes:
         x: unknowns at the state, locally owned entries, shape (n,).
@@ -195,43 +197,43 @@ class StepLimit:
         """
         return self._predictor.predict(curve, state) if self._predictor else None
 
-    def length(self, way: Way) -> float:
+    def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length of a step along a tangent.
 
         The step ends where the first gap closes, or where the allowed number of new points has come into contact.
 
         Args:
-            way: the step, with the wanted arc length.
+            trial: the trial step, with the wanted arc length.
 
         Returns:
-            Arc length, at most `way.length`.
+            Arc length, at most `trial.length`.
         """
-        found = way.events.step_length(way.length) if way.events else None
+        found = trial.events.step_length(trial.length) if trial.events else None
         if found is not None:
             return found
         n = self._n
-        return min([c.reach(way.x[:n], way.control, way.direction[:n], way.slope, way.length)
-                    for c in self.present], default=way.length)
+        return min([c.reach(trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
+                    for c in self.present], default=trial.length)
 
-    def prepare(self, way: Way, ends: bool = False) -> tuple[np.ndarray, float] | None:
+    def prepare(self, trial: TrialStep, ends: bool = False) -> tuple[np.ndarray, float] | None:
         """Prepare all active contacts for the solve of a step: store the predicted positions of gap closures.
 
         Args:
-            way: the step.
+            trial: the trial step.
             ends: True if the run will end the step at the first gap closure that it handles wrongly, see `check`.
 
         Returns:
             Deviation of the predicted end of the step from the tangent, due to contact events: change of x, locally
             owned entries, shape (n,), and of the control. None if it is zero.
         """
-        n, found = self._n, way.events.closures(way.length) if way.events else None
+        n, found = self._n, trial.events.closures(trial.length) if trial.events else None
         for k, approach in enumerate(self.present):
             if approach.face.contact.lagged and not (ends and approach.lags):
                 continue                                    # such a contact uses no predicted gap closures
             times, places, guessed = found[k] if found else (*approach.along(
-                way.x[:n], way.control, way.direction[:n], way.slope, way.length), None)
-            approach.prepare(times, places, guessed, way.length, ends)
-        return way.events.bend(way.length) if way.events and found else None
+                trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length), None)
+            approach.prepare(times, places, guessed, trial.length, ends)
+        return trial.events.bend(trial.length) if trial.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
         """Check after the solve whether a step was too long for the contacts.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact.step_limit import Way
+from ..contact.step_limit import TrialStep
 from ..measures.targets import Target, is_met, process_time
 from . import predictor
 from .equations import Array, Measure
@@ -115,11 +115,11 @@ class Flow(Run):
         problem, problem.clock = self.problem, time
         value = float(self._course(time))
         x, control = self._predicted(old, time, value)
-        way, limit = Way(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
-        if limit and limit.length(way) < _STEPS.contact:
+        trial, limit = TrialStep(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
+        if limit and limit.length(trial) < _STEPS.contact:
             raise Failure("too many points would come into contact in one step", [])
         if limit:
-            limit.prepare(way)
+            limit.prepare(trial)
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
         cut = limit and limit.check(old, new, 1.0)
         if cut:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.step_limit import Way
+from ..contact.step_limit import TrialStep
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
@@ -218,10 +218,10 @@ class Run:
         if snaps(self.curve, old, self._limit_rule, self._sense):
             return self._snap(old)
         events: Any = limit and limit.predict(self.curve, old)                         # type: ignore[arg-type]
-        self._way = Way(old.x, old.control, old.direction, old.slope, 0.0, events)
+        self._trial = TrialStep(old.x, old.control, old.direction, old.slope, 0.0, events)
         while True:
             length = min(self.step.length, most)
-            length = limit.length(self._way._replace(length=length)) if limit else length
+            length = limit.length(self._trial._replace(length=length)) if limit else length
             target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
                 self._limited("contact arriving", length)
@@ -238,7 +238,7 @@ class Run:
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
                 self._failed(failure.reason, self.step.length)
-                self._way = self._way._replace(events=None if failed > 1 else self._way.events)
+                self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
                 early = (self._jumps_soon and failed > 1 and length < lengths[0]
                         and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
                 if self._may_jump and (not good or early):
@@ -267,7 +267,7 @@ class Run:
         bound: output quantity of the target. reach: arc length to it. end: control at the end of the step, or None.
         """
         limit = self.problem.limit
-        bend = limit.prepare(self._way._replace(length=reach), ends=True) if limit else None
+        bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
         behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is not None and bound is not None:

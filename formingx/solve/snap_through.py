@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from petsc4py import PETSc
 
-from ..contact.step_limit import StepLimit, Way
+from ..contact.step_limit import StepLimit, TrialStep
 from .arc_length import Curve
 from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
@@ -217,7 +217,7 @@ class _Motion:
         self._pull, self.at = pull, new
         self.problem.advance(x, self.control)
         if limit:
-            limit.prepare(Way(x, self.control, x - last.x, 0.0, 1.0))
+            limit.prepare(TrialStep(x, self.control, x - last.x, 0.0, 1.0))
         self.solved += 1
         stays, self._wait = self._wait or len(history) - 1 > settings.few, False
         return max(1.0 if stays else settings.falls, far)

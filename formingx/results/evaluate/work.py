@@ -19,7 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...contact import resultants
-from ...contact.step_limit import Way
+from ...contact.step_limit import TrialStep
 from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...findings import Finding, tell
@@ -139,7 +139,7 @@ class EnergyBalance:
             with problem.state_context(a):
                 if self._flows(a, b):
                     problem.clock = a.time + part * (b.time - a.time)
-                problem.limit.prepare(Way(a.x, a.control, start.direction, start.slope, part * h))
+                problem.limit.prepare(TrialStep(a.x, a.control, start.direction, start.slope, part * h))
                 try:
                     found = curve.inside(start, end, part)
                 except Failure:                             # the contact iteration may converge elsewhere
