@@ -111,12 +111,12 @@ def test_contact_comes_back_as_it_was(points):
     here, kept = Problem(path.problem.scene), path.last.memory[0]
     carry(path.problem, path.last, here, path.last.x, path.last.control)
     found = here.memory[0]
-    touched = kept.touch.distance > -here.contacts[0].law.theta
-    assert touched.sum() > 3 and np.abs(kept.touch.slip).max() > 0
-    assert found.touch.position == pytest.approx(kept.touch.position, rel=1e-9, abs=1e-12)
-    assert found.touch.slip == pytest.approx(kept.touch.slip, rel=1e-9)
-    assert found.touch.distance[touched] == pytest.approx(kept.touch.distance[touched], rel=1e-9)
-    assert np.all(found.touch.distance[~touched] < -here.contacts[0].law.theta)
+    touched = kept.history.distance > -here.contacts[0].law.theta
+    assert touched.sum() > 3 and np.abs(kept.history.slip).max() > 0
+    assert found.history.position == pytest.approx(kept.history.position, rel=1e-9, abs=1e-12)
+    assert found.history.slip == pytest.approx(kept.history.slip, rel=1e-9)
+    assert found.history.distance[touched] == pytest.approx(kept.history.distance[touched], rel=1e-9)
+    assert np.all(found.history.distance[~touched] < -here.contacts[0].law.theta)
     assert np.array_equal(found.arrived, kept.arrived)
     force = here.contacts[0].tractions(path.last.x, path.last.control).force
     with path.problem.state_context(path.last) as problem:

@@ -5,7 +5,7 @@ import pytest
 
 import formingx as fx
 from formingx.contact.increment import Increment
-from formingx.physics.contact_law import NormalLaw, Touch
+from formingx.physics.contact_law import ContactHistory, NormalLaw
 from formingx.physics.penalty import Law
 from formingx.problem.problem import Problem
 
@@ -82,7 +82,8 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
     law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
     before = x - slip * tangent
-    old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
+    distance = np.full(len(x), -0.5 * THETA if touched else -2 * THETA)
+    old = ContactHistory(before, distance, np.full(len(x), 1e-4), before)
     found = law.tractions(x, old)
     exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
     np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
@@ -96,13 +97,14 @@ def test_a_tool_that_holds(mu, touched):
     law = Law(TOOL, mu, K, THETA, SLIP, pulls=True)
     x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
     before = x - 0.01 * tangent
-    old = Touch(before, np.full(len(x), -0.5 * THETA if touched else -2 * THETA), np.full(len(x), 1e-4), before)
+    distance = np.full(len(x), -0.5 * THETA if touched else -2 * THETA)
+    old = ContactHistory(before, distance, np.full(len(x), 1e-4), before)
     found, d = law.tractions(x, old), law.distance(x)
     exact = derivative(lambda y: law.tractions(y, old).force, x, 1e-7)
     np.testing.assert_allclose(exact, found.stiffness, atol=1e-5 * K)
     np.testing.assert_allclose(found.normal, K * (d + THETA if touched else np.maximum(d + THETA, 0)), atol=1e-9 * K)
     assert np.all(law.touching(x, old) == (touched | (d > -THETA)))
-    assert np.all(law.touching(x, found.touch) == law.touching(x, old))
+    assert np.all(law.touching(x, found.history) == law.touching(x, old))
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, np.inf])
@@ -110,7 +112,7 @@ def test_force_is_continuous(mu):
     law, step = Law(TOOL, mu, K, THETA, SLIP), 1e-9
     x, tangent = points_near(TOOL, (-THETA, THETA))
     normal = TOOL.nearest(x).normal
-    old = Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.05 * tangent)
+    old = ContactHistory(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.05 * tangent)
     a, b = (law.tractions(x + side * step * normal, old).force for side in (-1, 1))
     assert np.abs(a - b).max() < 10 * K * step
 
@@ -125,7 +127,7 @@ def test_a_shear_limit_of_ones_own():
     law = Law(TOOL, mu, K, THETA, SLIP, shear_limit=limit)
     x, tangent = points_near(TOOL, SIDES)
     for slid in (0.3 * SLIP, -20 * SLIP):
-        old = Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + slid * tangent)
+        old = ContactHistory(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + slid * tangent)
         found = law.tractions(x, old)
         assert np.all(np.abs(found.tangential) <= strength * (1 + 1e-12))
         exact = derivative(lambda y, old=old: law.tractions(y, old).force, x, 1e-7)
@@ -137,8 +139,8 @@ def test_a_shear_limit_of_ones_own():
 def test_an_accepted_state_keeps_its_forces(mu):
     law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
-    first = law.tractions(x, Touch(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.03 * tangent))
-    again = law.tractions(x, first.touch)
+    first = law.tractions(x, ContactHistory(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x + 0.03 * tangent))
+    again = law.tractions(x, first.history)
     np.testing.assert_allclose(again.force, first.force, atol=1e-12 * K)
 
 
@@ -147,7 +149,7 @@ def test_points_that_are_guessed_are_linearised_where_they_begin(mu):
     """In the first iteration: by the law where they are, not where their motion is predicted; then as the others."""
     law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
-    old = Touch(x - 0.01 * tangent, np.full(len(x), -2 * THETA), np.zeros(len(x)), x - 0.3 * SLIP * tangent)
+    old = ContactHistory(x - 0.01 * tangent, np.full(len(x), -2 * THETA), np.zeros(len(x)), x - 0.3 * SLIP * tangent)
     start, guessed = x - 0.2 * tangent, np.random.default_rng(0).random(len(x)) < 0.5         # round fillets
     mixed, plain = Increment(law, old, start, guessed), Increment(law, old, start)
     by, other = mixed.linearise(x), plain.linearise(x)
@@ -164,12 +166,12 @@ def test_a_point_slides_after_the_same_slip_at_every_pressure(depth):
     """T = mu N g/g_s up to mu N; what slid is forgotten: back by g_s, it is free of traction."""
     law, mu, away = Law(tools.plane(0.0), 0.4, K, THETA, SLIP), 0.4, np.array([0.3, 0.9, 1.1, 50.0]) * SLIP
     start = np.column_stack([np.zeros(4), np.full(4, depth)])
-    touch = Touch(start, np.full(4, depth), np.zeros(4), start)
+    history = ContactHistory(start, np.full(4, depth), np.zeros(4), start)
     x = start + np.outer(away, law.nearest(start).tangent[0])
-    found = law.tractions(x, touch)
+    found = law.tractions(x, history)
     assert found.normal == pytest.approx(found.normal[0]) and found.normal[0] > 0
     assert found.tangential == pytest.approx(mu * found.normal * np.minimum(away / SLIP, 1))
-    back = law.tractions(x - np.outer(np.minimum(away, SLIP), law.nearest(start).tangent[0]), found.touch)
+    back = law.tractions(x - np.outer(np.minimum(away, SLIP), law.nearest(start).tangent[0]), found.history)
     assert back.tangential == pytest.approx(np.zeros(4), abs=1e-6 * mu * found.normal[0])
 
 
@@ -180,14 +182,14 @@ def test_what_friction_gains_in_a_cycle_of_pressure_vanishes_with_the_elastic_sl
     way = np.linspace(0, SLIP, 101)
     cycle = [(g, low) for g in way] + [(SLIP, high)] + [(g, high) for g in way[::-1]]
     x = np.array([(0.0, low)])
-    touch, work, last = Touch(x, np.array([low]), np.zeros(1), x), 0.0, None
+    history, work, last = ContactHistory(x, np.array([low]), np.zeros(1), x), 0.0, None
     for g, d in cycle:
         x = np.array([(g, d)])
-        found = law.tractions(x, touch)
+        found = law.tractions(x, history)
         along = float(found.tangential[0] * law.nearest(x).tangent[0, 0])
         if last is not None:
             work += 0.5 * (along + last[1]) * (g - last[0])
-        touch, last = found.touch, (g, along)
+        history, last = found.history, (g, along)
     assert work == pytest.approx(-mu * K * (high - low) * SLIP / 2, rel=1e-6)
 
 
@@ -437,5 +439,5 @@ def test_open_points_carry_nothing_alone_or_beside_closed_ones(mu, pulls):
     assert beside.normal[-1] > 0 and np.all(alone.force == 0) and np.all(alone.stiffness == 0)
     for name in ("force", "normal", "tangential", "sense", "stiffness", "status"):
         assert np.array_equal(getattr(alone, name), getattr(beside, name)[:-1])
-    for a, b in zip(alone.touch, beside.touch, strict=True):
+    for a, b in zip(alone.history, beside.history, strict=True):
         assert np.array_equal(a, b[:-1])

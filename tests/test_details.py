@@ -143,10 +143,10 @@ def test_a_tool_that_comes_in_remembers_nothing():
     problem = Problem(scene)
     contact, = problem.contacts
     x = np.random.default_rng(1).uniform(-0.01, 0.01, problem.n_owned)
-    assert contact.touch.position == pytest.approx(contact.points)
+    assert contact.history.position == pytest.approx(contact.points)
     contact.come_in(x, -0.2)
-    assert contact.touch.position == pytest.approx(contact.positions(x, -0.2), rel=1e-12)
-    assert not contact.touch.slip.any()
+    assert contact.history.position == pytest.approx(contact.positions(x, -0.2), rel=1e-12)
+    assert not contact.history.slip.any()
 
 
 def test_a_grey_face_radiates_with_the_fourth_power():

@@ -170,7 +170,7 @@ def test_work_of_the_plug_is_strain_energy_and_friction(rough_ball):
         with path.problem.state_context(state) as problem:
             (face,) = problem.contacts
             x = face.positions(state.x, state.control)
-            limit = face.rule.area * 0.3 * face.law.pressure(face.touch)
+            limit = face.rule.area * 0.3 * face.law.pressure(face.history)
         if before is not None:
             way = x - before[0]
             normal = face.law.tool.near(x).normal

@@ -161,7 +161,7 @@ def share_of_friction(path):
     for state in path.states:
         with path.problem.state_context(state):
             touches = contact.touching(state.x[:n], state.control)
-            most = max(most, np.abs(contact.touch.slip[touches]).max(initial=0.0) / contact.law.elastic_slip)
+            most = max(most, np.abs(contact.history.slip[touches]).max(initial=0.0) / contact.law.elastic_slip)
     return most
 
 

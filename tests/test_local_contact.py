@@ -24,9 +24,9 @@ class Face:
     def __init__(self, slip):
         law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
         here = np.array([[4.0, -0.5 * THETA]])
-        touch = law.start(here - [[slip, 0.0]])
+        history = law.start(here - [[slip, 0.0]])
         self.points, self.scale = here, np.ones(1)
-        self.increment = Increment(law, touch, here)
+        self.increment = Increment(law, history, here)
         self.increment.tractions(here)
         self.increment.linearise(here)
 

@@ -112,7 +112,7 @@ class Approach:
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
-        free = ~face.law.touching(start, face.touch)
+        free = ~face.law.touching(start, face.history)
         if face.contact.lagged:                             # a tangent of a long step predicts no arrivals
             most = LIMITS.nearer * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
@@ -143,7 +143,7 @@ class Approach:
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
-        free = ~face.law.touching(start, face.touch) & (face.rule.area > 0)
+        free = ~face.law.touching(start, face.history) & (face.rule.area > 0)
         times = gap_closures(face.law, start, velocity, free, length)
         return times, start + times[:, None] * velocity
 
@@ -184,11 +184,11 @@ class Approach:
             True if the step is too long.
         """
         face, theta = self.face, self.face.law.theta
-        if face.touch is None:
+        if face.history is None:
             return False
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         if face.contact.lagged:
-            deep = np.where(face.law.touching(a, face.touch), 0.0, b - 2 * face.rule.lengths)
+            deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.near * face.thickness) & (b > -theta)))
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
@@ -224,9 +224,9 @@ class Approach:
             return False
         face, law = self.face, self.face.law
         now = face.tractions(new, control).normal
-        if self._part_of_pressure(now, law.pressure_ahead(face.touch)) <= LIMITS.behind:
+        if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.behind:
             return False
-        face.expect_arrivals(law.at_pressure(face.touch, now))
+        face.expect_arrivals(law.at_pressure(face.history, now))
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
@@ -242,9 +242,9 @@ class Approach:
         """
         if not self.lags:
             return length
-        law, touch = self.face.law, self.face.touch
-        rate = law.k * np.einsum("ni,ni->n", law.motion(start, touch).normal, velocity)
-        change = self._part_of_pressure(law.pressure(touch) + length * rate)
+        law, history = self.face.law, self.face.history
+        rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
+        change = self._part_of_pressure(law.pressure(history) + length * rate)
         return length * min(LIMITS.lag / change, 1.0) if change else length
 
     def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
@@ -260,7 +260,7 @@ class Approach:
         Returns:
             Relative difference over all ranks.
         """
-        face, before = self.face, self.face.law.pressure(self.face.touch)
+        face, before = self.face, self.face.law.pressure(self.face.history)
         off = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, off, 0.0), face.rule.area @ before])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
@@ -278,14 +278,14 @@ class Approach:
         Returns:
             True if both happened in the step, on any ranks.
         """
-        face, theta, touch = self.face, self.face.law.theta, self.face.touch
-        if touch is None or not face.contact.sticks or face.law.pulls or face.contact.lagged:
+        face, theta, history = self.face, self.face.law.theta, self.face.history
+        if history is None or not face.contact.sticks or face.law.pulls or face.contact.lagged:
             return False
         x, area = face.positions(new, control), face.rule.area > 0
         near = face.law.nearest(x)
-        distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - touch.position))
-        opens = area & (touch.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
-        closes = area & (touch.distance <= -theta - LIMITS.near * face.thickness) & (distance > -theta)
+        distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - history.position))
+        opens = area & (history.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
+        closes = area & (history.distance <= -theta - LIMITS.near * face.thickness) & (distance > -theta)
         found = self._comm.allreduce(np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
         return bool(np.all(found > 0))
 
@@ -345,8 +345,8 @@ class Approach:
         Returns:
             Fraction of the step, 1 without such points.
         """
-        face, law, touch = self.face, self.face.law, self.face.touch
-        if touch is None or not law.has_friction:
+        face, law, history = self.face, self.face.law, self.face.history
+        if history is None or not law.has_friction:
             return 1.0
         end, velocity = face.positions(new, control), face.moved(direction, slope)
         near = law.nearest(end)
@@ -355,11 +355,11 @@ class Approach:
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
         if face.contact.sticks:
-            wrong = np.isnan(touch.arrival[:, 0]) & (np.abs(slid) > LIMITS.slides * face.rule.lengths)
+            wrong = np.isnan(history.arrival[:, 0]) & (np.abs(slid) > LIMITS.slides * face.rule.lengths)
         else:
-            counted = np.einsum("ni,ni->n", near.tangent, end - touch.arrival)
+            counted = np.einsum("ni,ni->n", near.tangent, end - history.arrival)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
-        late = (touch.distance <= -law.theta) & (F > 0) & wrong
+        late = (history.distance <= -law.theta) & (F > 0) & wrong
         return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
 
 

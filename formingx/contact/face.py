@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..forms.carry import Carrier
 from ..forms.history import Start
 from ..physics.contact import Contact
-from ..physics.contact_law import Touch, Tractions
+from ..physics.contact_law import ContactHistory, Tractions
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule, Vertices
 
@@ -23,13 +23,13 @@ class Memory(NamedTuple):
     """History variables of the points of a face at the last accepted state.
 
     Attributes:
-        touch: history variables of the contact law.
+        history: history variables of the contact law.
         arrived: mask of the points that came into contact in the step to this state, shape (n,).
         penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
             (`Contact.present_area`).
     """
 
-    touch: Touch
+    history: ContactHistory
     arrived: np.ndarray
     penalty: np.ndarray
 
@@ -104,7 +104,7 @@ class FaceContact:
         """
         if self._warm is not None:
             self.law = self.law.with_friction(self.contact.friction_at(self._temperatures(), clamped=True))
-            self.increment = Increment(self.law, self.touch)
+            self.increment = Increment(self.law, self.history)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
         """Return the displacement of the points, shape (n, components), in the units of the unknowns `values`."""
@@ -146,7 +146,7 @@ class FaceContact:
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return a mask of the points in contact in a state, shape (n,); `fields`: locally owned unknowns."""
-        return self.law.touching(self.positions(fields, control), self.touch)
+        return self.law.touching(self.positions(fields, control), self.history)
 
     @property
     def area(self) -> np.ndarray:
@@ -184,12 +184,12 @@ class FaceContact:
         if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
             self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         start = None if old is None else self.positions(old, control)
-        self.increment, self._guessed = Increment(self.law, self.touch, start, self._guessed), None
+        self.increment, self._guessed = Increment(self.law, self.history, start, self._guessed), None
 
     def leave_out(self, points: np.ndarray) -> None:
         """Keep some points (a mask, shape (n,)) open until the next increment begins."""
         law: Any = self.law                                  # see `ContactLaw`
-        self.increment = Increment(law.without(points), self.touch)
+        self.increment = Increment(law.without(points), self.history)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the contact forces in a state to the residual.
@@ -236,7 +236,7 @@ class FaceContact:
         if self._solid.scene.kinematics.axisymmetric:
             radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
         both = np.zeros_like(self._in_tangent)
-        both[:, 0, 0] = self.law.stiffness_round(self.positions(fields, control), self.touch, radius)
+        both[:, 0, 0] = self.law.stiffness_round(self.positions(fields, control), self.history, radius)
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -262,7 +262,7 @@ class FaceContact:
         """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""
         if ahead:
             arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
-            return self.law.stiffness_ahead(self.positions(fields, control), self.touch, arrived)
+            return self.law.stiffness_ahead(self.positions(fields, control), self.history, arrived)
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
@@ -295,9 +295,9 @@ class FaceContact:
         return self.law.remembers or self.contact.present_area
 
     @property
-    def touch(self) -> Touch | None:
+    def history(self) -> ContactHistory | None:
         """History variables of the contact law; None if it has none, as without friction."""
-        return self._memory and self._memory.touch
+        return self._memory and self._memory.history
 
     def start(self) -> None:
         """Set the history variables of the reference configuration, in which the points have not been in contact."""
@@ -312,7 +312,7 @@ class FaceContact:
         self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Store the predicted positions of the points when their gaps close in the next step (`Touch.arrival`).
+        """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.arrival`).
 
         Args:
             arrival: positions relative to the tool, shape (n, c), length; NaN for no friction in the step.
@@ -320,7 +320,7 @@ class FaceContact:
         """
         self._guessed = guessed
         if self._memory is not None:
-            self._take(self._memory._replace(touch=self._memory.touch._replace(arrival=arrival)))
+            self._take(self._memory._replace(history=self._memory.history._replace(arrival=arrival)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Update the history variables to an accepted state; they do not change while the tool is inactive.
@@ -332,26 +332,26 @@ class FaceContact:
         """
         if self._memory is None or not self.present:
             return
-        old, theta = self._memory.touch, self.law.theta
-        touch = self.law.tractions(self.positions(x, control), old).touch
+        old, theta = self._memory.history, self.law.theta
+        history = self.law.tractions(self.positions(x, control), old).history
         penalty = self._penalty if self.contact.present_area else self._memory.penalty
-        arrived = (old.distance <= -theta) & (touch.distance > -theta)
+        arrived = (old.distance <= -theta) & (history.distance > -theta)
         if self.contact.lagged:                             # no point has moved since a stage began here
-            moved = np.abs(touch.arrival - old.arrival).max(1, initial=0.0)
+            moved = np.abs(history.arrival - old.arrival).max(1, initial=0.0)
             arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
-        self._take(Memory(touch, arrived, penalty))
+        self._take(Memory(history, arrived, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
         """Return True if points under tension were separated from a tool in three dimensions; collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
-        touch, x = self._memory.touch, self.positions(fields, control)
-        free = self.law.pulling(x, touch) & ~self._memory.arrived
+        history, x = self._memory.history, self.positions(fields, control)
+        free = self.law.pulling(x, history) & ~self._memory.arrived
         found = bool(self.comm.allreduce(int(free.sum())))
         if found:
-            self._take(self._memory._replace(touch=touch._replace(
-                position=np.where(free[:, None], x, touch.position),
-                distance=np.where(free, -2 * self.law.theta, touch.distance))))
+            self._take(self._memory._replace(history=history._replace(
+                position=np.where(free[:, None], x, history.position),
+                distance=np.where(free, -2 * self.law.theta, history.distance))))
         return found
 
     def close_penetrated(self, fields: np.ndarray, control: float, most: float) -> bool:
@@ -364,12 +364,12 @@ class FaceContact:
         """
         if self._memory is None or not self.contact.lagged:
             return False
-        old, x, theta = self._memory.touch, self.positions(fields, control), self.law.theta
+        old, x, theta = self._memory.history, self.positions(fields, control), self.law.theta
         late = (old.distance <= -theta) & (self.law.distance(x) > most)
         found = bool(self.comm.allreduce(int(late.sum())))
         if found:
-            new = self.law.tractions(x, old).touch
-            self._take(self._memory._replace(touch=Touch(*(
+            new = self.law.tractions(x, old).history
+            self._take(self._memory._replace(history=ContactHistory(*(
                 np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
         return found
 
@@ -392,12 +392,12 @@ class FaceContact:
         self._memory = memory
         if self.contact.present_area and memory is not None:
             self._harden(memory.penalty)
-        self.increment = Increment(self.law, self.touch)
+        self.increment = Increment(self.law, self.history)
 
     def save(self, memory: Memory) -> dict[str, np.ndarray]:
         """Return the history variables of all ranks as arrays, with the reference position of each point."""
-        parts = self.comm.allgather((self.points, *memory.touch, memory.arrived, memory.penalty))
-        names = ("points", *memory.touch._fields, "arrived", "penalty")
+        parts = self.comm.allgather((self.points, *memory.history, memory.arrived, memory.penalty))
+        names = ("points", *memory.history._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> Memory:
@@ -411,10 +411,10 @@ class FaceContact:
         if np.any(away > 1e-9 * self._length):
             raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
         like = self.law.start(self.points)
-        touch = Touch(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
-                        for name in Touch._fields))
+        history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
+                        for name in ContactHistory._fields))
         penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
-        return Memory(touch, np.array(data["arrived"], dtype=bool)[rows], penalty)
+        return Memory(history, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
     def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
@@ -431,11 +431,11 @@ class FaceContact:
         """
         if memory is None:
             return None
-        carrier, touch, theta = Carrier(self.comm, mapping(source.points), self.points), memory.touch, self.law.theta
+        carrier, history = Carrier(self.comm, mapping(source.points), self.points), memory.history
         distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
-                                      (touch.distance, memory.arrived, memory.penalty))
-        touched, position = distance > -source.law.theta, self.positions(x, control)
+                                      (history.distance, memory.arrived, memory.penalty))
+        touched, position, theta = distance > -source.law.theta, self.positions(x, control), self.law.theta
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
-        slip = np.where(touched, carrier.fitted(touch.slip), 0.0)
-        return Memory(Touch(position, np.where(touched, distance * theta / source.law.theta, free), slip, position),
-                      arrived, penalty)
+        slip = np.where(touched, carrier.fitted(history.slip), 0.0)
+        distance = np.where(touched, distance * theta / source.law.theta, free)
+        return Memory(ContactHistory(position, distance, slip, position), arrived, penalty)

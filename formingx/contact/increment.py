@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..physics.contact_law import ContactLaw, Motion, Touch, Tractions
+from ..physics.contact_law import ContactHistory, ContactLaw, Motion, Tractions
 
 
 class Increment:
@@ -20,18 +20,18 @@ class Increment:
 
     Args:
         law: contact law.
-        touch: history variables of the points; None without friction.
+        history: history variables of the points; None without friction.
         start: positions of the points relative to the tool at the last accepted state, shape (n, c), length; None
             without such a state.
         guessed: mask of the points whose contact forces are predicted at the first guess of the iteration, shape (n,).
             The law is first linearised at the guess for these points, and at the start for the others.
     """
 
-    def __init__(self, law: ContactLaw, touch: Touch | None, start: np.ndarray | None = None,
+    def __init__(self, law: ContactLaw, history: ContactHistory | None, start: np.ndarray | None = None,
                  guessed: np.ndarray | None = None):
-        self._law, self._touch = law, touch
-        self._touched = None if start is None else law.touching(start, touch)
-        self._before: Motion | None = None if start is None else law.motion(start, touch)   # in the last iteration
+        self._law, self._history = law, history
+        self._touched = None if start is None else law.touching(start, history)
+        self._before: Motion | None = None if start is None else law.motion(start, history)   # in the last iteration
         self._guessed = guessed
         self._sense: np.ndarray | None = None               # of sliding in the last iteration
         self._last: tuple[np.ndarray, Tractions] | None = None
@@ -48,7 +48,7 @@ class Increment:
             Tractions at the points, with their stiffness.
         """
         if self._last is None or not np.array_equal(x, self._last[0]):
-            self._last = x, self._law.tractions(x, self._touch)
+            self._last = x, self._law.tractions(x, self._history)
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
@@ -61,13 +61,13 @@ class Increment:
             Tractions of the linearised law minus tractions of the law itself, at x, shape (n, c), stress.
         """
         plain = found = self.tractions(x)
-        now = self._law.motion(x, self._touch)
+        now = self._law.motion(x, self._history)
         if self._before is not None:
             expected = self._before.to(x)
             if self._guessed is not None:
                 expected = Motion(*(np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
                                     for a, b in zip(expected, now)))
-            found = self._law.tractions(x, self._touch, self._sense, expected)
+            found = self._law.tractions(x, self._history, self._sense, expected)
             self._last = x, found
         self._sense, self._before, self._guessed = found.sense, now, None
         return found.force - plain.force
@@ -82,7 +82,7 @@ class Increment:
         """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
             return np.zeros(len(self._now[0]), dtype=bool)
-        return self._law.touching(self._now[0], self._touch) & ~self._touched
+        return self._law.touching(self._now[0], self._history) & ~self._touched
 
     @property
     def ramp(self) -> float:
@@ -121,9 +121,9 @@ class Increment:
             Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
             their `Tractions`, linearised at the distances and slips predicted to first order.
         """
-        touch = self._touch and Touch(*(part[points] for part in self._touch))
+        history = self._history and ContactHistory(*(part[points] for part in self._history))
         law, x, predicted = self._law.part(points), self._now[0][points], self._foreseen(points)
-        return lambda motion: law.tractions(x, touch, None, predicted(motion))
+        return lambda motion: law.tractions(x, history, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Return a function that predicts how deep some points are in the ramp after a further motion.

@@ -108,7 +108,7 @@ def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
     Returns:
         Energy, stress length^3; in plane strain per depth, stress length^2.
     """
-    return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.touch))
+    return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.history))
 
 
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:

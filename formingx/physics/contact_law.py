@@ -32,7 +32,7 @@ class ContactStatus(IntEnum):
     FREE = 2
 
 
-class Touch(NamedTuple):
+class ContactHistory(NamedTuple):
     """History variables of n contact points at the last accepted state, relative to the tool.
 
     Attributes:
@@ -58,13 +58,13 @@ class Tractions:
         tangential: tangential tractions T, shape (n,), stress.
         sense: sense of sliding, 1 or -1 along the tangent of the tool, 0 for a sticking point, shape (n,).
         stiffness: function that computes the property `stiffness` when it is first used.
-        touch: function that computes the property `touch` when it is first used.
+        history: function that computes the property `history` when it is first used.
     """
 
     def __init__(self, force: np.ndarray, normal: np.ndarray, tangential: np.ndarray, sense: np.ndarray,
-                 stiffness: Callable[[], np.ndarray], touch: Callable[[], Touch]):
+                 stiffness: Callable[[], np.ndarray], history: Callable[[], ContactHistory]):
         self.force, self.normal, self.tangential, self.sense = force, normal, tangential, sense
-        self._stiffness, self._touch = stiffness, touch
+        self._stiffness, self._history = stiffness, history
 
     @cached_property
     def stiffness(self) -> np.ndarray:
@@ -72,9 +72,9 @@ class Tractions:
         return self._stiffness()
 
     @cached_property
-    def touch(self) -> Touch:
+    def history(self) -> ContactHistory:
         """History variables that hold after the state with these tractions is accepted."""
-        return self._touch()
+        return self._history()
 
     @property
     def status(self) -> np.ndarray:
@@ -142,7 +142,7 @@ class ContactLaw:
         elastic_slip: elastic slip at which a point begins to slide, length.
         shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
         has_friction: True if tractions depend on the slip.
-        remembers: True if tractions depend on the history variables (`Touch`).
+        remembers: True if tractions depend on the history variables (`ContactHistory`).
         pulls: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
         predictable: True if the law has `friction` and `depth`, as `formingx.physics.penalty.Law`; several gaps may
             then close in one step.
@@ -161,11 +161,11 @@ class ContactLaw:
         """True, or a mask of shape (n,), for points that never slide; used only with friction."""
         return False
 
-    def start(self, x: np.ndarray) -> Touch:
+    def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points that begin at positions x, shape (n, c), length."""
         raise NotImplementedError
 
-    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+    def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         """Return a mask of the points that are in contact with the tool.
 
         Args:
@@ -177,7 +177,7 @@ class ContactLaw:
         """
         raise NotImplementedError
 
-    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+    def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips of the points with their gradients; by default 0, for a linear law.
 
         Args:
@@ -189,7 +189,7 @@ class ContactLaw:
         """
         return Motion(x, np.zeros(len(x)), np.zeros_like(x), np.zeros(len(x)), np.zeros_like(x))
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+    def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the contact tractions at the points.
 
@@ -204,7 +204,7 @@ class ContactLaw:
         """
         raise NotImplementedError
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
         """Return the derivative of the tractions by the positions at an accepted state, towards the next step.
 
         A law with a ramp gives points that have just closed the stiffness that they have further inside the ramp.
@@ -219,7 +219,7 @@ class ContactLaw:
         """
         return self.tractions(x, old).stiffness
 
-    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
+    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the circumferential traction by the circumferential motion.
 
         The second variation of non-axisymmetric modes of an axisymmetric body uses this stiffness.
@@ -268,7 +268,7 @@ class ContactLaw:
         """
         return np.zeros(len(d)), np.zeros(len(d))
 
-    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+    def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
         """Return the energy of the normal tractions per unit reference area; by default 0.
 
         Args:
@@ -325,7 +325,7 @@ class NormalLaw(ContactLaw):
         """
         raise NotImplementedError
 
-    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+    def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
         return self.k * self.stored(self.distance(x))
 
     def distance(self, x: np.ndarray) -> np.ndarray:
@@ -344,17 +344,17 @@ class NormalLaw(ContactLaw):
             self._near = positions, Nearest(near.distance - self.shift, near.normal, near.curvature)
         return self._near[1]
 
-    def start(self, x: np.ndarray) -> Touch:
-        return Touch(x.copy(), self.distance(x), np.zeros(len(x)), x.copy())
+    def start(self, x: np.ndarray) -> ContactHistory:
+        return ContactHistory(x.copy(), self.distance(x), np.zeros(len(x)), x.copy())
 
-    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+    def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         return self.distance(x) > -self.theta
 
-    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+    def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         near = self.nearest(x)
         return Motion(x, near.distance, near.normal, np.zeros(len(x)), 0 * x)
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+    def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         near, zero = self.nearest(x), np.zeros(len(x))
         n, t, at = near.normal, near.tangent, near.distance if expected is None else expected.distance
@@ -363,7 +363,7 @@ class NormalLaw(ContactLaw):
         return Tractions(N[:, None] * n, N, zero, zero, lambda: outer(n, (self.k * slope)[:, None] * n)
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
-    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
+    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative N n_r/r of the circumferential traction by the circumferential motion.
 
         Args:

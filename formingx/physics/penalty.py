@@ -8,7 +8,7 @@ import numpy as np
 
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
-from .contact_law import Motion, NormalLaw, Touch, Tractions, outer
+from .contact_law import ContactHistory, Motion, NormalLaw, Tractions, outer
 
 STICKS = 100.0
 """Coefficient of friction from which on a point counts as sticking."""
@@ -41,7 +41,7 @@ class Law(NormalLaw):
         self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
         self.elastic_slip, self.pulls = elastic_slip, pulls
         self._set_friction(mu)
-        self._slid: tuple[Nearest, Touch, tuple] | None = None      # last geometry and history, and their slip
+        self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """Return a copy of the law with other coefficients of friction.
@@ -62,7 +62,7 @@ class Law(NormalLaw):
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.remembers = self.has_friction or self.pulls
 
-    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+    def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         """Return the mask of the points in contact with the tool, including bonded points.
 
         Args:
@@ -74,7 +74,7 @@ class Law(NormalLaw):
         """
         return (self.distance(x) > -self.theta) | self._bonded(old)
 
-    def _bonded(self, old: Touch | None) -> np.ndarray | bool:
+    def _bonded(self, old: ContactHistory | None) -> np.ndarray | bool:
         """Return the mask of the points that were in contact and cannot separate, shape (n,); False for no point."""
         return False if not self.pulls or old is None else old.distance > -self.theta
 
@@ -120,7 +120,7 @@ class Law(NormalLaw):
         grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
         return np.where(sticks, np.inf, grows)
 
-    def energy(self, x: np.ndarray, old: Touch | None = None) -> np.ndarray:
+    def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
         """Return the energy of the normal traction, the integral of N over the distance.
 
         Args:
@@ -136,7 +136,7 @@ class Law(NormalLaw):
         inside = np.clip(d + theta, 0.0, 2 * theta)
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
-    def start(self, x: np.ndarray) -> Touch:
+    def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points that have not slipped.
 
         Args:
@@ -148,9 +148,9 @@ class Law(NormalLaw):
         d = self.distance(x)
         if self.pulls:                                      # at the outer edge of the ramp it sticks, free of stress
             d = np.where(np.abs(d / self.theta + 1) < RAMP_EDGE, -(1 - RAMP_EDGE) * self.theta, d)
-        return _touch(x.copy(), d, np.zeros(len(x)))
+        return _history(x.copy(), d, np.zeros(len(x)))
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+    def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the contact tractions at points.
 
@@ -174,7 +174,7 @@ class Law(NormalLaw):
         zero: np.ndarray = np.zeros(len(x))
         if centre.max(initial=-np.inf) <= -self.theta and not np.any(bonded):         # no point touches
             return Tractions(np.zeros(x.shape), zero, zero, zero, lambda: np.zeros((*x.shape, x.shape[1])),
-                             lambda: _touch(x, d, zero))
+                             lambda: _history(x, d, zero))
         F, slope = self.ramp(centre, bonded)
         pressed, ahead = k * F, d - centre
         N = pressed + k * slope * ahead
@@ -182,7 +182,7 @@ class Law(NormalLaw):
         kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.remembers else d            # stays in contact
         if not self.has_friction:
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
-                             + outer(t, (pressed * bend)[:, None] * t), lambda: _touch(x, kept_at, zero))
+                             + outer(t, (pressed * bend)[:, None] * t), lambda: _history(x, kept_at, zero))
         assert old is not None
         g, dg = self._slip(x, near, t, old)
         predicted = g if expected is None else expected.slip
@@ -204,11 +204,11 @@ class Law(NormalLaw):
             return (outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
                     + outer(t, (pressed * bend)[:, None] * t + dT))
 
-        def touch() -> Touch:
+        def history() -> ContactHistory:
             kept = np.divide(T, s, out=zero.copy(), where=s > 0)
             kept *= 1 + 1e-9 * np.abs(sense_now)             # sliding points go on sliding, in spite of round-off
-            return _touch(x, kept_at, kept)
-        return Tractions(force, N, T, sense_now, stiffness, touch)
+            return _history(x, kept_at, kept)
+        return Tractions(force, N, T, sense_now, stiffness, history)
 
     def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the tangential stiffness T/g of elastic slip, and its derivative by the distance, shape (n,) each.
@@ -229,7 +229,7 @@ class Law(NormalLaw):
         return (np.where(sticks, k * slope, limit / self.elastic_slip),
                 np.where(sticks, rising, grows / self.elastic_slip * k * slope))
 
-    def stiffness_round(self, x: np.ndarray, old: Touch | None, radius: np.ndarray) -> np.ndarray:
+    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         r"""Return the derivative of the circumferential traction with respect to the circumferential motion.
 
         .. math:: \frac{N n_r}{r}
@@ -250,7 +250,7 @@ class Law(NormalLaw):
         F, slope = self.ramp(near.distance, self._bonded(old))
         return turned + np.where(found.sense == 0, self._resistance(near.distance, self.k * F, slope)[0], 0.0)
 
-    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+    def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips of points, with their gradients.
 
         Args:
@@ -264,7 +264,7 @@ class Law(NormalLaw):
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, near.tangent, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
-    def stiffness_ahead(self, x: np.ndarray, old: Touch | None, arrived: np.ndarray) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
         """Return the stiffness at an accepted state towards the next step, in which points that just closed are stiff.
 
         At the outer edge of the ramp a point has no stiffness. The tangent of the path would let such a point slip
@@ -289,7 +289,8 @@ class Law(NormalLaw):
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
-    def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray, old: Touch) -> tuple[np.ndarray, np.ndarray]:
+    def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray,
+              old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
         """Return the elastic slip g that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
 
         The result is stored for repeated calls with the same arguments.
@@ -307,6 +308,6 @@ class Law(NormalLaw):
         return found
 
 
-def _touch(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> Touch:
+def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
     """Return history variables with position x, distance d and elastic slip; a later gap closure is expected at x."""
-    return Touch(x, d, slip, x)
+    return ContactHistory(x, d, slip, x)

@@ -181,7 +181,7 @@ def _flips(problem: Any, attempt: Any) -> int | None:
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
     for contact, a, b in zip(problem.present, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
-        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.touch).sense
+        slides = [contact.law.tractions(contact.positions(x[:n], c), contact.history).sense
                   for x, c in (before, (attempt.x, attempt.control))]
         count += int(np.sum((a != b) | (a & b & (slides[0] != slides[1]))))
     return problem.comm.allreduce(count, MPI.SUM)

@@ -153,7 +153,7 @@ class ContactEventSequence:
         self._n, self._way = n, (x, control, direction, slope)
         start = [face.positions(x[:n], control) for face in faces]
         self._along = [face.moved(direction[:n], slope) for face in faces]
-        self._free = [~face.law.touching(at, face.touch) & (face.rule.area > 0) for face, at in zip(faces, start)]
+        self._free = [~face.law.touching(at, face.history) & (face.rule.area > 0) for face, at in zip(faces, start)]
         self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
         self._closures: list[GapClosure] = []
@@ -261,7 +261,7 @@ class ContactEventSequence:
         force = self._points.at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
         status = self._points.at([t.sense for t in found]).astype(int)
         status[self._points.friction == 0] = ContactStatus.SLIDES
-        slip = self._points.at([np.zeros(len(face.points)) if face.touch is None else face.touch.slip
+        slip = self._points.at([np.zeros(len(face.points)) if face.history is None else face.history.slip
                                 for face in self._faces])
         piece = self._pieces[0].of(len(status))
         place = self._points.at(piece.at) - slip[:, None] * self._points.near(piece.at, force).tangent

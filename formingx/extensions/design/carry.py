@@ -155,28 +155,28 @@ class _StateTransfer:
                                        *(entry.problem.contacts for entry in self.neighbours)):
             if face.present:
                 face.leave_out(late)
-                free = ~face.law.touching(face.positions(state.x[:n], state.control), face.touch)
+                free = ~face.law.touching(face.positions(state.x[:n], state.control), face.history)
                 for mine in others:
                     mine.leave_out(free | late)
 
     def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Place the perturbed points whose gap closes in a step; return the mask of closures at its end, shape (n,)."""
-        touch, law, n = face.touch, face.law, self.problem.n_owned
+        history, law, n = face.history, face.law, self.problem.n_owned
         zero = np.zeros(len(face.points), dtype=bool)
-        if touch is None or not law.has_friction or not face.present:
+        if history is None or not law.has_friction or not face.present:
             return zero
         distance = law.distance(face.positions(state.x[:n], state.control))
-        arrived = (touch.distance <= -law.theta) & (distance > -law.theta)
-        late = arrived & (np.isnan(touch.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
+        arrived = (history.distance <= -law.theta) & (distance > -law.theta)
+        late = arrived & (np.isnan(history.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
         velocity = face.moved(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
         early = np.flatnonzero(arrived & ~late)
         if len(early):
-            gap = law.part(early).distance(touch.arrival[early])
+            gap = law.part(early).distance(history.arrival[early])
         for entry in self.neighbours:
-            mine, arrival = entry.problem.contacts[number], touch.arrival.copy()
+            mine, arrival = entry.problem.contacts[number], history.arrival.copy()
             if len(early):
-                guess = mine.positions(entry.x[:n], entry.control)[early] + touch.arrival[early] - start[early]
+                guess = mine.positions(entry.x[:n], entry.control)[early] + history.arrival[early] - start[early]
                 arrival[early] = _onto(mine.law.part(early), guess, velocity[early], gap)
             mine.expect_arrivals(arrival)
         return late
@@ -191,22 +191,22 @@ class _StateTransfer:
             if not face.law.remembers or not face.present:
                 continue
             run = state.memory[self.problem.histories.index(face)]
-            free = run.touch.distance <= -face.law.theta
+            free = run.history.distance <= -face.law.theta
             late = np.flatnonzero(self._late[number] if self._late else 0 * free)
             free[late] = True
             for entry in self.neighbours:
                 mine = entry.problem.contacts[number]
                 memory = mine.get()
                 assert memory is not None
-                touch = memory.touch._replace(distance=run.touch.distance,
-                                              slip=np.where(free, run.touch.slip, memory.touch.slip))
+                history = memory.history._replace(distance=run.history.distance,
+                                              slip=np.where(free, run.history.slip, memory.history.slip))
                 if len(late):
-                    touch = touch._replace(position=touch.position.copy())
-                    touch.position[late] = _onto(
+                    history = history._replace(position=history.position.copy())
+                    history.position[late] = _onto(
                         mine.law.part(late), mine.positions(entry.x[:n], entry.control)[late],
                         self._velocity[number][late],
-                        run.touch.distance[late])
-                mine.put(memory._replace(touch=touch, arrived=run.arrived))
+                        run.history.distance[late])
+                mine.put(memory._replace(history=history, arrived=run.arrived))
         for entry in self.neighbours:
             entry.memory = entry.problem.memory
         self._late = []

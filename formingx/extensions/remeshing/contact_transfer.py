@@ -12,7 +12,7 @@ import numpy as np
 
 from ...contact.face import FaceContact, Memory
 from ...contact.rule import Lobatto
-from ...physics.contact_law import Touch
+from ...physics.contact_law import ContactHistory
 
 
 class ContactState(NamedTuple):
@@ -56,7 +56,7 @@ class ContactState(NamedTuple):
             ends = rule.edges[(rule.edges == axis).any(1), :2].ravel()
             beside = ends[ends != axis][0]
             traction[axis], touches[axis], d[axis] = (traction[beside, 0], 0.0), touches[beside], d[beside]
-        slip = 0.0 if face.touch is None else np.abs(face.touch.slip).max(initial=0.0) / face.thickness
+        slip = 0.0 if face.history is None else np.abs(face.history.slip).max(initial=0.0) / face.thickness
         return cls(x, d, touches, traction, pairs, slip)
 
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -123,13 +123,13 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
     law, zero = face.law, np.zeros(len(x))
     slip, arrived = zero, np.zeros(len(x), dtype=bool)
     if law.has_friction:
-        tangential = law.tractions(x, Touch(x, depth, zero + 1e-9 * theta, x)).tangential      # of a slip 1e-9 theta
+        tangential = law.tractions(x, ContactHistory(x, depth, zero + 1e-9 * theta, x)).tangential
         slip = np.divide(friction * share * 1e-9 * theta, tangential, out=zero.copy(),
                          where=touches & (tangential != 0))
         most = 2 * old.slip * face.thickness               # no friction without pressure
         slip = np.clip(slip, -most, most)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
-    face.put(Memory(Touch(x, distance, slip, x), arrived, np.ones(len(x))))
+    face.put(Memory(ContactHistory(x, distance, slip, x), arrived, np.ones(len(x))))
 
 
 def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...physics.contact_law import ContactStatus, Motion, Touch, Tractions, outer
+from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
 from .lagged_stick import SMALL_GAP, LaggedStick
 
 _LEAST = 0.1               # pressure that limits friction, over the pressure at the last state, at least
@@ -48,8 +48,9 @@ class Near(NamedTuple):
 class LaggedFriction(LaggedStick):
     """The `ContactLaw` of this module.
 
-    `Touch.position` is the position at the last accepted state, and `slip` the elastic slip g, shape (n, 3), length. Of
-    points that touch `distance` is the pressure there over k, and the depth of `arrival` is N_0/k.
+    Its history variables (`ContactHistory`): `position` is the position at the last accepted state, and `slip` the
+    elastic slip g, shape (n, 3), length. Of points in contact, `distance` is the pressure there over k, and
+    the depth of `arrival` is N_0/k.
 
     Args:
         tool: gives its distance with first and second derivatives (`near`).
@@ -66,7 +67,7 @@ class LaggedFriction(LaggedStick):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
         self._last: tuple[np.ndarray, Near] | None = None
-        self._ahead: tuple[Touch, np.ndarray] | None = None
+        self._ahead: tuple[ContactHistory, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
         """Return the law of some of the points.
@@ -79,7 +80,7 @@ class LaggedFriction(LaggedStick):
         """
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
-    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
+    def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of points in contact that are in tension, that is outside the tool.
 
         Args:
@@ -91,21 +92,21 @@ class LaggedFriction(LaggedStick):
         """
         return self.held(old) & (self.distance(x) < -SMALL_GAP * self.theta)
 
-    def start(self, x: np.ndarray) -> Touch:
+    def start(self, x: np.ndarray) -> ContactHistory:
         return super().start(x)._replace(slip=np.zeros_like(x))
 
-    def pressure(self, touch: Touch) -> np.ndarray:
+    def pressure(self, history: ContactHistory) -> np.ndarray:
         """Return the contact pressure of a state.
 
         Args:
-            touch: history variables.
+            history: history variables.
 
         Returns:
             Pressure N, shape (n,), stress.
         """
-        return np.asarray(self.k * np.maximum(touch.distance, 0.0))
+        return np.asarray(self.k * np.maximum(history.distance, 0.0))
 
-    def pressure_ahead(self, old: Touch) -> np.ndarray:
+    def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
         """Return the pressure that limits friction in the next step.
 
         Args:
@@ -120,7 +121,7 @@ class LaggedFriction(LaggedStick):
             self._ahead = old, self.k * np.clip(depth, _LEAST * now, _MOST * now)
         return self._ahead[1]
 
-    def at_pressure(self, old: Touch, pressure: np.ndarray) -> np.ndarray:
+    def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
         """Return positions of gap closure for which `pressure_ahead` returns a given pressure.
 
         Args:
@@ -128,12 +129,12 @@ class LaggedFriction(LaggedStick):
             pressure: the pressure, shape (n,), stress.
 
         Returns:
-            `Touch.arrival`, shape (n, 3), length.
+            `ContactHistory.arrival`, shape (n, 3), length.
         """
         change = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + change[:, None] * self.tool.near(old.position).normal)
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+    def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions, linearised at the predicted positions; see `ContactLaw`.
 
@@ -174,25 +175,25 @@ class LaggedFriction(LaggedStick):
             found[rows] = self.k * (outer(n, n) + depth[:, None, None] * near.hessian) + stiff[:, None, None] * dg
             return found
 
-        def touch() -> Touch:
+        def history() -> ContactHistory:
             """Return the new history variables."""
             slip = np.zeros_like(x)
             slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
             depth = self.distance(x)
             depth = np.where(depth > -self.theta, 0.0, np.minimum(depth, -2 * self.theta))
             depth[rows] = np.maximum(self.distance(x)[rows], 0.0)
-            return Touch(x.copy(), depth, slip, x.copy())
+            return ContactHistory(x.copy(), depth, slip, x.copy())
         force, normal, tangential, sliding = np.zeros_like(x), zero.copy(), zero.copy(), zero.copy()
         force[rows] = self.k * d[:, None] * n + stiff[:, None] * g
         normal[rows], tangential[rows] = self.k * d, stiff * size
         angle = np.arctan2(*(np.einsum("ni,ni->n", way, e) for e in basis[::-1]))
         sliding[rows] = np.where(slides, np.where(angle == 0, 2 * np.pi, angle), 0.0)
-        found = _Tractions(force, normal, tangential, sliding, stiffness, touch)
+        found = _Tractions(force, normal, tangential, sliding, stiffness, history)
         if at is not x:
             found.force = force + np.einsum("nij,nj->ni", found.stiffness, x - at)
         return found
 
-    def near(self, x: np.ndarray, old: Touch) -> tuple[np.ndarray, Near]:
+    def near(self, x: np.ndarray, old: ContactHistory) -> tuple[np.ndarray, Near]:
         """Return the points in contact and their geometry relative to the tool.
 
         Args:
@@ -205,7 +206,7 @@ class LaggedFriction(LaggedStick):
         rows = np.flatnonzero(self.held(old))
         return rows, self._near(x[rows])
 
-    def motion(self, x: np.ndarray, old: Touch | None) -> Motion:
+    def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
         rows, near = self.near(x, old)

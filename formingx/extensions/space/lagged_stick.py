@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...physics.contact_law import ContactLaw, Motion, Touch, Tractions
+from ...physics.contact_law import ContactHistory, ContactLaw, Motion, Tractions
 from ...tools.tool import RigidTool
 
 _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
@@ -34,8 +34,8 @@ SMALL_GAP = 1e-3
 class LaggedStick(ContactLaw):
     """Contact law of this module.
 
-    For a sticking point, `Touch.position` is the sticking position, and `distance` is 0. For a free point they are its
-    position at the last accepted state and its distance, below -theta.
+    For a sticking point, `ContactHistory.position` is the sticking position, and `distance` is 0. For a free point they
+    are its position at the last accepted state and its distance, below -theta.
 
     Args:
         tool: tool with a signed distance.
@@ -62,7 +62,7 @@ class LaggedStick(ContactLaw):
         """
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
-    def held(self, old: Touch) -> np.ndarray:
+    def held(self, old: ContactHistory) -> np.ndarray:
         """Return the mask of the sticking points.
 
         Args:
@@ -73,7 +73,7 @@ class LaggedStick(ContactLaw):
         """
         return old.distance > -self.theta
 
-    def pulling(self, x: np.ndarray, old: Touch) -> np.ndarray:
+    def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of sticking points that are in tension, that is outside the tool, and may separate.
 
         Args:
@@ -87,7 +87,7 @@ class LaggedStick(ContactLaw):
         most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
         return self.separates & self.held(old) & (-self.distance(x) > most)
 
-    def touching(self, x: np.ndarray, old: Touch | None) -> np.ndarray:
+    def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         return np.zeros(len(x), dtype=bool) if old is None else self.held(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ class LaggedStick(ContactLaw):
             self._found = [(x.copy(), found), *self._found[:2]]
         return found
 
-    def start(self, x: np.ndarray) -> Touch:
+    def start(self, x: np.ndarray) -> ContactHistory:
         """Return the initial history variables; points inside the tool at the start stick there.
 
         Args:
@@ -118,9 +118,9 @@ class LaggedStick(ContactLaw):
         """
         d = self.distance(x)
         held = d > -self.theta
-        return Touch(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
+        return ContactHistory(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
 
-    def tractions(self, x: np.ndarray, old: Touch | None, sense: np.ndarray | None = None,
+    def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions of the sticking points; their `normal` is 1, as no normals are computed.
 
@@ -141,9 +141,9 @@ class LaggedStick(ContactLaw):
             found = np.zeros((*x.shape, x.shape[1]))
             found[held] = self.k * np.eye(x.shape[1])
             return found
-        return Tractions(force, held.astype(float), zero, zero, stiffness, lambda: self._touch(x, old, held))
+        return Tractions(force, held.astype(float), zero, zero, stiffness, lambda: self._history(x, old, held))
 
-    def _touch(self, x: np.ndarray, old: Touch, held: np.ndarray) -> Touch:
+    def _history(self, x: np.ndarray, old: ContactHistory, held: np.ndarray) -> ContactHistory:
         """Return the history variables of an accepted state."""
         d = self.distance(x)
         new = ~held & (d > -self.theta)
@@ -159,4 +159,4 @@ class LaggedStick(ContactLaw):
                 low, high = np.where(inside, low, middle), np.where(inside, middle, high)
             position[rows] = a + high[:, None] * (b - a)
         free = np.minimum(d, -2 * self.theta)
-        return Touch(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())
+        return ContactHistory(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())

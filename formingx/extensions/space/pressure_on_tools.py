@@ -70,9 +70,9 @@ class PressureOnTools:
             function.x.array[:] = 0
         self._at.x.array[:] = surface.length * surface.w.x.array
         for face in surface.faces:
-            if face.present and not face.contact.sticks and face.touch is not None:
-                held, near = face.law.near(face.positions(fields, control), face.touch)
-                pressed = face.law.pressure(face.touch)[held]
+            if face.present and not face.contact.sticks and face.history is not None:
+                held, near = face.law.near(face.positions(fields, control), face.history)
+                pressed = face.law.pressure(face.history)[held]
                 touches = np.column_stack([np.ones(len(held)), pressed, np.zeros(len(held))])
                 for function, values in zip(functions, (touches, near.normal, *near.hessian.transpose(2, 0, 1))):
                     function.x.array[face.rule.dofs[held]] = values

@@ -50,7 +50,7 @@ def furthest(path: Any) -> Resticking | None:
         definition = contact.contact
         if definition.lagged or not (definition.sticks and definition.separates):
             continue
-        touches = [state.memory[number].touch for state in path.segments[-1].states
+        touches = [state.memory[number].history for state in path.segments[-1].states
                    if len(state.memory) > number and state.memory[number] is not None]
         rows = gathered(contact.comm, np.column_stack([contact.points, _shifts(contact, touches)]))
         again = rows[rows[:, 2] > 0]
@@ -71,11 +71,11 @@ def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
     """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
-    for touch in touches:
-        touching = touch.distance > -contact.law.theta
+    for history in touches:
+        touching = history.distance > -contact.law.theta
         again = touching & ~stuck & ~np.isnan(last[:, 0])
-        total[again] += np.linalg.norm(touch.position[again] - last[again], axis=1)
-        last[touching], stuck = touch.position[touching], touching
+        total[again] += np.linalg.norm(history.position[again] - last[again], axis=1)
+        last[touching], stuck = history.position[touching], touching
     return np.divide(total, contact.rule.lengths, out=np.zeros(len(total)), where=contact.rule.lengths > 0)
 
 

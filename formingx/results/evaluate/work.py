@@ -271,10 +271,10 @@ class EnergyBalance:
             return lost
         with problem.state_context(a):
             for c in (c for c in contacts if c in problem.present):
-                before[c] = c.positions(a.x[: problem.n_owned], a.control), c.touch, _friction_of(c, a, problem)
+                before[c] = c.positions(a.x[: problem.n_owned], a.control), c.history, _friction_of(c, a, problem)
         with problem.state_context(b):
-            for c, (x, touch, T) in before.items():
-                slid = _slip_of(c.law, x, touch, c.positions(b.x[: problem.n_owned], b.control)) - c.touch.slip
+            for c, (x, history, T) in before.items():
+                slid = _slip_of(c.law, x, history, c.positions(b.x[: problem.n_owned], b.control)) - c.history.slip
                 lost += self._sum(c.rule.area * (T + _friction_of(c, b, problem)) / 2 * slid)
         return lost
 
@@ -318,16 +318,16 @@ def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
 
-def _slip_of(law: Any, x: np.ndarray, touch: Any, end: np.ndarray) -> np.ndarray:
+def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarray:
     """Return the slip of points that moved straight from x to `end`, shape (n, 2), while they touched, shape (n,)."""
     nearest, outer_edge = law.nearest(end), -law.theta
-    touched, touches = touch.distance > outer_edge, nearest.distance > outer_edge
-    approach = nearest.distance - touch.distance
-    crosses = np.divide(outer_edge - touch.distance, approach, out=np.zeros(len(approach)), where=approach != 0)
+    touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
+    approach = nearest.distance - history.distance
+    crosses = np.divide(outer_edge - history.distance, approach, out=np.zeros(len(approach)), where=approach != 0)
     crosses = np.clip(crosses, 0.0, 1.0)
     share = np.where(touched, np.where(touches, 1.0, crosses), np.where(touches, 1 - crosses, 0.0))
     motion = share[:, None] * (end - x)
-    return touch.slip + np.sign(np.einsum("ni,ni->n", nearest.tangent, motion)) * np.hypot(*motion.T)
+    return history.slip + np.sign(np.einsum("ni,ni->n", nearest.tangent, motion)) * np.hypot(*motion.T)
 
 
 def _entry_name(scene: Any, item: Any) -> str:
