@@ -54,10 +54,10 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             wide. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
             sheet, the `Scene` chooses other elements: short ones where the sheet reaches a fillet of the tool,
             and fewer through the thickness (docs/accuracy.md). A given `grading` or `concentrate` is kept.
-        elements: (along the radius, through each layer), in place of `accuracy`. The second entry may be a list with an
-            entry for each layer. An entry is a count, or relative sizes of elements from the bottom up, as in (60, [[1,
-            2, 4], 2]). A single layer needs no outer list: (60, [1, 2, 4]). Each rectangle is divided into two
-            triangles.
+        elements: (number along the radius, division of the layers), in place of `accuracy`. The division is a number of
+            elements through each layer, or a list with an entry for each layer. An entry is a number, or relative sizes
+            of elements from the bottom up, as in (60, [[1, 2, 4], 2]). A single layer needs no outer list: (60, [1, 2,
+            4]). Each rectangle is divided into two triangles.
         grading: size of the element at the rim over the element at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: element size there over the largest}, for example around
             the edge of a plug. Sizes grow linearly with the distance from these radii, where nodes are placed.
@@ -101,7 +101,14 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
-    """Return the numbers of elements of a disc along the radius and through each layer, nearly square if thick."""
+    """Return the number of elements along the radius of a disc, and the numbers through its layers.
+
+    Args:
+        accuracy: "draft", "standard" or "fine".
+        low: inner radius, length.
+        high: outer radius, length.
+        layers: {name: thickness as a function of radii}.
+    """
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
@@ -115,9 +122,15 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
 
 def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coordinates: np.ndarray,
                  through: list[np.ndarray], body: Callable[[np.ndarray, list[np.ndarray]], Mesh]) -> Mesh:
-    """Return the mesh with a `Preset`, from which a `Scene` makes the same body of other elements.
+    """Return the mesh with a `Preset`, with which a `Scene` divides the same body into other elements.
 
-    body: function of (ends of the columns, relative ends of elements through each layer) that returns the mesh.
+    Args:
+        mesh: the mesh.
+        accuracy: "draft", "standard" or "fine".
+        layers: {name: thickness as a function of coordinates}.
+        coordinates: coordinates along the sheet at which the largest thickness is sought, shape (n,).
+        through: ends of the elements through each layer on [0, 1].
+        body: function of ends of the columns and ends of the elements through each layer on [0, 1]; returns the mesh.
     """
     thickness = np.array([thickness_at(coordinates).max() for thickness_at in layers.values()])
     return replace(mesh, preset=Preset(accuracy, thickness, tuple(len(ends) - 1 for ends in through), lambda ends, n:
@@ -126,6 +139,11 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
 
 def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
     """Return the argument `concentrate` of a disc, sorted by radius.
+
+    Args:
+        concentrate: {reference radius: element size there over the largest}.
+        low: inner radius of the disc, length.
+        high: outer radius, length.
 
     Raises:
         InputError: a radius is not on the disc, or a size is not between 0 and 1.
@@ -144,7 +162,13 @@ def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[
 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
-    """Return the ends of `along` elements with given relative sizes at some radii, shape (along + 1,).
+    """Return the ends of `along` elements from radius `low` to radius `high`, shape (along + 1,), length.
+
+    Args:
+        low: smallest radius, length.
+        high: largest radius, length.
+        along: number of elements.
+        sizes: {radius: element size there over the largest}; each of these radii is an end.
 
     Raises:
         InputError: there are fewer elements than intervals between these radii.
@@ -177,9 +201,9 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     (second-order geometry).
 
     Args:
-        inner_radius: length.
+        inner_radius: inner radius, length.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
-        elements: (from the axis to the equator, through each layer), as in `disc`.
+        elements: (number from the axis to the equator, division of the layers as in `disc`).
         grading: size of the element at the equator over the element at the axis.
         comm: MPI communicator.
 
@@ -215,8 +239,8 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
             -inner_radius to `length`. The thickness is measured along the normal.
         length: length of the tube above the half sphere, length.
         accuracy: "draft", "standard" or "fine": a `Scene` with a tool chooses the elements, as for a `disc`.
-        elements: (from the axis to the neck, through each layer), as in `disc`, in place of `accuracy`; default
-            (60, 2).
+        elements: (number from the axis to the neck, division of the layers as in `disc`), in place of `accuracy`;
+            default (60, 2).
         grading: size of the element at the neck over the element at the axis.
         comm: MPI communicator.
 
@@ -245,7 +269,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
 
     def inner(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the height in the tube, length, and the angle in the bottom, radians, shape (n,) each."""
+        """Return the height above the half sphere, length, and the angle in it, radians, shape (n,) each."""
         return (length * np.maximum(1 - from_neck / node, 0.0),
                 np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0))
 
@@ -272,8 +296,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     Args:
         inner: corners (R, Z) of the inner face, shape (n, 2), n at least 2, length.
         outer: corners (R, Z) of the outer face, shape (n, 2), length.
-        elements: (between successive corners, through each layer). The first entry is a count or a list of n - 1
-            counts, the second as in `disc`.
+        elements: (number between successive corners, division of the layers as in `disc`). The first entry may be a
+            list of n - 1 numbers, one for each interval.
         layers: {layer name: its fraction of the distance from `inner` to `outer`, in any unit}; default one layer,
             `wall`.
         comm: MPI communicator.
@@ -319,10 +343,14 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
 
 def _points(name: str, points: Any) -> np.ndarray:
-    """Return points as an array, shape (n, 2), checked.
+    """Return points (R, Z) as an array, shape (n, 2), length.
+
+    Args:
+        name: name of the argument, for messages.
+        points: the points, a sequence of pairs.
 
     Raises:
-        InputError: there are fewer than two, or one is not finite.
+        InputError: there are fewer than two points, or a coordinate is not finite.
     """
     found = np.array(as_points(name, points))
     if len(found) < 2 or not np.all(np.isfinite(found)):
@@ -338,9 +366,10 @@ def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray
 
     Args:
         kind: name of the body, for messages.
-        place: see `Columns`.
-        ends: see `Columns`.
-        fixed: see `Columns`.
+        place: function of coordinates along the body, shape (k,), that returns the nodes of all rows, shape
+            (rows, k, 2), length.
+        ends: ends of the columns of elements in this coordinate, shape (n + 1,).
+        fixed: ends that other divisions of the body keep, shape (m,).
         layers: names of the layers.
         through: ends of the elements through each layer on [0, 1].
         sides: names of the boundaries left, right, bottom and top.

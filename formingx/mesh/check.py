@@ -18,7 +18,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     Args:
         points: nodes, shape (n, 2), length.
         triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
-        what: beginning of the message.
+        what: name of the mesh, with which the message begins.
 
     Raises:
         InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet without
@@ -55,7 +55,10 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return the number of the connected piece of each element, shape (m,); piece 0 contains the first node."""
+    """Return the number of the connected piece of the body that contains each triangle, shape (m,).
+
+    triangles: node numbers of the corners, shape (m, 3). Piece 0 contains the lowest node number.
+    """
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:
@@ -68,6 +71,11 @@ def _pieces(triangles: np.ndarray) -> np.ndarray:
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Check that each edge has one mid-edge node, which is no corner and belongs to no other edge.
+
+    Args:
+        points: nodes (R, Z), shape (n, 2), length.
+        triangles: node numbers, shape (m, 3 or 6); triangles of three nodes pass.
+        what: name of the mesh, for messages.
 
     Raises:
         InputError: an edge violates this.
@@ -89,13 +97,13 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
-    """Return True for triangles whose Jacobian changes its sign between nodes.
+    """Return True for triangles whose Jacobian determinant changes its sign between nodes.
 
     Args:
-        nodes: shape (m, 3 or 6, 2), length.
+        nodes: nodes (R, Z) of each triangle, corners first, shape (m, 3 or 6, 2), length.
 
     Returns:
-        Shape (m,).
+        Booleans, shape (m,); False for triangles of three nodes.
     """
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
@@ -111,7 +119,13 @@ def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
 
 
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
-    """Return the edges that belong to one element only, shape (k, 2).
+    """Return the edges that belong to one element only, as node numbers, shape (k, 2).
+
+    Args:
+        points: nodes (R, Z), shape (n, 2), length.
+        triangles: node numbers of the corners, shape (m, 3).
+        turn: 1 for counter-clockwise triangles, -1 for clockwise ones, shape (m,).
+        what: name of the mesh, for messages.
 
     Raises:
         InputError: two elements lie on the same side of an edge.
@@ -129,11 +143,11 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """Return a point where edges cross or touch without sharing a node, shape (2,), or None.
+    """Return the middle of an edge that crosses or touches another without sharing a node, shape (2,), or None.
 
     Args:
-        points: shape (n, 2), length.
-        edges: numbers of their ends, shape (k, 2).
+        points: ends of the edges, shape (n, 2), length.
+        edges: numbers of the ends of each edge, shape (k, 2).
     """
     pairs = next(crossings(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
@@ -143,11 +157,11 @@ def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
     """Yield the pairs of edges that cross or touch without sharing a node.
 
     Args:
-        points: shape (n, 2), length.
-        edges: numbers of their ends, shape (k, 2).
+        points: ends of the edges, shape (n, 2), length.
+        edges: numbers of the ends of each edge, shape (k, 2).
 
     Yields:
-        Numbers of edges, shape (m, 2), m > 0.
+        Numbers of the two edges of each pair, shape (m, 2), m > 0.
     """
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = 1e-9 * float((high - low).max())
@@ -159,20 +173,20 @@ def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
         crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
         for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
                                          (d, f[:, 1], a, b, e)):
-            overlap = q - p
-            length = (overlap**2).sum(1)
-            t = np.clip(((point - p) * overlap).sum(1) / length, 0, 1)
-            gap = ((point - p - t[:, None] * overlap) ** 2).sum(1)
+            edge = q - p
+            length = (edge**2).sum(1)
+            t = np.clip(((point - p) * edge).sum(1) / length, 0, 1)
+            gap = ((point - p - t[:, None] * edge) ** 2).sum(1)
             crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
         if crosses.any():
             yield np.column_stack([first, second])[crosses]
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return the cross products of vectors in the plane."""
+    """Return the cross products u x v of vectors in the plane, shape (...), from shapes (..., 2)."""
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
 def _show(point: np.ndarray) -> str:
-    """Return a point as text."""
+    """Return a point, shape (2,), as text for messages."""
     return f"(R, Z) = ({point[0]:.6g}, {point[1]:.6g})"

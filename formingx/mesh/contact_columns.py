@@ -1,7 +1,8 @@
 """Elements of a sheet that tools touch, for `accuracy=` of `disc` and `parison`.
 
 The wall of a formed sheet is least accurate where the sheet lies on a fillet of a tool. The columns of elements there
-are short; elsewhere few are enough. `fillets_in_sheet` estimates which part of the sheet reaches a fillet.
+are short; elsewhere long columns are accurate enough. `fillets_in_sheet` estimates the part of the sheet that reaches
+a fillet.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ class Fineness(NamedTuple):
     """Sizes of the elements of one accuracy.
 
     Attributes:
-        along: number of columns along the sheet, if it were free of fillets and ends.
-        fillet: length of a deformed column over the geometric mean of fillet radius and wall.
+        along: number of columns along a sheet without fillets and constrained ends.
+        fillet: length of a deformed column on a fillet over the geometric mean of fillet radius and wall thickness.
         through: smallest number of elements through the sheet.
-        even: length from a constrained end with columns of the shortest length, over the thickness.
+        even: distance from a constrained end up to which the columns have their shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
     """
 
@@ -44,40 +45,43 @@ _THICKEST = 1 / 10
 _SHORTEST = 1 / 16
 """Smallest over largest length of a column."""
 
-_UNSURE = 0.03
-"""Error of an estimated position away from the start, over the length of the sheet; three times as much towards
-the start."""
+_POSITION_ERROR = 0.03
+"""Largest error of the estimated ends of a fillet in the sheet, over the length of the sheet. Towards the start of the
+sheet the error may be three times larger."""
 
 _END = 0.5
-"""Length of a column at a constrained end over the height of an element, of half the thickness at least: shorter
-elements lock, longer ones miss the bending."""
+"""Length of a column at a constrained end over the height of an element there, of at most `Fineness.through` elements
+through the sheet. Shorter columns lock, longer ones miss the bending."""
 
 _BENDING = 0.04
-"""Wall over fillet radius, times 1 - cos(turn), below which two elements through the sheet are enough."""
+"""Wall over fillet radius, times 1 - cos of the angle of the arc, below which two elements through the sheet are
+enough."""
 
 _WALL = 0.25
-"""Largest wall over fillet radius in the geometric mean: a thicker wall allows no longer columns."""
+"""Largest wall over fillet radius that enters the geometric mean: a thicker wall allows no longer columns."""
 
 _TURN = 1 / 8
-"""Power of 1 - cos(turn) of a fillet: the sheet bridges a flat fillet less, and its columns may be longer."""
+"""Exponent of 1 - cos of the angle of the arc: the sheet bridges a short arc less, and its columns may be longer."""
 
 _SAMPLES = 2000            # points of the sheet at which sizes are computed
 
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
-    """Return the body with the elements that its tools need, or the mesh itself where its elements were given.
+    """Return a mesh of the same body with short columns of elements at the fillets of its tools.
+
+    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet.
 
     Args:
-        mesh: from `disc` or `parison`.
-        contacts: the contacts of the scene.
-        axisymmetric: False in plane strain.
-        keep_through: at least as many elements through each layer as the mesh has.
+        mesh: mesh from `disc` or `parison`.
+        contacts: contacts of the scene, with `on`, `tool` and `direction`.
+        axisymmetric: True for bodies of revolution, False in plane strain.
+        keep_through: True for at least as many elements through each layer as the mesh has.
     """
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
-    at = np.linspace(columns.ends[0], columns.ends[-1], _SAMPLES)
-    rows = columns.place(at)
+    coordinates = np.linspace(columns.ends[0], columns.ends[-1], _SAMPLES)
+    rows = columns.place(coordinates)
     s = length_along(rows[[0, -1]].mean(0))
     faces = dict(zip(columns.faces, rows[[0, -1]]))
     thickness, touching = float(preset.thickness.sum()), [item for item in contacts if item.on in faces]
@@ -103,18 +107,27 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
             away = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
             size = np.minimum(size, _END * thickness / min(through, fineness.through) + GROWTH * away)
-    ends = ends_of_columns(at, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
+    ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
 
 def _distance(s: np.ndarray, fillet: FilletInSheet) -> np.ndarray:
-    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length."""
-    unsure = _UNSURE * s[-1]
-    return np.maximum(np.maximum(fillet.first - 3 * unsure - s, s - fillet.last - unsure), 0.0)
+    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length.
+
+    s: lengths along the sheet from its start to the points, shape (n,).
+    """
+    error = _POSITION_ERROR * s[-1]
+    return np.maximum(np.maximum(fillet.first - 3 * error - s, s - fillet.last - error), 0.0)
 
 
 def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:
-    """Return the numbers of elements through the layers, by their share of the thickness."""
+    """Return the numbers of elements through the layers, in proportion to their thickness.
+
+    Args:
+        preset: accuracy and layers of the mesh.
+        through: number of elements through the whole sheet.
+        keep: True for at least as many elements through each layer as the mesh has.
+    """
     share = preset.thickness / preset.thickness.sum()
     least = np.array(preset.through if keep else np.ones(len(share)))
     return np.maximum(np.ceil(through * share - 1e-9), least).astype(int).tolist()

@@ -19,7 +19,7 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
     Args:
         kind: name of the calling function, for messages.
         thickness: its argument of this name.
-        alone: name of a single layer.
+        alone: name of the layer if `thickness` names none.
         coordinate: coordinate along which the thickness may vary; "" if it may not.
 
     Returns:
@@ -36,10 +36,15 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
 
 
 def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a thickness as a function of coordinates.
+    """Return the thickness of a layer as a function of coordinates, shape (n,), with values of this shape, length.
+
+    Args:
+        caller: name of the thickness, for messages.
+        given: a length, a function of a coordinate, or a table {coordinate: length}.
+        coordinate: name of the coordinate along which the thickness may vary; "" if it may not.
 
     Raises:
-        InputError: it is not positive, or may not vary.
+        InputError: the thickness is not positive or not given at all coordinates, or varies although it may not.
     """
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
         value = positive(caller, given)
@@ -61,7 +66,13 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
 
 
 def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
-    """Return the value of the user's function.
+    """Return the thickness that the user's function gives at coordinate `v`.
+
+    Args:
+        function: the user's function.
+        v: its argument.
+        caller: name of the thickness, for messages.
+        coordinate: name of the coordinate, for messages.
 
     Raises:
         InputError: the function raises an error.
@@ -76,8 +87,12 @@ def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
 def checked_grading(kind: str, grading: Any) -> float:
     """Return the argument `grading` as a float.
 
+    Args:
+        kind: name of the calling function, for messages.
+        grading: size of the last element over the first.
+
     Raises:
-        InputError: it is not between 1e-6 and 1e6.
+        InputError: `grading` is not between 1e-6 and 1e6.
     """
     grading = positive(f"{kind}: grading", grading)
     if not 1e-6 <= grading <= 1e6:
@@ -91,11 +106,11 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
     Args:
         kind: name of the calling function, for messages.
         along_what: direction along the sheet, for messages.
-        elements: its argument of this name.
+        elements: its argument of this name: (number along the sheet, division of the layers).
         layers: number of layers.
 
     Raises:
-        InputError: `elements` does not have this form, or there are too many elements.
+        InputError: `elements` has another form, or there are too many elements.
     """
     if not is_row(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
@@ -113,7 +128,11 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
 
 
 def _layer_ends(kind: str, given: Any) -> np.ndarray:
-    """Return the ends of elements through a layer on [0, 1], from their number or their relative sizes.
+    """Return the ends of the n elements through a layer on [0, 1], shape (n + 1,).
+
+    Args:
+        kind: name of the calling function, for messages.
+        given: number of the elements, or their relative sizes.
 
     Raises:
         InputError: a size is not positive.
@@ -149,19 +168,19 @@ def graded(along: int, grading: float) -> np.ndarray:
 
 
 def with_middles(joints: np.ndarray) -> np.ndarray:
-    """Return the ends of elements and their middles in order, shape (2 n + 1,)."""
+    """Return the ends of n elements, shape (n + 1,), and their middles in order, shape (2 n + 1,)."""
     points = np.empty(2 * len(joints) - 1)
     points[::2], points[1::2] = joints, (joints[1:] + joints[:-1]) / 2
     return points
 
 
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
-    """Return the distances of all rows of nodes from the first face, shape (rows, coordinates), length.
+    """Return the distances of all rows of nodes from the first face of a sheet, shape (rows, n), length.
 
     Args:
         layers: {name: thickness as a function of coordinates}.
         through: ends of the elements through each layer on [0, 1].
-        coordinates: coordinates along the sheet, shape (coordinates,).
+        coordinates: coordinates along the sheet, shape (n,).
     """
     rows = [np.zeros(len(coordinates))]
     for thickness_at, ends in zip(layers.values(), through):

@@ -50,7 +50,8 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
         mesh: the mesh.
         file: name of the file.
         shift: (R, Z) added to the coordinates, length.
-        numbering: order of the nodes of an element in the text format, "corners" or "around".
+        numbering: order of the six nodes of an element in the text format: "corners" (the corners first) or "around"
+            (corner, middle, corner, ...).
 
     Raises:
         InputError: the numbering is unknown, or there is more than one rank.
@@ -70,5 +71,5 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
 
 
 def _is_text(file: str) -> bool:
-    """Return True for the name of a text file."""
+    """Return True if the file name ends in .txt."""
     return file.lower().endswith(".txt")

@@ -1,8 +1,9 @@
 """Estimate of the part of an undeformed sheet that reaches each fillet of a tool.
 
-A sheet under pressure is nearly a membrane. In the tool its free surface is that of the largest ball that fits. The
-radius of this ball falls as the pressure grows; it orders the points of the tool by their time of contact. Points that
-touch stick, and the free film stretches evenly along the section. The position of the fillet material is found to 5 %
+A sheet under pressure is nearly a membrane. In the tool its free surface is that of a ball that fits into the tool.
+The radius of this ball falls as the pressure grows. So a point of the tool is touched when this radius falls to the
+radius of the largest ball that touches the tool there. Points that touch stick, and the free part of the sheet
+stretches evenly along the section. The position of the fillet material is found to 5 %
 of the length of the sheet in a cup (tests/test_accuracy_in_moulds.py).
 """
 
@@ -21,11 +22,11 @@ class FilletInSheet(NamedTuple):
 
     Attributes:
         first, last: ends of this part, measured along the sheet from its start, length.
-        radius: of the fillet, length.
+        radius: radius of the fillet, length.
         turn: 1 - cos of the angle of the arc, at most 1.
-        stretch: reference over deformed length along the section.
-        area_ratio: reference over deformed area; the wall over its thickness in the reference configuration.
-        concave: the sheet bridges the fillet before it touches it.
+        stretch: reference over deformed length of the sheet on the fillet, along the section.
+        area_ratio: reference over deformed area there: the wall over the thickness in the reference configuration.
+        concave: True if the sheet bridges the fillet before it touches it.
     """
 
     first: float
@@ -38,16 +39,17 @@ class FilletInSheet(NamedTuple):
 
 
 _PIECE = 1 / 60
-"""Length of a straight piece of a tool over its size."""
+"""Distance between successive points of a tool over the size of the tool."""
 
 _LEVELS = 80
-"""Number of radii of the free surface."""
+"""Number of radii of the free surface at which the sheet is examined."""
 
 _LARGEST = 30.0
 """Largest radius of the free surface over the length of the sheet."""
 
 _UNDER_PLUG = 0.6
-"""Smallest reference over present radius of the sheet at the edge of a moving tool; the largest is 1."""
+"""Smallest reference radius over present radius of a point of the sheet at the edge of a moving tool. (The largest
+is 1.)"""
 
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
@@ -56,8 +58,8 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
     Args:
         tool: a tool of a section.
         face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        axisymmetric: False in plane strain.
-        moving: the tool moves, by an amount that is not known.
+        axisymmetric: True for bodies of revolution, False in plane strain.
+        moving: True if the tool moves, by an unknown amount.
     """
     s = length_along(face)
     x, normal, curvature = _surface(tool, face, s[-1])
@@ -85,9 +87,16 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
 
 
 def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points of the tool that face the sheet, in its order, the normals into the tool, and |curvature|.
+    """Return points of the tool opposite the sheet, ordered along the sheet.
 
-    Shapes (m, 2), (m, 2), (m,).
+    Args:
+        tool: a tool of a section.
+        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
+        length: length of the sheet, length.
+
+    Returns:
+        Points, shape (m, 2), length; normals into the tool, shape (m, 2); absolute curvatures of the tool, shape (m,),
+        1/length.
     """
     outline = tool.surface()[0]
     pieces = np.diff(outline, axis=0)
@@ -104,14 +113,21 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
 
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:
-    """Return the numbers of the points of each arc, consecutive points of one curvature."""
+    """Return the numbers of the points of each arc: consecutive points of equal curvature, shape (m,), above 0."""
     same = np.isclose(curvature[1:], curvature[:-1], rtol=1e-3)
     groups = np.split(np.arange(len(curvature)), np.flatnonzero(~same) + 1)
     return [group for group in groups if curvature[group[0]] > 0]
 
 
 def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) -> np.ndarray:
-    """Return the radius of the largest ball outside the tool that touches it at each point, shape (m,), length."""
+    """Return the radius of the largest ball outside the tool that touches it at each point, shape (m,), length.
+
+    Args:
+        tool: a tool of a section.
+        x: points of the tool, shape (m, 2), length.
+        normal: normals into the tool there, shape (m, 2).
+        largest: upper bound of the radii, length.
+    """
     low: np.ndarray = np.zeros(len(x))
     high: np.ndarray = np.full(len(x), largest)
     for _ in range(40):
@@ -122,10 +138,16 @@ def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) ->
 
 
 def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return where in the undeformed sheet the material on each point of the tool lies, along it, shape (m,), length.
+    """Return the positions along the undeformed sheet of the material that touches a tool, shape (m,), length.
 
-    Points touch in the order of their radii `free`. A free part of the film is an arc of the present radius; it
-    stretches evenly between the points at its ends, which stick.
+    A point of the tool is touched when the radius of the free surface falls to its radius `free`. Each free part of the
+    sheet is an arc of this radius. It stretches evenly between the points at its ends, which stick.
+
+    Args:
+        x: points of the tool in order along the sheet, shape (m, 2), length.
+        free: radius of the largest ball outside the tool that touches each point, shape (m,), length.
+        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
+        s: length along the face from its start to these points, shape (n,).
     """
     points = np.concatenate([face[:1], x, face[-1:]])
     on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]

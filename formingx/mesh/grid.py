@@ -40,11 +40,11 @@ class Grid(NamedTuple):
 
 
 def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return triangles with clockwise ones reversed.
+    """Return triangles with their nodes counter-clockwise, shape (m, 3 or 6).
 
     Args:
-        points: shape (n, 2), length.
-        triangles: point numbers, shape (m, 3 or 6).
+        points: nodes (R, Z), shape (n, 2), length.
+        triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
     """
     triangles = np.array(triangles)
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -124,12 +124,20 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 
 
 def _tagged(grid: Grid, what: str) -> tuple:
-    """Return cells, points, cell tags, edges, edge tags and names, with cells and edges in the numbering of DOLFINx.
+    """Return the arrays of a grid with its names as tags, in the order of nodes of DOLFINx.
 
     An edge of several boundaries gets a tag of its own, which belongs to all of them.
 
+    Args:
+        grid: the grid.
+        what: name of the mesh, for messages.
+
+    Returns:
+        Cells, shape (m, 3 or 6); points; tags of the cells, shape (m,); boundary edges, shape (k, 2 or 3); tags of the
+        edges, shape (k,); {layer: tag}; {boundary: tags}.
+
     Raises:
-        InputError: a boundary edge is not an edge of an element.
+        InputError: the elements are invalid, or a boundary edge is not an edge of an element.
     """
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
@@ -165,7 +173,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    """Return {(lower end, higher end): [middle]} of all edges; without mid-edge nodes {ends: []}."""
+    """Return {(lower end, higher end): [middle]}, node numbers of all edges; [] for triangles of three nodes."""
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
@@ -174,10 +182,16 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 
 
 def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
-                 points: np.ndarray) -> list[list[int]]:
-    """Return the boundary edges of elements, each with its ends and its middle; [] if no edge belongs to an element.
+                   points: np.ndarray) -> list[list[int]]:
+    """Return the node numbers of boundary edges: ends and middle of each; [] if no edge belongs to an element.
 
     So a curve that is no part of the body, such as a tool in the same file, gives an empty boundary.
+
+    Args:
+        edges: node numbers of the ends of the edges, shape (k, 2); -1 for a node of no element.
+        known: {(lower end, higher end): [middle]} of the edges of elements.
+        caller: beginning of the message.
+        points: nodes (R, Z), shape (n, 2), length.
 
     Raises:
         InputError: some edges belong to elements, others do not.

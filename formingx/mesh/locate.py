@@ -14,26 +14,27 @@ OUTSIDE = 1e-3
 """Distance from a cell, over its size, within which a point counts as inside; curved edges are approximate."""
 
 
-class Place(NamedTuple):
-    """Located points of this rank.
+class LocatedPoints(NamedTuple):
+    """Those of the sought points that lie in cells of this rank, and their cells.
 
     Attributes:
-        mine: numbers of the points, shape (m,).
-        cells: local cell numbers, shape (m,).
-        reference: positions in the reference cell, shape (m, dimension).
+        numbers: numbers of these points among the sought ones, shape (m,).
+        cells: local number of the cell that contains each point, shape (m,).
+        reference: position of each point in the reference cell, shape (m, dimension).
     """
 
-    mine: np.ndarray
+    numbers: np.ndarray
     cells: np.ndarray
     reference: np.ndarray
 
 
-def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh") -> Place:
+def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh"
+           ) -> LocatedPoints:
     """Return the cells that contain points; collective.
 
     Args:
         mesh: the `dolfinx.mesh.Mesh`.
-        points: shape (n, 2), length, equal on all ranks.
+        points: reference positions (R, Z), shape (n, 2), length, equal on all ranks.
         size: extent of the mesh, length.
         cells: local numbers of cells to be searched; default all.
         within: name of these cells in the message.
@@ -69,5 +70,5 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
     ranks = np.where((found >= 0) & (depth == best), comm.rank, comm.size)
     owner = np.empty_like(ranks)
     comm.Allreduce(ranks, owner, MPI.MIN)
-    mine = np.flatnonzero(owner == comm.rank)
-    return Place(mine, found[mine], reference[mine])
+    numbers = np.flatnonzero(owner == comm.rank)
+    return LocatedPoints(numbers, found[numbers], reference[numbers])

@@ -35,13 +35,13 @@ class Columns(NamedTuple):
 
 
 class Preset(NamedTuple):
-    """Accuracy that was asked of a sheet, and the sheet with other elements.
+    """Accuracy that a script asks of a sheet, and the function that divides the sheet into other elements.
 
     Attributes:
         accuracy: "draft", "standard" or "fine".
         thickness: largest thickness of each layer, shape (layers,), length.
         through: number of elements through each layer.
-        make: returns the mesh with other ends of columns, and other numbers of elements through each layer.
+        make: function of other ends of columns and other numbers of elements through each layer; returns the mesh.
     """
 
     accuracy: str
@@ -56,14 +56,15 @@ class Mesh:
 
     Attributes:
         domain: the `dolfinx.mesh.Mesh`, with coordinates (R, Z), length.
-        cells: its `MeshTags` of layers.
-        facets: its `MeshTags` of boundaries.
-        layers: {name: tag}.
+        cells: `MeshTags` of the cells, by layers.
+        facets: `MeshTags` of the facets, by boundaries.
+        layers: {name: tag of its cells}.
         boundaries: {name: tags of its facets}; several tags if a part has its own name (`with_part`).
         comm: the communicator on which the mesh was made. Pass Python objects on it, not on its copy `domain.comm`.
             Data that mpi4py attaches to the copy are freed with it. Inside an exception this would block the exit of
             Python.
         columns: `Columns` of elements along a disc, a sphere, a parison or a `from_lines` body; None for other meshes.
+        preset: `Preset` of a disc or parison whose elements a `Scene` may choose; None for other meshes.
 
     >>> list(sheet.layers), list(sheet.boundaries), sheet.nodes_of("rim").shape
     (['sheet'], ['axis', 'rim', 'bottom', 'top'], (3, 2))
@@ -166,7 +167,14 @@ class Mesh:
                        columns=self._columns_with((low, high), axis, tolerance, part))
 
     def _columns_with(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
-        """Return the columns of the mesh with fixed ends at the limits of a new part, or None."""
+        """Return the `Columns` of the mesh with fixed ends at the limits of a new part, or None without columns.
+
+    Args:
+        limits: lowest and highest coordinate of the part, length.
+        axis: 0 for R, 1 for Z.
+        tolerance: largest distance of an end from a limit, length.
+        part: arguments of `with_part`.
+    """
         if self.columns is None:
             return None
         columns, make = self.columns, self.columns.make

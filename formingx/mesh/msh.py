@@ -155,7 +155,17 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
-    """Return {name of a physical group: elements, as indices into the sorted node numbers} for one dimension.
+    """Return {name of a physical group: its elements} for one dimension.
+
+    Args:
+        found: content of the file.
+        dim: dimension of the elements, 1 or 2.
+        kinds: {gmsh's number of an allowed element type: number of nodes}.
+        numbers: sorted node numbers, shape (n,).
+        file: name of the file, for messages.
+
+    Returns:
+        Elements of each group as indices into `numbers`, shape (m, nodes).
 
     Raises:
         InputError: an element is of another type, or refers to a missing node.
@@ -185,7 +195,7 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 
 
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the names and contents of the sections, which must make up the whole file.
+    """Yield the names and contents of the sections of a file, which must consist of sections alone.
 
     Raises:
         InputError: a section has no end, or there is text outside the sections.
@@ -203,7 +213,7 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
-    """Return (version, True if binary, byte order, bytes of a size) from $MeshFormat.
+    """Return version, True if binary, byte order and bytes of a size from the section $MeshFormat.
 
     Raises:
         InputError: the version is not supported.
@@ -222,10 +232,10 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 
 
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
-    """Return {(dimension, group): name} from $PhysicalNames.
+    """Return {(dimension, number of a group): name} from the section $PhysicalNames.
 
     Raises:
-        InputError: a line has another form.
+        InputError: a line has another form, or a group has two names.
     """
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
     names: dict[tuple[int, int], str] = {}
@@ -244,7 +254,7 @@ def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
 
 
 def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
-    """Return node numbers and points of a section in format 2."""
+    """Return node numbers, shape (n,), and points, shape (n, 3), from the section $Nodes of an MSH 2.2 file."""
     if section.binary:
         rows = section.records(section.line(), [("number", "i4", ()), ("x", "f8", (3,))])
         section.end()
@@ -256,7 +266,7 @@ def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _elements_2(section: Section) -> list[Block]:
-    """Return one block for each (type, group, entity) of a section in format 2.
+    """Return a block for each (element type, group, entity) from the section $Elements of an MSH 2.2 file.
 
     Raises:
         InputError: an element type is unknown.
@@ -280,11 +290,11 @@ def _elements_2(section: Section) -> list[Block]:
 
 
 def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
-    """Return {(dimension, entity): its physical groups}.
+    """Return {(dimension, entity): numbers of its physical groups}.
 
     Args:
         section: the section $Entities or $PartitionedEntities.
-        whole: groups of the entities that were partitioned.
+        whole: groups of the entities that were partitioned; None for $Entities.
     """
     found = {}
     if whole is not None:
@@ -309,7 +319,7 @@ def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int]
 
 
 def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
-    """Return node numbers and points of a section in format 4."""
+    """Return node numbers, shape (n,), and points, shape (n, 3), from the section $Nodes of an MSH 4.1 file."""
     numbers: list[np.ndarray] = [np.zeros(0, dtype=np.int64)]
     points: list[np.ndarray] = [np.zeros((0, 3))]
     blocks, total, *_ = section.sizes(4)
@@ -324,7 +334,13 @@ def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
-    """Check that a section ends, and has the number of parts that its first line states.
+    """Check that a section ends, and holds the number of nodes or elements that its first line states.
+
+    Args:
+        section: the section.
+        what: "nodes" or "elements", for messages.
+        total: number from the first line.
+        parts: nodes or elements of each block.
 
     Raises:
         InputError: the numbers differ.
@@ -335,7 +351,11 @@ def _total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> 
 
 
 def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
-    """Return the blocks of a section in format 4.
+    """Return the blocks of elements from the section $Elements of an MSH 4.1 file.
+
+    Args:
+        section: the section.
+        groups: {(dimension, entity): numbers of its physical groups}.
 
     Raises:
         InputError: an element type is unknown.

@@ -36,7 +36,7 @@ class Section:
         return self._binary
 
     def line(self) -> int:
-        """Return the count on a line of text, as in the old binary format.
+        """Return the count on the next line of text; sections of binary MSH 2.2 files begin with one.
 
         Raises:
             InputError: there is no such line.
@@ -76,11 +76,14 @@ class Section:
                              f" counts announce")
 
     def records(self, n: int, fields: list) -> np.ndarray:
-        """Return the next n records of a binary section."""
+        """Return the next n records of a binary section, a structured array, shape (n,).
+
+        fields: (name, type without byte order, shape) of each entry of a record.
+        """
         return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
 
     def _take(self, n: int, kind: str) -> np.ndarray:
-        """Return the next n numbers of a kind.
+        """Return the next n numbers of a type, such as "f8", shape (n,); in text files all numbers are floats.
 
         Raises:
             InputError: the section is too short.
@@ -93,7 +96,7 @@ class Section:
         return self._values[self._offset - n:self._offset]
 
     def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
-        """Return the next n numbers of a binary section.
+        """Return the next n numbers or records of a type in a binary section, shape (n,).
 
         Raises:
             InputError: the section is too short.
@@ -119,10 +122,10 @@ class Section:
 
 
 def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
-    """Return the first of the numbers as a count.
+    """Return the first of the numbers `found` as a count.
 
     Raises:
-        InputError: it is negative or too large.
+        InputError: the count is negative or too large.
     """
     n = int(found[0])
     if not 0 <= n < 2**40:
@@ -131,10 +134,10 @@ def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
 
 
 def checked_dimension(dim: int, section: Section) -> int:
-    """Return a dimension.
+    """Return the dimension `dim` of an entity.
 
     Raises:
-        InputError: it is not between 0 and 3.
+        InputError: the dimension is not between 0 and 3.
     """
     if not 0 <= dim <= 3:
         raise InputError(f"{section.where}: a dimension is {dim}")

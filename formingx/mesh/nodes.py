@@ -8,7 +8,7 @@ from mpi4py import MPI
 from .. import _compat
 
 MAX_COMPARED = 1_000_000
-"""Largest number of compared coordinates for a direct search for nearest points."""
+"""Number of compared coordinates above which nearest points are sought with a tree."""
 COORDINATES = 2
 """Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
 
@@ -70,7 +70,7 @@ def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the rows of `geometry.x` with the nodes of facets, shape (facets, 2 or 3)."""
+    """Return the local node numbers of facets, ends first, shape (facets, 2 or 3): rows of `domain.geometry.x`."""
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

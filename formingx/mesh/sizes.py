@@ -5,44 +5,50 @@ from typing import Any
 import numpy as np
 
 GROWTH = 0.25
-"""Growth of the length of columns or triangles per distance along the sheet."""
+"""Largest growth of the length of columns or triangles per distance from the shortest ones."""
 
 
 def length_along(line: np.ndarray) -> np.ndarray:
-    """Return the length along a line through points, shape (n, 2), from its first point, shape (n,)."""
+    """Return the length along a polyline from its first point to each point, shape (n,).
+
+    line: points of the polyline, shape (n, 2), length.
+    """
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
 
 def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return the number of columns, a fraction, from the first point to each point, shape (n,).
+    """Return the number of columns from the first point of a sheet to each point, not rounded, shape (n,).
 
     Args:
-        s: length along the sheet, shape (n,).
-        size: length of columns there, shape (n,).
+        s: length along the sheet to each point, shape (n,).
+        size: length of a column at each point, shape (n,), length.
     """
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 
-def ends_of_columns(at: np.ndarray, s: np.ndarray, size: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return the ends of columns with given lengths, shape (columns + 1,).
+def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+    """Return the ends of columns with given lengths, as coordinates along the sheet, shape (columns + 1,).
 
     Args:
-        at: coordinates along the sheet, shape (n,).
-        s: length along the sheet there, shape (n,).
-        size: length of columns there, shape (n,).
+        coordinates: coordinates of points along the sheet, shape (n,).
+        s: length along the sheet to each point, shape (n,).
+        size: largest length of a column at each point, shape (n,), length.
         pieces: coordinates at which columns must end, with the first and the last, shape (m,).
     """
     number = number_of_columns(s, size)
-    marks = np.interp(pieces, at, number)
+    marks = np.interp(pieces, coordinates, number)
     ends = [pieces[:1]]
     for a, b, last in zip(marks, marks[1:], pieces[1:]):
         n = max(int(np.ceil(b - a - 1e-6)), 1)
-        ends += [np.interp(a + (b - a) * np.arange(1, n) / n, number, at), np.array([last])]
+        ends += [np.interp(a + (b - a) * np.arange(1, n) / n, number, coordinates), np.array([last])]
     return np.concatenate(ends)
 
 
 def moved_nodes(mesh: Any) -> float:
-    """Return the largest motion of a node of the faces since a mesh with columns was made, over its size."""
+    """Return the largest motion of a node of the two faces since the mesh was made, over the extent of the mesh.
+
+    mesh: a `Mesh` with `columns`, whose nodes a script may have moved.
+    """
     columns = mesh.columns
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
     away = [np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()

@@ -126,8 +126,14 @@ def read(file: str | os.PathLike) -> Grid:
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
     """Check that every boundary edge is an edge of an element.
 
+    Args:
+        file: name of the file, for messages.
+        layers: {name: triangles, shape (m, 6)}, rows of the nodes.
+        boundaries: {name: edges, shape (k, 3)}: first, last and middle node.
+        numbers: node numbers in the file, shape (n,), for messages.
+
     Raises:
-        InputError: an edge is not.
+        InputError: a boundary edge is no edge of an element.
     """
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
@@ -139,10 +145,12 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
 
 
 def _known(numbering: str, lines: _Lines | None = None) -> str:
-    """Return the numbering, checked.
+    """Return `numbering`, which must be "corners" or "around".
+
+    lines: lines of the file that is read, for messages; None when a file is written.
 
     Raises:
-        InputError: it is unknown.
+        InputError: the numbering is unknown.
     """
     if numbering not in _NUMBERINGS:
         message = f"numbering = {numbering!r}: must be one of {', '.join(map(repr, _NUMBERINGS))}"
@@ -151,7 +159,16 @@ def _known(numbering: str, lines: _Lines | None = None) -> str:
 
 
 def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
-    """Return the name of a layer or a boundary, checked to be new."""
+    """Return the name of a new layer or boundary from the first line of its block.
+
+    Args:
+        lines: lines of the file, for messages.
+        words: words of the first line of the block.
+        taken: names of the layers or boundaries before.
+
+    Raises:
+        InputError: a block before has the same name.
+    """
     name = " ".join(words[2:])
     if name in taken:
         raise lines.error(f"a second block {words[0]!r} is called {name!r}")
@@ -159,7 +176,7 @@ def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
 
 
 class _Lines(Iterator):
-    """Lines of a file as words without comments, with their line numbers for messages."""
+    """Iterator over the lines of a file, each a list of words without comments; it counts lines for messages."""
 
     def __init__(self, file: str):
         self.file, self.line_number = file, 0
@@ -178,19 +195,22 @@ class _Lines(Iterator):
         raise StopIteration
 
     def error(self, message: str) -> InputError:
-        """Return an error that names the present line."""
+        """Return an error with this message, which names the file and the present line."""
         shown = self._text[self.line_number - 1].strip() if self._text else ""
         return InputError(f"mesh file {self.file!r}, line {self.line_number} ({shown[:60]!r}): {message}")
 
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
-        """Return `count` lines of numbers, with node numbers converted to indices.
+        """Return the next `count` lines of numbers as lists, with node numbers converted to indices.
 
         Args:
             count: the number of lines, as text.
-            kinds: type of each column.
-            what: content, for messages.
-            nodes: {node number: index}; None for no conversion.
+            kinds: function of a word that returns its number, for each column.
+            what: contents of a line, for messages.
+            nodes: {node number: index} for all columns but the first; None for no conversion.
             all_nodes: True if the first column is a node number, too.
+
+        Raises:
+            InputError: a line is missing or has another form, or a node is unknown.
         """
         if not (count.isascii() and count.isdigit() and len(count) <= 15) or int(count) < 1:
             raise self.error(f"the count {count!r} must be a whole number of at least 1")

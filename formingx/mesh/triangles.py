@@ -10,14 +10,14 @@ from .nodes import of_cells, own_cells
 
 
 class Place(NamedTuple):
-    """Place in the body.
+    """Place of a point in a body, for messages.
 
     Attributes:
         R: reference coordinate R, length.
         Z: reference coordinate Z, length.
         layer: name of the layer, "" if unknown.
-        boundary: name of the nearest boundary.
-        distance: distance from this boundary, length.
+        boundary: name of the nearest boundary, "" for a mesh without boundaries.
+        distance: distance from the nearest node of this boundary, length.
     """
 
     R: float
@@ -35,7 +35,7 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Describe the place of a point in words of the mesh: its layer, its nearest boundary, the distance from there.
+    """Return the place of a point: its coordinates, its layer, and the nearest boundary with its distance.
 
     Collective.
 
@@ -43,9 +43,6 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
         mesh: the mesh.
         point: reference coordinates, shape (2,), length, equal on all ranks; in three dimensions (x, y).
         layer: name of the layer, if known.
-
-    Returns:
-        The place.
     """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
@@ -63,10 +60,10 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
     It is 1 for an equilateral triangle, 0 for a flat one, and negative for an inverted one.
 
     Args:
-        corners: shape (n, 3, 2), length.
+        corners: corners of the triangles, shape (n, 3, 2), length.
 
     Returns:
-        Shape (n,).
+        Shape quality of each triangle, shape (n,).
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
@@ -108,5 +105,5 @@ class Triangles:
         self.thickness = float(self.area.sum()) / self.length
 
     def place(self, number: int) -> Place:
-        """Return the `Place` of the middle of a triangle."""
+        """Return the `Place` of the centroid of triangle `number`."""
         return place(self._mesh, self.corners[number].mean(0), str(self.layer[number]))

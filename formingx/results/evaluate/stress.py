@@ -33,7 +33,7 @@ from petsc4py import PETSc
 
 from ... import _compat
 from ...errors import InputError, as_points, known, pair
-from ...mesh.locate import Place, locate
+from ...mesh.locate import LocatedPoints, locate
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...physics.kinematics import BLOCK
 from ...ranks import gathered
@@ -77,11 +77,11 @@ class StressField:
         positions = as_points("Stress: points", points)
         comm, place = recovery.problem.comm, recovery.locate(positions, layer)
         values = np.zeros((len(positions), _COUNT))
-        if len(place.mine):
+        if len(place.numbers):
             shapes: Any = recovery.element.tabulate(0, place.reference)
             dofs = recovery.space.dofmap.list[place.cells]
             column = list(recovery.cells).index(layer)
-            values[place.mine] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
+            values[place.numbers] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
         return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
@@ -182,7 +182,7 @@ class Stresses:
         self._ready = False
         self._raw: dict[int, tuple] = {}
         self._patches: Patches | None = None
-        self._located: dict[str, tuple[np.ndarray, Place]] = {}
+        self._located: dict[str, tuple[np.ndarray, LocatedPoints]] = {}
 
     def of(self, state: Any) -> StressField:
         """Return the stresses of a state; collective."""
@@ -191,7 +191,7 @@ class Stresses:
             self._ready = True
         return StressField(self, state)
 
-    def locate(self, points: np.ndarray, layer: str) -> Place:
+    def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
         """Return the cells that contain points of a layer; the last result is cached; collective.
 
         Args:
