@@ -9,7 +9,7 @@ import pytest
 import formingx as fx
 from formingx.tools import cad
 from formingx.tools.arcs import arcs_along
-from formingx.tools.profile import Arc
+from formingx.tools.pieces import Arc
 
 tools = fx.tools
 POINTS = np.random.default_rng(1).uniform([0, 1.5], [12, 7], (100, 2))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
-from .profile import Arc, Line
+from .pieces import Arc, Line
 
 _MAX_HALVINGS = 14     # largest number of halvings of a curve
 _MAX_ARCS = 2000       # largest number of arcs for one curve
@@ -15,7 +15,7 @@ _MIN_TOLERANCE = 1e-7  # smallest tolerance over the size of a curve
 
 def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
                name: str) -> list[Line | Arc]:
-    """Return arcs and lines that approximate a curve.
+    """Return successive arcs and lines that approximate a curve, with equal tangents at their joints.
 
     Args:
         curve: function of parameters from 0 to 1, shape (n,), that returns points and derivatives, shape (n, 2) each.
@@ -53,7 +53,7 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
     """Return the coordinates (x, y) of points in the plane z = 0, shape (n, 2).
 
     Args:
-        points: shape (n, 3), length.
+        points: points (x, y, z), shape (n, 3), length.
         name: beginning of the error message.
 
     Raises:
@@ -69,14 +69,15 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
 
 
 def piece_through(points: np.ndarray, name: str) -> Line | Arc:
-    """Return the line or the arc through given points.
+    """Return the line or the circular arc through given points.
 
     Args:
-        points: in their order on the piece, shape (n, 2), length.
+        points: points (R, Z) in their order along the line or arc, shape (n, 2), length.
         name: beginning of the error message.
 
     Raises:
-        InputError: the points lie on no line or circle, or not in their order. Fewer than four do not define an arc.
+        InputError: the points lie on no line or circle, or not in this order. Fewer than four points do not define an
+            arc.
     """
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")
@@ -104,8 +105,8 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 
     The joint is the midpoint of the control points p + d t and q - d s.
     """
-    v, arcs = q - p, t + s
-    a, b, c = 2 * (1 - t @ s), 2 * (v @ arcs), v @ v
+    v, tangents = q - p, t + s
+    a, b, c = 2 * (1 - t @ s), 2 * (v @ tangents), v @ v
     if a > 1e-12:
         d = (-b + math.sqrt(b * b + 4 * a * c)) / (2 * a)
     elif b > 0:
@@ -118,7 +119,7 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
 
 
 def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
-    """Return the arc or the line from p with the unit tangent t to q, or None."""
+    """Return the arc or the line from p with the unit tangent t to q; None if q lies at p or straight behind it."""
     w = q - p
     normal_distance, tangent_distance, length = t[0] * w[1] - t[1] * w[0], float(t @ w), math.hypot(*w)
     if not length > 0:
@@ -131,7 +132,7 @@ def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:
 
 
 def _distance_to(points: np.ndarray, piece: Line | Arc) -> np.ndarray:
-    """Return the distances of points, shape (n, 2), from the line or circle of a piece, shape (n,)."""
+    """Return the distances of points, shape (n, 2), from the infinite line or full circle of `piece`, shape (n,)."""
     if isinstance(piece, Arc):
         return np.abs(np.hypot(*(points - piece.centre).T) - piece.radius)
     direction = (piece.b - piece.a) / math.dist(piece.a, piece.b)

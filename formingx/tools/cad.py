@@ -19,7 +19,7 @@ import numpy as np
 from ..errors import InputError
 from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
-from .profile import Arc, Line
+from .pieces import Arc, Line
 
 _SECONDS = 10               # computing time allowed for a file, s
 _BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
@@ -32,7 +32,8 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
     Args:
         file: name of the file.
         kind: "step" or "brep".
-        tolerance: tolerance of arcs along splines and ellipses, length.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, in the unit of the
+            file; None if arcs may not replace them.
 
     Returns:
         {number: function that returns the pieces of the curve, or raises its error}.
@@ -48,14 +49,22 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 
 
 class _Reader:
-    """Process that reads one file."""
+    """Reader of one STEP or BREP file, with a process of its own that ends with the `with` block.
+
+    Args:
+        file: name of the file.
+        kind: "step" or "brep".
+
+    Attributes:
+        bounds: {number of a curve: [lowest, highest parameter]}.
+    """
 
     def __init__(self, file: str, kind: str):
         self._file, self._seconds = file, _SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
         # not a rank of a run under mpirun
-        apart = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
+        environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
         self._process = subprocess.Popen(
-            [sys.executable, "-P", cad_process.__file__, file, kind, str(self._seconds)], env=apart, text=True,
+            [sys.executable, "-P", cad_process.__file__, file, kind, str(self._seconds)], env=environment, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
         self._timer = Timer(_CLOCK_FACTOR * self._seconds, self._process.kill)
         self._timer.start()
@@ -76,12 +85,12 @@ class _Reader:
         self._process.communicate()
 
     def evaluate(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return points of a curve and its derivatives at parameters, shape (n,); shape (n, 3) each."""
+        """Return points and derivatives of curve `tag`, shape (n, 3) each, at `parameters`, shape (n,)."""
         points, derivatives = self._answer([tag, parameters.tolist()])
         return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
-        """Return the answer of the process to a question.
+        """Return the answer of the process to `question`, or its first line if this is None.
 
         Raises:
             InputError: the process reports an error, crashes, or takes too long.
@@ -108,10 +117,14 @@ class _Reader:
 
 def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
-    """Return the function that returns the pieces of a curve.
+    """Return a function that returns the lines and arcs of a curve, or raises the error that its evaluation gave.
 
-    Raises:
-        InputError: the curve needs a tolerance.
+    Args:
+        evaluate: function of parameters, shape (n,), that returns points and derivatives, shape (n, 3) each.
+        bounds: lowest and highest parameter.
+        tolerance: largest distance between the curve and the arcs that replace it, length; None for a curve that must
+            be a line or an arc.
+        name: beginning of the error message.
     """
     low, high = bounds
 
@@ -131,7 +144,7 @@ def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], b
 
 
 def _raise(error: InputError) -> list[Line | Arc]:
-    """Raise an error in place of returning pieces."""
+    """Raise an error: for a curve that cannot be read, in place of the function that returns its pieces."""
     raise error
 
 

@@ -13,7 +13,13 @@ import sys
 
 
 def main(file: str, kind: str, seconds: int) -> None:
-    """Read the file, then answer questions until the input ends."""
+    """Read the file, then answer questions from standard input until it ends.
+
+    Args:
+        file: name of the file.
+        kind: "step" or "brep".
+        seconds: processor time after which the system ends the process, s.
+    """
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     out = os.fdopen(os.dup(1), "w", buffering=1)
@@ -33,9 +39,9 @@ def main(file: str, kind: str, seconds: int) -> None:
         out.write(json.dumps({"error": str(error)}) + "\n")
         return
     for line in sys.stdin:
-        tag, at = json.loads(line)
+        tag, parameters = json.loads(line)
         try:
-            answer = [list(model.getValue(1, tag, at)), list(model.getDerivative(1, tag, at))]
+            answer = [list(model.getValue(1, tag, parameters)), list(model.getDerivative(1, tag, parameters))]
             out.write(json.dumps(answer) + "\n")
         except Exception as error:  # noqa: BLE001
             out.write(json.dumps({"error": str(error)}) + "\n")

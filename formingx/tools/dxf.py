@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from . import dxf_tags
 from .arcs import arcs_along, in_plane
-from .profile import TURN, Arc, Line
+from .pieces import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
@@ -22,7 +22,8 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
 
     Args:
         file: name of the file.
-        tolerance: tolerance of arcs along splines and ellipses, length.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, in the unit of the
+            file; None if arcs may not replace them.
 
     Returns:
         {number: function that returns the pieces of the curve}.
@@ -53,6 +54,10 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
 def _check_counts(expected: Counter, found: Counter) -> None:
     """Check that ezdxf found all curves of a drawing.
 
+    Args:
+        expected: {kind: number of its curves in the file}.
+        found: {kind: number of its curves that ezdxf found}.
+
     Raises:
         ValueError: a curve is missing.
     """
@@ -62,7 +67,12 @@ def _check_counts(expected: Counter, found: Counter) -> None:
 
 
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the pieces of a curve.
+    """Return the lines and arcs of a curve.
+
+    Args:
+        entity: the curve, an entity of ezdxf.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length, or None.
+        name: beginning of the error message.
 
     Raises:
         InputError: the curve is damaged or unsupported; the message names it.
@@ -76,10 +86,10 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the pieces of a curve of any kind.
+    """Return the lines and arcs of a curve by the function for its kind (arguments as in `_pieces`).
 
     Raises:
-        InputError: the kind is not supported.
+        InputError: the kind is not supported, or the curve lies in another plane.
     """
     kind = entity.dxftype()
     if kind in _SKIPPED:
@@ -91,25 +101,25 @@ def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _line(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the line of an entity."""
+    """Return the line of an entity LINE, as a list."""
     return [Line(_in_plane(entity.dxf.start, name), _in_plane(entity.dxf.end, name))]
 
 
 def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the arc of an entity."""
+    """Return the arc of an entity ARC, as a list."""
     start, end = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the circle of an entity."""
+    """Return the circle of an entity CIRCLE, as a list with an arc of 360 degrees."""
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return lines and arcs of a polyline.
+    """Return the lines and arcs of a polyline.
 
-    A bulge is the tangent of a quarter of the arc's angle, negative if clockwise.
+    Each point has a bulge: the tangent of a quarter of the angle of the arc that follows, negative if clockwise.
 
     Raises:
         InputError: the polyline is three-dimensional, a mesh, or fitted by a spline.
@@ -140,10 +150,10 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along an ellipse.
+    """Return arcs along an ellipse, within the tolerance.
 
     Raises:
-        InputError: the ratio of its axes is not between 0 and 1.
+        InputError: the ratio of the axes is not between 0 and 1, or there is no tolerance.
     """
     _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
@@ -153,13 +163,13 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
     high += TURN if high <= low else 0.0
 
     def curve(t):
-        at = (low + (high - low) * t).tolist()
-        return _rows(tool.vertices(at)), _rows(tool.tangents(at))
+        parameters = (low + (high - low) * t).tolist()
+        return _rows(tool.vertices(parameters)), _rows(tool.tangents(parameters))
     return arcs_along(curve, _required(tolerance, name), name)
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along the smooth parts of a spline between its knots."""
+    """Return arcs along the smooth parts of a spline between its knots, within the tolerance."""
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
     tool = entity.construction_tool()
@@ -168,8 +178,8 @@ def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
     for low, high in zip(knots, knots[1:]):
         def curve(t, low=low, high=high):
             inner = np.clip(low + (high - low) * t, low, high - 1e-12 * (high - low))
-            both = [tool.derivative(at, 1) for at in inner.tolist()]
-            return _rows(b[0] for b in both), _rows(b[1] for b in both)
+            found = [tool.derivative(parameter, 1) for parameter in inner.tolist()]
+            return _rows(point for point, _ in found), _rows(derivative for _, derivative in found)
         pieces += arcs_along(curve, _required(tolerance, name), name)
     return pieces
 
@@ -181,7 +191,7 @@ _SKIPPED = ("3DFACE", "3DSOLID", "BODY", "HELIX", "INSERT", "MESH", "MLINE", "RA
 
 
 def _is_visible(entity: Any, drawing: Any) -> bool:
-    """Return True if an entity is visible."""
+    """Return True if an entity and its layer in the drawing are visible."""
     layer = drawing.layers.get(entity.dxf.layer) if entity.dxf.layer in drawing.layers else None
     return not (entity.dxf.get("invisible", 0) or layer is not None and (layer.is_off() or layer.is_frozen()))
 
@@ -204,20 +214,20 @@ def unit(file: str) -> str | None:
 
 
 def _in_plane(point: Any, name: str) -> np.ndarray:
-    """Return (x, y) of a point in the plane z = 0."""
+    """Return (x, y) of a point (x, y, 0), shape (2,); name: beginning of the message if z is not 0."""
     return in_plane(np.array([tuple(point)]), name)[0]
 
 
 def _rows(points: Any) -> np.ndarray:
-    """Return points as an array, shape (n, 3)."""
+    """Return the coordinates (x, y) of points of ezdxf as an array, shape (n, 2)."""
     return np.array([(p[0], p[1]) for p in points], float)
 
 
 def _required(tolerance: float | None, name: str) -> float:
-    """Return the tolerance.
+    """Return the tolerance for a curve that arcs must replace; name: beginning of the error message.
 
     Raises:
-        InputError: it is None.
+        InputError: the tolerance is None.
     """
     if tolerance is None:
         raise InputError(f"{name} is neither a straight line nor a circular arc: give tolerance=..., a length, and it"

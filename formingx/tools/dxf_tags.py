@@ -71,8 +71,14 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
 def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tuple[str, ...]) -> None:
     """Check the tags of one entity.
 
+    Args:
+        kind: kind of the entity, such as "LINE".
+        tags: (group code, value) of each tag.
+        line: number of lines up to the end of the entity.
+        others: kinds of entities that are not checked.
+
     Raises:
-        ValueError: its kind is unknown, or a tag is missing or occurs twice; the message names the line.
+        ValueError: the kind is unknown, or a tag is missing or occurs twice; the message names the line.
     """
     where = f"the {kind} that ends before line {line + 1}"
     if kind not in _NEEDED:

@@ -13,7 +13,8 @@ from ..mesh import msh
 from ..units import LENGTHS, Units
 from . import cad, dxf, geo
 from .arcs import in_plane, piece_through
-from .profile import Arc, Line, Tool
+from .pieces import Arc, Line
+from .profile import Tool
 
 _HEADERS = {"step": (b"ISO-10303-21",), "brep": (b"DBRep_DrawableShape", b"CASCADE Topology", b"Open CASCADE Topology")}
 _KINDS = {".geo": "geo", ".msh": "msh", ".dxf": "dxf", ".step": "step", ".stp": "step", ".brep": "brep"}
@@ -70,9 +71,9 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
     if kind in _HEADERS and not head.startswith(_HEADERS[kind]):
         raise InputError(f"tool file {name!r} cannot be read: it does not begin as a {kind.upper()} file does")
     factor = 1.0 if units is None else _factor(units, kind, name)
-    own_curves = None if tolerance is None else tolerance / factor
+    file_tolerance = None if tolerance is None else tolerance / factor
     found = ({"geo": _geo_curves, "msh": _mesh_curves}[kind](name) if kind in ("geo", "msh") else
-             dxf.curves(name, own_curves) if kind == "dxf" else cad.curves(name, kind, own_curves))
+             dxf.curves(name, file_tolerance) if kind == "dxf" else cad.curves(name, kind, file_tolerance))
     for tag in tags or []:
         if abs(tag) not in found:
             raise InputError(f"tool file {name!r} has no curve {abs(tag)}; it has {sorted(found)}")
@@ -85,10 +86,15 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
 
 
 def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
-    """Return the tool, reversed if necessary, so that the body lies outside.
+    """Return the tool, or the tool with its solid on the other side, so that the body lies outside.
+
+    Args:
+        tool: the tool.
+        body: a point (R, Z) of the body, or its mesh.
+        file: name of the file, for messages.
 
     Raises:
-        InputError: the body lies on both sides.
+        InputError: the body lies on both sides of the profile.
     """
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
@@ -102,12 +108,18 @@ def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
 
 
 def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
-    """Return the pieces of a curve, reversed for a negative number."""
+    """Return the lines and arcs of curve `tag`, in reverse order and direction if `tag` is negative."""
     return pieces if tag > 0 else [piece.backwards for piece in reversed(pieces)]
 
 
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
-    """Return all curves in order from a free end, reversed where necessary, and True if they are closed.
+    """Return the pieces of all curves in order along the profile, and True if the profile is closed.
+
+    An open profile begins at one of its two free ends. Curves are reversed where necessary.
+
+    Args:
+        curves: lines and arcs of each curve.
+        file: name of the file, for messages.
 
     Raises:
         InputError: the curves do not form one line.
@@ -126,38 +138,47 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
         neighbours[b].append(a)
     number = np.array([1 + len(others) for others in neighbours])
     if number.max() > 2 or len(curves) > 1 and any(k ^ 1 in others for k, others in enumerate(neighbours)):
-        at = ends[np.argmax(number)]
-        raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({at[0]:.6g}, {at[1]:.6g}), or a"
-                         f" curve closes in itself: name the curves of the profile, curves=[...]")
+        x, y = ends[np.argmax(number)]
+        raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({x:.6g}, {y:.6g}), or a curve"
+                         f" closes in itself: name the curves of the profile, curves=[...]")
     free = np.flatnonzero(number == 1)
     if len(free) not in (0, 2):
         raise InputError(f"tool file {file!r}: its curves have {len(free)} free ends: a profile has two, or none if it"
                          f" is closed; name the curves of the profile, curves=[...]")
     if len(curves) == 1:
         return curves[0], not len(free)
-    at, found = int(free[0]) if len(free) else 0, list[Line | Arc]()
+    first, found = int(free[0]) if len(free) else 0, list[Line | Arc]()       # ends 2 k and 2 k + 1 belong to curve k
     for k in range(len(curves)):
-        found += _directed(curves[at // 2], -1 if at % 2 else 1)
-        last = at ^ 1
+        found += _directed(curves[first // 2], -1 if first % 2 else 1)
+        last = first ^ 1
         following = neighbours[last]
         if k < len(curves) - 1 and (not following or not len(free) and following[0] == 0):
             raise InputError(f"tool file {file!r}: its curves are in several parts: name those of the profile,"
                              f" curves=[...]")
-        at = following[0] if following else at
+        first = following[0] if following else first
     return found, not len(free)
 
 
 def _tag(tag: Any) -> int:
-    """Return the number of a curve, checked."""
+    """Return the number of a curve, an integer other than 0; a negative number reverses the curve.
+
+    Raises:
+        InputError: `tag` is no such number.
+    """
     number = finite("tools.read: number of a curve", tag)
     return int(math.copysign(count("tools.read: number of a curve", abs(number)), number))
 
 
 def _factor(units: Any, kind: str, file: str) -> float:
-    """Return the factor for the lengths of a file.
+    """Return the factor by which the lengths of a file are multiplied.
+
+    Args:
+        units: argument `units` of `read`.
+        kind: format of the file, such as "dxf".
+        file: name of the file.
 
     Raises:
-        InputError: the unit is unknown, or the file states none.
+        InputError: the unit is unknown, or the file states no unit.
     """
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
@@ -170,7 +191,7 @@ def _factor(units: Any, kind: str, file: str) -> float:
 
 
 def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
-    """Return a piece with its lengths times a factor."""
+    """Return the line or arc with its coordinates and radius multiplied by a factor."""
     return (Line(piece.a * factor, piece.b * factor) if isinstance(piece, Line)
             else piece._replace(centre=piece.centre * factor, radius=piece.radius * factor))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.numerals import is_number
-from .profile import Arc, Line
+from .pieces import Arc, Line
 
 _OPERATORS: dict[type, Any] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
@@ -61,7 +61,13 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
 
 
 class _Drawing:
-    """Points, curves and numbers defined by the statements so far."""
+    """Points, curves and named numbers of a script, to which `add` adds those of a statement.
+
+    Attributes:
+        values: {name: number}.
+        points: {number of a point: (x, y), shape (2,)}.
+        curves: {number of a curve: line or arc, or the kind of another curve}.
+    """
 
     def __init__(self) -> None:
         self.values: dict[str, float] = {"Pi": math.pi}
@@ -89,10 +95,10 @@ class _Drawing:
             self.values[name.strip()] = self._number(value)
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
-        """Add a point.
+        """Add point `tag` with the numbers (x, y, 0) or (x, y, 0, mesh size).
 
         Raises:
-            ValueError: it lies outside the plane, or its number is used already.
+            ValueError: the point lies outside the plane, or its number is used already.
         """
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
@@ -101,20 +107,20 @@ class _Drawing:
         self.points[tag] = np.array(numbers[:2])
 
     def _add_line(self, tag: int, numbers: list[float]) -> None:
-        """Add a line.
+        """Add line `tag` between the two points with these numbers.
 
         Raises:
-            ValueError: it has not two points.
+            ValueError: there are not two numbers.
         """
         if len(numbers) != 2:
             raise ValueError("a line must be {first point, last point}")
         self._add_curve(tag, Line(*(self._point(n) for n in numbers)))
 
     def _add_circle(self, tag: int, numbers: list[float]) -> None:
-        """Add a circular arc.
+        """Add circular arc `tag`.
 
-        It is given by {first point, centre, last point} if below 180 degrees, or by {x, y, 0, radius[, first angle,
-        last angle]}.
+        An arc below 180 degrees has the numbers {first point, centre, last point}. Any arc may have the numbers {x, y,
+        0, radius, first angle, last angle}, without the angles for a full circle.
 
         Raises:
             ValueError: the two ends differ in their distance from the centre, or the numbers do not define an arc.
@@ -135,7 +141,7 @@ class _Drawing:
             raise ValueError("a circle must be {first point, centre, last point}")
 
     def _add_curve(self, tag: int, piece: Line | Arc | str) -> None:
-        """Store a curve under its number.
+        """Add a curve with the number `tag`: a line or an arc, or the kind of another curve.
 
         Raises:
             ValueError: the number is used already.
@@ -157,17 +163,17 @@ class _Drawing:
 
     @staticmethod
     def _tag(number: float) -> int:
-        """Return a number as an integer.
+        """Return the number of a point or curve as an integer.
 
         Raises:
-            ValueError: it is not a positive integer.
+            ValueError: the number is not a positive integer.
         """
         if number != int(number) or number < 1:
             raise ValueError(f"{number:g} is no number of a point or curve")
         return int(number)
 
     def _number(self, text: str) -> float:
-        """Return the value of an expression of numbers, names and + - * / ^.
+        """Return the value of an expression of numbers, names, functions and + - * / ^.
 
         Raises:
             ValueError: the expression contains anything else.
@@ -199,10 +205,10 @@ class _Drawing:
 
 
 def _real(value: Any) -> float:
-    """Return a float.
+    """Return the result of an operation, a float.
 
     Raises:
-        ValueError: it is not a finite real number.
+        ValueError: the result is complex.
     """
     if isinstance(value, complex):
         raise ValueError("a root of a negative number")
@@ -210,12 +216,12 @@ def _real(value: Any) -> float:
 
 
 def _without_remarks(text: str) -> str:
-    """Return the script without comments."""
+    """Return the text of a script with its comments replaced by spaces, so that lines keep their numbers."""
     return re.sub(r"//[^\n]*|/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """Yield (line, statement without its semicolon) of a script without comments."""
+    """Yield (number of the first line, text without the semicolon) of each statement of a script without comments."""
     line = 1
     for part in text.split(";"):
         begin = line + part[: len(part) - len(part.lstrip())].count("\n")

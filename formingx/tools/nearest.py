@@ -62,7 +62,7 @@ void nearest(long points, const double *x, long pieces, long lines, const double
 
 
 def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the signed distance of points, its gradient and its curvature.
+    """Return the signed distance of points from a profile, its gradient, and the curvature of its level lines.
 
     Args:
         x: points, shape (n, 2), length.
@@ -72,7 +72,8 @@ def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, n
         lines: number of lines.
 
     Returns:
-        Distances, shape (n,), gradients, shape (n, 2), and curvatures, shape (n,).
+        Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
+        1/length.
     """
     ffi, doubles, function = _compiled()
     n = len(x)

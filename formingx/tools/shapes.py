@@ -7,7 +7,8 @@ import numpy as np
 
 from ..errors import InputError, finite, non_negative, positive
 from .files import read
-from .profile import TURN, Arc, Line, Nearest, Tool
+from .pieces import TURN, Arc, Line
+from .profile import Nearest, Tool
 
 __all__ = ["Arc", "Line", "Nearest", "Pot", "Tool", "bottle", "clamp_ring", "cone", "cup", "cylinder", "male", "plane",
            "pot", "read", "sphere"]
@@ -17,7 +18,7 @@ def plane(z: float = 0.0) -> Tool:
     """Return the half-space above Z = z as a tool.
 
     Args:
-        z: position of its surface, length.
+        z: Z of the surface of the tool, length.
 
     >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()
     [-1.0, 2.0]
@@ -67,6 +68,9 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
         fillet: radius of the edge around the top, length.
         foot: radius of the edge between wall and base plate, length.
 
+    Raises:
+        InputError: a length is not positive, or an angle or a fillet is too large.
+
     >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)
     >>> mould.signed_distance([[0.0, 25.0]]).tolist()
     [-5.0]
@@ -115,8 +119,11 @@ def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
 
     Args:
         radius: radius of the plug, length.
-        z: Z of its face, length.
-        fillet: radius of the edge, length.
+        z: Z of the flat end, length.
+        fillet: radius of the edge between flat end and shaft, length.
+
+    Raises:
+        InputError: the radius is not positive, or the fillet is too large.
 
     >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
     >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
@@ -131,8 +138,8 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
     """Return a cone that points down.
 
     Args:
-        half_angle: angle between its surface and the Z axis, degrees, from 0.01 to below 90.
-        z: Z of its lowest point, length.
+        half_angle: angle between the surface and the Z axis, degrees, from 0.01 to below 90.
+        z: Z of the lowest point of the cone, length.
         tip: radius of the rounded tip, length.
         size: length of the drawn surface; the cone itself has no end.
 
@@ -158,9 +165,12 @@ def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
     """Return a ball (axisymmetric, r = 0) or a round bar (plane strain).
 
     Args:
-        radius: radius, length.
-        z: Z of its lowest point, length.
-        r: R of its lowest point, length.
+        radius: radius of the ball or bar, length.
+        z: Z of the lowest point, length.
+        r: R of the lowest point, length.
+
+    Raises:
+        InputError: the radius is not positive.
 
     >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
     [-1.0, 1.0]
@@ -196,6 +206,9 @@ def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, he
         z: position of the flat face, length.
         height: height of the ring, at least two fillets (the default), length.
 
+    Raises:
+        InputError: a length is not positive, or the fillets do not fit on the ring.
+
     >>> ring = fx.tools.clamp_ring(radius=50.0, width=20.0, fillet=2.0)
     >>> ring.signed_distance([[60.0, -1.0]]).tolist()
     [-1.0]
@@ -212,7 +225,7 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
     """Return mould and plug of a tapered cup, which is formed upwards.
 
     The sheet lies on Z from 0 to its thickness, as made by `mesh.disc`. The mould opens downwards onto the top of the
-    sheet. The plug points up and touches the bottom. Drive the plug with `direction=(0, 1)`.
+    sheet. The plug points up and touches the bottom face of the sheet. Its contact needs `direction=(0, 1)`.
 
     Args:
         mouth: radius of the cup at its mouth, length.
@@ -252,7 +265,7 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
 
 
 def _draft(shape: str, draft: float) -> float:
-    """Return a draft angle in radians, checked.
+    """Return the draft angle of a shape in radians, from degrees; shape: name for messages.
 
     Raises:
         InputError: the angle is negative, or 90 degrees or more.

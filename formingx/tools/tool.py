@@ -41,4 +41,8 @@ class PlaneTool(RigidTool, Protocol):
     """Rigid tool of a section; it is smooth between corners, so its distance has derivatives."""
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Return the signed distance of points, shape (n, 2), its gradient and its curvature."""
+        """Return the signed distance of points from the surface, with its gradient and curvature (`Nearest`).
+
+        Args:
+            x: points, shape (n, 2), length.
+        """

@@ -1,0 +1,214 @@
+"""Lines and circular arcs of a profile, and the fillets between the lines of a polyline."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, finite, pair, positive
+
+FLAT = 1e-9
+"""Angle between two successive pieces below which their joint is smooth, radians."""
+TURN = 2 * math.pi
+"""Angle of a full circle, radians."""
+
+
+class Line(NamedTuple):
+    """Straight piece of a profile.
+
+    Attributes:
+        a: first point (R, Z), length.
+        b: last point (R, Z), length.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+
+    @property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """First and last point (R, Z), length."""
+        return self.a, self.b
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Angle between the line and the R axis at its first and last point (both equal), radians."""
+        angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
+        return angle, angle
+
+    @property
+    def backwards(self) -> Line:
+        """The line from its last point to its first."""
+        return Line(self.b, self.a)
+
+
+class Arc(NamedTuple):
+    """Circular piece of a profile.
+
+    Attributes:
+        centre: centre (R, Z), length.
+        radius: radius, length; 0 for a sharp corner.
+        start: polar angle of the first point, radians.
+        sweep: angle of the arc, positive if it turns left, radians.
+    """
+
+    centre: np.ndarray
+    radius: float
+    start: float
+    sweep: float
+
+    @property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """First and last point (R, Z), length."""
+        first, last = (self.centre + self.radius * np.array([math.cos(a), math.sin(a)])
+                       for a in (self.start, self.start + self.sweep))
+        return first, last
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Angle between the tangent and the R axis at the first and the last point, radians."""
+        quarter = math.copysign(math.pi / 2, self.sweep)
+        return self.start + quarter, self.start + self.sweep + quarter
+
+    @property
+    def backwards(self) -> Arc:
+        """The arc from its last point to its first."""
+        return self._replace(start=self.start + self.sweep, sweep=-self.sweep)
+
+
+def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
+    """Return the lines and tangent arcs of a polyline with fillets.
+
+    Args:
+        points: corners (R, Z), shape (n, 2), length.
+        radii: fillet radius of each corner, length.
+        closed: True to join the last corner to the first.
+        each: True if every point with a fillet must be a corner.
+
+    Raises:
+        InputError: a fillet has no corner, or is too large.
+    """
+    n, size = len(points), float(np.ptp(points, axis=0).max())
+    edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
+    lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
+    for (i, j), length in lengths.items():
+        if length <= 1e-9 * size:
+            raise InputError(f"Tool: points {i} and {j} are the same, {show(points[i])}")
+    angle = {e: math.atan2(*(points[e[1]] - points[e[0]])[::-1]) for e in edges}
+    before = {j: (i, j) for i, j in edges}
+    after = {i: (i, j) for i, j in edges}
+    cut, arcs = [0.0] * n, {}
+    for i, radius in enumerate(radii):
+        if radius == 0:
+            continue
+        outgoing = angle[after[i]] if i in after else None
+        incoming = angle[before[i]] if i in before else None
+        if outgoing is None or incoming is None:
+            if abs(points[i][0]) > 1e-9 * size:
+                raise InputError(f"Tool: fillet at point {i} = {radius!r}: an open end has no corner to round")
+            outgoing, incoming = (-incoming if outgoing is None else outgoing,             # type: ignore[operator]
+                                  -outgoing if incoming is None else incoming)             # type: ignore[operator]
+        turn = turn_angle(incoming, outgoing)
+        if abs(turn) < FLAT:
+            if each:
+                raise InputError(f"Tool: fillet at point {i} = {radius!r}: the profile runs straight on there: it has"
+                                 f" no corner to round")
+            continue
+        cut[i] = radius * math.tan(abs(turn) / 2)
+        arcs[i] = _fillet(points[i], radius, cut[i], incoming, turn, i in before, i in after)
+    _check_fit(points, radii, lengths, cut)
+    pieces: list[Line | Arc] = [arcs[0]] if 0 in arcs and not closed else []
+    for i, j in edges:
+        direction = (points[j] - points[i]) / lengths[i, j]
+        if lengths[i, j] - cut[i] - cut[j] > 1e-9 * size:
+            pieces.append(Line(points[i] + cut[i] * direction, points[j] - cut[j] * direction))
+        if j in arcs:
+            pieces.append(arcs[j])
+    return pieces
+
+
+def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn: float, first: bool,
+            second: bool) -> Arc:
+    """Return the arc that rounds a corner; half of it at an open end on the axis.
+
+    Args:
+        corner: the corner (R, Z), shape (2,), length.
+        radius: radius of the arc, length.
+        cut: length by which the arc shortens each edge at the corner, length.
+        incoming: direction of the edge before the corner, radians.
+        turn: angle between the edges, positive to the left, radians.
+        first: True if there is an edge before the corner.
+        second: True if there is an edge after the corner.
+    """
+    side = math.copysign(1.0, turn)
+    start = corner - cut * np.array([math.cos(incoming), math.sin(incoming)])
+    centre = start + side * radius * np.array([-math.sin(incoming), math.cos(incoming)])
+    begin = incoming - side * math.pi / 2 + (0.0 if first else turn / 2)
+    return Arc(centre, radius, begin, turn if first and second else turn / 2)
+
+
+def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[float]) -> None:
+    """Check that the fillets at the two ends of each edge fit on it.
+
+    Args:
+        points: corners (R, Z), shape (n, 2), length.
+        radii: fillet radius of each corner, length.
+        lengths: {(first corner, last corner): length of the edge}.
+        cut: length by which the fillet at each corner shortens its edges, length.
+
+    Raises:
+        InputError: two fillets are together longer than their edge.
+    """
+    for (i, j), length in lengths.items():
+        if cut[i] + cut[j] > length * (1 + 1e-9):
+            k = i if cut[i] >= cut[j] else j
+            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {show(points[k])}:"
+                             f" the edge from {show(points[i])} to {show(points[j])} is {length:.6g} long and its"
+                             f" fillets take {cut[i] + cut[j]:.6g}; at most"
+                             f" {radii[k] * max(length - cut[i] - cut[j] + cut[k], 0) / cut[k]:.6g} fits")
+
+
+def checked(piece: Line | Arc, i: int) -> Line | Arc:
+    """Return piece i of a profile with its numbers as floats.
+
+    Raises:
+        InputError: the piece is neither a line nor an arc, is not finite, or has no length.
+    """
+    caller = f"Tool: piece {i}"
+    if isinstance(piece, Line):
+        a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)
+        if not math.dist(a, b) > 1e-12 * max(np.abs(a).max(), np.abs(b).max()):
+            raise InputError(f"{caller}: a line from {show(a)} to {show(b)} has no length")
+        return Line(a, b)
+    if not isinstance(piece, Arc):
+        raise InputError(f"{caller} = {piece!r}: must be a Line or an Arc")
+    centre = np.array(pair(f"{caller}: centre", piece.centre))
+    arc = Arc(centre, positive(f"{caller}: radius", piece.radius), finite(f"{caller}: start", piece.start),
+              finite(f"{caller}: sweep", piece.sweep))
+    if not 1e-9 < abs(arc.sweep) <= TURN * (1 + 1e-12):
+        raise InputError(f"{caller}: sweep = {arc.sweep!r}: must be an angle in radians, not 0, at most a full turn")
+    return arc
+
+
+def turn_angle(incoming: float, outgoing: float) -> float:
+    """Return the angle from a direction to the next one along the profile, radians, in (-pi, pi]."""
+    return math.pi - (math.pi - (outgoing - incoming)) % TURN
+
+
+def sampled(piece: Line | Arc, n: int) -> np.ndarray:
+    """Return n + 1 evenly spaced points on an arc, shape (n + 1, 2), or the ends of a line, shape (2, 2), length."""
+    if isinstance(piece, Line):
+        return np.array([piece.a, piece.b])
+    angles = piece.start + piece.sweep * np.linspace(0, 1, n + 1)
+    return piece.centre + piece.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def number_of_chords(piece: Line | Arc) -> int:
+    """Return the number of chords that replace a piece in the search for crossings: 64 per 90 degrees, at least 4."""
+    return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
+
+
+def show(point: np.ndarray) -> str:
+    """Return a point, shape (2,), as text for messages."""
+    return f"({point[0]:.6g}, {point[1]:.6g})"
