@@ -21,8 +21,8 @@ class Slab:
 
     Attributes:
         thickness: thickness d, length.
-        conductivity: thermal conductivity k.
-        capacity: heat capacity per volume, rho c.
+        conductivity: thermal conductivity k, power/(length temperature).
+        capacity: heat capacity per volume, rho c, energy/(length^3 temperature).
     """
 
     thickness: float
@@ -37,9 +37,10 @@ class Slab:
 
 def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, float], x: Any, times: Any,
            source: Callable | None = None, terms: int = 200) -> np.ndarray:
-    r"""Return the temperatures of a slab with convection at both faces.
+    r"""Return the temperatures of a slab with convection at both faces, as a sum over its modes.
 
-    With the Biot numbers b of the faces and the steady state T_s:
+    T_s is the steady temperature, d the thickness, alpha the thermal diffusivity, b_0 and b_1 the Biot numbers of the
+    faces, A_m the amplitudes that give the initial temperature:
 
     .. math::
         T(x, t) = T_s(x) + \sum_m A_m \, \phi_m(x/d) \, e^{-m^2 \alpha t/d^2}, \quad
@@ -51,15 +52,15 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
     Args:
         slab: the slab.
         start: uniform initial temperature.
-        h: heat transfer coefficients of the faces x = 0 and x = d.
+        h: heat transfer coefficients of the faces x = 0 and x = d, power/(length^2 temperature).
         air: temperatures of the air at the two faces.
         x: positions, shape (n,), length.
         times: times, shape (k,).
-        source: heat source per volume, a function of x; default none.
-        terms: number of terms.
+        source: heat source per volume, power/length^3, a function of x, shape (...); default none.
+        terms: number of modes.
 
     Returns:
-        Temperatures, shape (k, n).
+        Temperatures at the times and positions, shape (k, n).
 
     >>> from formingx.exact.heat import Slab, series
     >>> sheet = Slab(thickness=2.0, conductivity=0.2, capacity=2.0)
@@ -88,11 +89,18 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
 
 
 def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callable:
-    """Return the steady temperature as a function of x: -k T'' = source, with convection at both faces."""
+    """Return the steady temperature of a slab as a function of x: -k T'' = source, with convection at both faces.
+
+    Args:
+        slab: the slab.
+        h: heat transfer coefficients of the faces x = 0 and x = d.
+        air: temperatures of the air at the two faces.
+        source: heat source per volume, a function of x, or None.
+    """
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
 
-    def integrated(x):                                           # -source/k integrated twice from 0, and once
+    def integrated(x):                                           # -source/k, integrated from 0 twice and once
         if source is None:
             return 0.0 * x, 0.0 * x
         y = x[..., None] * (nodes + 1) / 2
@@ -108,16 +116,17 @@ def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_star
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
 
-    The heat flux into the tool is `conductance` (T_sheet - T_tool). The other face of the sheet loses h (T - air). The
-    back of the tool keeps its initial temperature.
+    The heat flux into the tool is conductance * (T_sheet - T_tool), with the temperatures of the touching faces. The
+    heat flux from the other face of the sheet to the air is h * (T - air). The back of the tool keeps its initial
+    temperature.
 
     Args:
         sheet: the sheet.
         tool: the tool.
-        conductance: thermal contact conductance.
+        conductance: thermal contact conductance, power/(length^2 temperature).
         start: initial temperature of the sheet.
         tool_start: initial temperature of the tool.
-        h: heat transfer coefficient of the free face.
+        h: heat transfer coefficient of the free face, power/(length^2 temperature).
         air: temperature of the air.
         x: positions in the sheet from the touching face, shape (n,), length.
         depths: positions in the tool from the touching face, shape (m,), length.
@@ -146,7 +155,10 @@ def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_star
 
 
 def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
-    """Return the inverse Laplace transform at a time, on Talbot's contour with n points; the error is about 1e-9."""
+    """Return the inverse Laplace transform at a time t > 0, by a sum over n points of Talbot's contour.
+
+    transformed: function of a complex number s that returns the transforms, shape (m,). The error is about 1e-9.
+    """
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
     cot = 1 / np.tan(theta)
@@ -160,16 +172,16 @@ def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: An
           source: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the temperatures of a slab with given heat fluxes at its faces, by the method of lines.
 
-    Finite volumes have nodes at both faces and between equal cells. Their error is proportional to the square of the
-    cell size; Richardson's extrapolation from two cell sizes removes it.
+    Nodes lie at both faces and between cells of equal size. The error of finite volumes is proportional to the square
+    of this size; Richardson's extrapolation from two sizes removes it.
 
     Args:
         slab: the slab.
         start: uniform initial temperature.
-        fluxes: heat fluxes into the faces x = 0 and x = d, functions of the temperature.
+        fluxes: heat fluxes into the faces x = 0 and x = d, power/length^2, functions of the temperature of the face.
         times: times in ascending order, shape (k,).
-        cells: number of cells.
-        source: heat source per volume, a function of x; default none.
+        cells: number of cells of the finer division, even.
+        source: heat source per volume, power/length^3, a function of x, shape (n,); default none.
 
     Returns:
         Positions x, shape (n,), length, and temperatures, shape (k, n).
@@ -180,7 +192,7 @@ def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: An
 
 
 def _lines(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int, source: Callable | None) -> np.ndarray:
-    """Return the temperatures at the nodes of finite volumes, shape (times, cells + 1)."""
+    """Return the temperatures at the nodes of finite volumes, shape (times, cells + 1); arguments as in `lines`."""
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells

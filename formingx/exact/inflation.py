@@ -50,15 +50,15 @@ from ..errors import InputError, known, non_negative, positive
 
 @dataclass(frozen=True)
 class MembraneState:
-    """Membrane inflated to a given pole stretch, in the units of the input.
+    """Membrane inflated to a given pole stretch, at n points from the pole to the rim, in the units of the input.
 
     Attributes:
         pressure: pressure, stress.
-        height: height of the pole, length.
+        height: height of the pole above the rim, length.
         R: reference radii, shape (n,), length.
         r: deformed radii, shape (n,), length.
-        z: deformed heights, shape (n,), length.
-        thickness_ratio: thickness stretch, shape (n,).
+        z: deformed heights above the rim, shape (n,), length.
+        thickness_ratio: deformed over reference thickness, shape (n,).
     """
 
     pressure: float
@@ -71,7 +71,7 @@ class MembraneState:
 
 def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
                        c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
-    """Return the inflated membrane with a given stretch at its pole.
+    """Return a flat circular membrane with a fixed rim, inflated to a given stretch at its pole.
 
     Args:
         pole_stretch: stretch at the pole, above 1.
@@ -128,7 +128,9 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
 def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
                       c01: float) -> MembraneState:
-    """Return `membrane_inflation` for c10(R), with the pressure continued from a small stretch by the secant method.
+    """Return the inflated membrane whose constant c10 is a function of R (arguments as in `membrane_inflation`).
+
+    The pole stretch is raised in steps; the secant method finds the pressure of each.
 
     Raises:
         InputError: no pressure was found.
@@ -169,13 +171,13 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
 
 
 def meridional_stretch(n: Any, l2: Any) -> Any:
-    r"""Return the meridional stretch of a neo-Hookean membrane for a tension, by Newton's method.
+    r"""Return the meridional stretch lambda_1 of a neo-Hookean membrane under a meridional tension, by Newton's method.
 
     .. math:: \lambda_1 - \lambda_1^{-3} \lambda_2^{-2} = n
 
     Args:
-        n: tension per reference length over 2 c10 h0, shape (k,) or a number.
-        l2: circumferential stretch, shape (k,) or a number.
+        n: tension per reference length over 2 c10 h0 (h0: reference thickness), shape (k,) or a number.
+        l2: circumferential stretch lambda_2, shape (k,) or a number.
     """
     l1 = n + l2**-0.5
     for _ in range(20):
@@ -185,7 +187,7 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
 
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
-    """Return the first pressure maximum of a membrane, or None if there is none below a pole stretch of 12.
+    """Return the first pressure maximum of an inflated circular membrane, or None below a pole stretch of 12.
 
     Args:
         radius: reference radius, length.
@@ -222,15 +224,15 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
 
 @dataclass(frozen=True)
 class ThickWallState:
-    """Thick tube or sphere inflated to a given stretch of its inner face.
+    """Thick tube or sphere inflated to a given stretch of its inner face, at n points through the wall.
 
     Attributes:
         pressure: inner pressure, stress.
-        R: reference radii through the wall, shape (n,), length.
+        R: reference radii of the points, shape (n,), length.
         r: deformed radii, shape (n,), length.
         radial: radial Cauchy stress, shape (n,), stress.
-        hoop: hoop stress, shape (n,), stress.
-        third: axial stress of a tube, second hoop stress of a sphere, shape (n,), stress.
+        hoop: hoop Cauchy stress, shape (n,), stress.
+        third: axial Cauchy stress of a tube, second hoop stress of a sphere, shape (n,), stress.
     """
 
     pressure: float
@@ -242,15 +244,15 @@ class ThickWallState:
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
-        """Hydrostatic pressure, minus the mean of the three stresses, shape (n,), stress."""
+        """Hydrostatic pressure: minus the mean of radial, hoop and third stress, shape (n,), stress."""
         return -(self.radial + self.hoop + self.third) / 3
 
     def cauchy(self, direction: Any) -> np.ndarray:
         """Return the Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
 
         Args:
-            direction: outward direction through the wall in the (r, z) plane, of any length, shape (2,) or (n, 2); (1,
-                0) for a tube.
+            direction: vector (r, z) of any length that points outwards through the wall, shape (2,) or (n, 2); (1, 0)
+                for a tube.
         """
         radial = np.broadcast_to(np.asarray(direction, dtype=float), (len(self.R), 2))
         radial = radial / np.linalg.norm(radial, axis=1)[:, None]
@@ -309,10 +311,10 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
 
 
 def thick_sphere_limit_point(**wall: float) -> tuple[float, ThickWallState] | None:
-    """Return the first pressure maximum of a thick sphere, or None if there is none below an inner stretch of 20.
+    """Return the first pressure maximum of an inflated thick sphere, or None below an inner stretch of 20.
 
     Args:
-        wall: sizes and constants of `thick_wall`.
+        wall: arguments inner_radius, outer_radius, c10, c01 and R of `thick_wall`.
 
     Returns:
         The inner stretch and the state at the maximum.

@@ -46,15 +46,15 @@ from .inflation import meridional_stretch
 
 @dataclass(frozen=True)
 class PlugState:
-    """Membrane under a plug, in the units of the input.
+    """Membrane under a plug, at n points from the edge of the plug to the rim, in the units of the input.
 
     Attributes:
         force: force on the plug, stress length^2.
         face_stretch: equal biaxial stretch under the plug.
-        R: reference radii from the edge of the plug to the rim, shape (n,), length.
+        R: reference radii of the points, shape (n,), length.
         r: deformed radii, shape (n,), length.
         z: deformed heights, 0 at the rim, shape (n,), length.
-        thickness_ratio: thickness stretch, shape (n,).
+        thickness_ratio: deformed over reference thickness, shape (n,).
     """
 
     force: float
@@ -67,7 +67,7 @@ class PlugState:
 
 def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thickness: float, c10: float,
                         c01: float = 0.0, friction: str = "stick") -> PlugState:
-    """Return the membrane that a flat plug with a sharp edge has pushed by a travel.
+    """Return a circular membrane with a fixed rim that a flat plug with a sharp edge has pushed by a travel.
 
     Args:
         travel: travel of the plug, above 0, length.
@@ -76,7 +76,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
         thickness: reference thickness, length.
         c10: Mooney constant, stress.
         c01: Mooney constant, stress.
-        friction: on the plug, "stick" or "none".
+        friction: "stick" or "none", between membrane and plug.
 
     Raises:
         InputError: a size or constant is not allowed. At this travel the membrane would touch the side of the plug, or
@@ -138,8 +138,18 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 
 
 def _continued(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
-            radius: float) -> Any:
-    """Return the solution of the boundary value problem at the travel `goal`, continued from a guess at a smaller one.
+               radius: float) -> Any:
+    """Return the solution of a boundary value problem at a travel, reached in steps from a guess at a smaller travel.
+
+    Args:
+        slopes: function of (s, y, p) that returns the derivatives of y, as in `solve_bvp`.
+        ends: function of (travel, y at the first point, y at the last point, p) that returns the residuals there.
+        s: points of the guess on [0, 1], shape (n,).
+        y: guess of the solution, shape (3, n); its second row is proportional to the travel.
+        p: guess of the unknown parameters.
+        depth: travel of the guess, over the radius.
+        goal: travel of the solution, over the radius.
+        radius: reference radius of the membrane, for the message, length.
 
     Raises:
         InputError: a step of the continuation does not converge.
@@ -183,7 +193,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         face_stretch: stretch under the flat of the plug, above 1. It increases with the travel.
         radius: reference radius of the membrane, length.
         plug_radius: radius of the plug, length.
-        fillet: radius of its edge, length.
+        fillet: radius of the edge of the plug, length.
         thickness: reference thickness, length.
         c10: neo-Hookean constant, stress.
         mu: coefficient of friction.
@@ -206,7 +216,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
     edge = _integrated(2 * (f + h0), flat, _touching(mu, h0, f), events=upright, dense_output=True)
     edge_length = edge.t[-1]                        # arc length of the edge
 
-    def separation_point(u):                              # y at the arc length u of contact
+    def separation_point(u):                     # y where contact ends, at the arc length u from the flat
         return _state_after(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _touching(mu))
 
     def rim_error(u):                            # 0 if the membrane ends at the rim
@@ -228,34 +238,45 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
 
 
 def _tensions(t: float, l2: float) -> tuple[float, float]:
-    """Return the meridional stretch and the tension T2, for a given T1 and circumferential stretch.
+    """Return the meridional stretch and the circumferential tension T2 of a neo-Hookean membrane.
 
-    Tensions are over 2 c10 h0.
+    Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness).
+
+    Args:
+        t: meridional tension T1.
+        l2: circumferential stretch.
     """
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
 def _state_after(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
-    """Return the state (R, r, z, phi, T1) at a distance from a given one.
+    """Return the state (R, r, z, phi, T1) of the meridian at a distance from a point with the state y.
 
-    Lengths are over the radius, tensions over 2 c10 h0.
+    Lengths are over the radius of the membrane, tensions over 2 c10 h0.
+
+    Args:
+        length: distance, arc length or reference radius as in `slopes`.
+        y: state (reference radius, deformed radius, height, slope, meridional tension), shape (5,).
+        slopes: function of the five entries of a state that returns their derivatives by the distance.
     """
     return y if length == 0 else _integrated(length, y, slopes).y[:, -1]
 
 
 def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
-    """Return the solution of `solve_ivp` over a length, from the state y."""
+    """Return the solution of `solve_ivp` for the derivatives `slopes` over a distance `length`, from the state y."""
     from scipy.integrate import solve_ivp
     return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 
 
 def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
-    """Return the function that gives the derivative of (R, r, z, phi, T1) by arc length where the membrane touches.
+    """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length where the membrane touches.
+
+    Lengths are over the radius of the membrane, tensions over 2 c10 h0.
 
     Args:
         mu: coefficient of friction.
-        h0: reference thickness.
+        h0: reference thickness; 0 on the side of the plug.
         fillet: radius of the edge; infinite on the side of the plug.
     """
     def slopes(R, r, z, phi, t):
@@ -268,6 +289,6 @@ def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
 
 
 def _free(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
-    """Return the derivative of (R, r, z, phi, T1) by R on the free part of the membrane."""
+    """Return the derivatives of (R, r, z, phi, T1) by R on the free part of a membrane under a plug."""
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

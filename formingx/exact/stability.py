@@ -85,14 +85,14 @@ def cylinder(nu: float, n: int) -> float:
 
 
 def tube(ratio: float, n: int) -> tuple[float, float]:
-    """Return the state at which a tube under an outer fluid pressure buckles, at an axial stretch of 1.
+    """Return the state at which a tube of constant length buckles under an outer fluid pressure.
 
     Args:
         ratio: inner over outer reference radius.
         n: number of waves round the axis.
 
     Returns:
-        Pressure over mu, and deformed over reference inner radius.
+        Pressure over the shear modulus, and deformed over reference inner radius.
     """
     def f(inner):
         return _determinant(ratio, inner, n, 0.0, outside=True)
@@ -103,7 +103,8 @@ def tube(ratio: float, n: int) -> tuple[float, float]:
 def inflated_tube(ratio: float, kB: float, n: int) -> float:
     """Return the first inner stretch at which an inflated tube bulges or bends in one half wave along its axis.
 
-    The ends are frictionless, the length is constant. The inner stretch is deformed over reference inner radius.
+    The ends are frictionless, the length is constant. The inner stretch is deformed over reference inner radius. It is
+    nan if the tube is stable up to an inner stretch of 5.
 
     Args:
         ratio: inner over outer reference radius.
@@ -141,7 +142,7 @@ def clamped_plate(n: int) -> float:
 
 
 def _last_root(f: Callable[[float], float], low: float) -> float:
-    """Return the root below 1 that is nearest to 1, or nan."""
+    """Return the root of f nearest to 1 between `low` and 1, or nan if f has none."""
     grid = 1 - np.geomspace(1e-5, 1 - low, 80)
     last = f(grid[0])
     for a, b in zip(grid, grid[1:]):
@@ -153,7 +154,13 @@ def _last_root(f: Callable[[float], float], low: float) -> float:
 
 
 def _pressure(ratio: float, inner: float, stretch: float) -> float:
-    """Return the outer minus the inner pressure over mu, for a tube of outer radius 1."""
+    """Return the outer minus the inner pressure of a tube, over its shear modulus.
+
+    Args:
+        ratio: inner over outer reference radius.
+        inner: deformed over reference inner radius.
+        stretch: axial stretch.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     R, w = ratio + (1 - ratio) * (nodes + 1) / 2, weights * (1 - ratio) / 2
     r = np.sqrt((inner * ratio) ** 2 + (R**2 - ratio**2) / stretch)
@@ -162,7 +169,18 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    """Return the determinant of the conditions on the outer face for three motions that satisfy the inner ones."""
+    """Return the determinant that vanishes where a tube under pressure bifurcates, at an axial stretch of 1.
+
+    Its columns are three motions that satisfy the conditions on the inner face; its rows are the conditions on the
+    outer face.
+
+    Args:
+        ratio: inner over outer reference radius.
+        inner: deformed over reference inner radius.
+        n: number of waves round the axis.
+        k: wave number along the axis times the outer reference radius.
+        outside: True if the fluid pressure acts on the outer face, False on the inner.
+    """
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
     delta = _pressure(ratio, inner, 1.0)                             # outer less inner pressure
@@ -190,7 +208,7 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
         return np.append(np.array(found).T.ravel(), dbr - (bh - br) / r)
 
     def free(r, P):
-        """Return the rows of (U, V, W, rr, rh, rz) that vanish on a face under a pressure; U' from div v = 0."""
+        """Return the rows whose products with (U, V, W, rr, rh, rz) vanish on a face of radius r under a pressure P."""
         return np.array([[P / r, P * n / r, P * k, 1, 0, 0], [P * n / r, P / r, 0, 0, 1, 0], [P * k, 0, 0, 0, 0, 1]])
     start = np.hstack([np.eye(3), -free(a, P_in)[:, :3].T])         # tractions that follow from U, V, W
     p0 = state(a)[0] + P_in

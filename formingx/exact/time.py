@@ -42,17 +42,21 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 @dataclass
 class Body:
-    """Body of one degree of freedom s and its state; it is stress-free at s = 0 initially.
+    """Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
+
+    The load is the sum of c T over n points. T is the difference of the stresses in the principal directions 1 and 3.
 
     Attributes:
         c10: material constant, stress.
         branches: (shear modulus, relaxation time) of each branch.
-        direction: de_i/de in the three principal directions, shape (3,).
+        direction: logarithmic strains in the three principal directions over a strain e, shape (3,).
         strain: function of s that returns e and de/ds of all points, shape (n,) each.
         weight: function of s that returns c and dc/ds of all points, shape (n,) each.
         time: present time.
         s: present degree of freedom.
         w: elastic logarithmic strains of the branches, shape (n, branches, 3).
+        mu: shear moduli of the branches, shape (branches,), stress.
+        tau: relaxation times of the branches, shape (branches,), time.
 
     >>> from formingx.exact.time import block
     >>> bar = block("uniaxial", c10=0.5, branches=[(1.0, 2.0)])
@@ -76,21 +80,24 @@ class Body:
 
     @property
     def load(self) -> float:
-        """Load in the present state."""
+        """Load of the body in its present state."""
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
-        """Deform to s instantaneously."""
+        """Deform the body instantaneously to the degree of freedom s, without relaxation."""
         self.w = self._jumped(s)
         self.s = s
 
     def jump_to_load(self, load: float, bracket: tuple[float, float]) -> None:
-        """Deform instantaneously to the s, within `bracket`, at which a given load is reached."""
+        """Deform the body instantaneously to a given load.
+
+        bracket: two degrees of freedom s, between which the load is reached.
+        """
         from scipy.optimize import brentq
         self.jump(brentq(lambda s: self._load(s, self._jumped(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
     def drive(self, path: Callable, times: Any) -> np.ndarray:
-        """Return the loads while s follows a prescribed path, shape (n,).
+        """Return the loads while the degree of freedom s follows a prescribed path, shape (n,).
 
         Args:
             path: function of time that returns s and ds/dt.
@@ -106,12 +113,12 @@ class Body:
         return np.array([self._load(*state) for state in states])
 
     def hold(self, times: Any) -> np.ndarray:
-        """Return the loads at given times while s is constant (relaxation), shape (n,)."""
+        """Return the loads at times, shape (n,), while the degree of freedom s is constant (relaxation)."""
         s = self.s
         return self.drive(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
-        """Return s at given times while the load is constant (creep), shape (n,)."""
+        """Return the degree of freedom s at times, shape (n,), while the load is constant (creep)."""
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
@@ -122,9 +129,9 @@ class Body:
         return found[:, 0]
 
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
-        """Return the times at which s reaches given values under the present load.
+        """Return the times at which the degree of freedom s reaches given values under the present load.
 
-        There must be no equilibrium up to `end` at which the body would stay.
+        The body must creep up to `end`: there may be no s before at which it stays in equilibrium.
 
         Args:
             targets: values of s, shape (n,).
@@ -151,17 +158,17 @@ class Body:
         return np.array(met), float(found.y_events[0][0][0]) if len(found.t_events[0]) else None
 
     def _load(self, s: float, w: np.ndarray) -> float:
-        """Return the load for s and the elastic strains."""
+        """Return the load for the degree of freedom s and the elastic strains w."""
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """Return the stress difference T, shape (n,)."""
+        """Return the difference of the stresses in directions 1 and 3 at all points, shape (n,), stress."""
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu
 
     def _jumped(self, s: float) -> np.ndarray:
-        """Return the elastic strains after an instantaneous deformation to s."""
+        """Return the elastic strains after an instantaneous deformation to s, shape (n, branches, 3)."""
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
     def _strain_rate(self, s: float) -> np.ndarray:
@@ -169,16 +176,16 @@ class Body:
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _flow(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """Return the time derivative of the elastic strains, flattened."""
+        """Return the time derivative of the elastic strains w for the rate ds of s, flattened."""
         return self._strain_rate(s) * ds - self._relaxing(w).ravel()
 
     def _relaxing(self, w: np.ndarray) -> np.ndarray:
-        """Return the relaxation rate of the elastic strains, shape (n, branches, 3)."""
+        """Return the rate at which the elastic strains w decrease by relaxation, shape (n, branches, 3), 1/time."""
         m = np.exp(2 * w)
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 
     def _time_per_s(self, s: float, w: np.ndarray) -> float:
-        """Return the derivative of time by s under a constant load."""
+        """Return the derivative of the time by the degree of freedom s in creep under a constant load."""
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])
@@ -188,7 +195,12 @@ class Body:
         return float((dc @ self._difference(s, w) + (c * de) @ stiffness) / (c @ relaxation))
 
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
-        """Return the solution at given times, and set the present time.
+        """Return the solution of an initial value problem at times, shape (n, k), and update the present time.
+
+        Args:
+            rate: function of (time, solution) that returns the time derivatives, shape (k,).
+            start: solution at the present time, shape (k,).
+            times: times in ascending order, shape (n,).
 
         Raises:
             InputError: the solution ends before the last time.
@@ -243,7 +255,9 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    """Return a thin spherical balloon of radius R0 and thickness H0: unknown s = ln(r/R0), load p R0/H0.
+    """Return a thin spherical balloon under a pressure p, with s = ln(r/R0) and the load p R0/H0.
+
+    r and R0 are its deformed and reference radius, H0 is its reference thickness.
 
     Args:
         c10: material constant, stress.

@@ -18,7 +18,8 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
             number if it does not accept arrays.
         until: last process time.
         start: first process time.
-        tolerance: largest error of the table, linear between its points, over the range of the values.
+        tolerance: largest difference between the function and the table, which is linear between its points, over the
+            range of the values.
 
     Returns:
         [(time, value), ...].
@@ -50,5 +51,5 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
 
 
 def _evaluate(function: Callable, t: np.ndarray) -> np.ndarray:
-    """Return the values of the function at times, shape (n,)."""
+    """Return the values of the user's function at times t, shape (n,)."""
     return values("amplitude: function", function, {"t": t})

@@ -15,13 +15,16 @@ class Table:
     """Smooth curve through points, monotone between successive points (see `table`).
 
     Call it with numbers, shape (...), for values of this shape, or with a UFL expression for an expression. Numbers
-    outside the table are refused. An expression is extrapolated linearly, because an iteration may pass there; `check`
-    is called before a state is accepted.
+    outside the table are refused. An expression is extrapolated linearly, because an iteration may leave the table;
+    `check` is called before a state is accepted.
+
+    Args:
+        points: {x: y}, at least two points.
 
     Attributes:
-        x: points in ascending order, shape (n,).
-        y: values at these points, shape (n,).
-        limits: the first and the last x.
+        x: arguments of the points in ascending order, shape (n,).
+        y: values at these arguments, shape (n,).
+        limits: smallest and largest argument.
     """
 
     def __init__(self, points: Mapping[float, float]):
@@ -34,7 +37,7 @@ class Table:
         self.limits = float(self.x[0]), float(self.x[-1])
 
     def __call__(self, x: Any) -> Any:
-        """Return the values at x.
+        """Return the values of the curve at x, of the shape of x.
 
         Args:
             x: numbers, shape (...), or a UFL expression.
@@ -48,7 +51,7 @@ class Table:
         return self._curve(np.clip(x, self.x[0], self.x[-1]))
 
     def check(self, x: Any, name: str = "x") -> None:
-        """Check that all numbers x lie in the table.
+        """Check that all numbers x lie between the smallest and the largest argument of the table.
 
         Args:
             x: numbers.
@@ -66,13 +69,13 @@ class Table:
 
     @cached_property
     def _curve(self) -> Any:
-        """Piecewise cubic Hermite interpolation (Fritsch and Butland 1984)."""
+        """Piecewise cubic Hermite interpolation of the points (Fritsch and Butland 1984), a function of x."""
         from scipy.interpolate import PchipInterpolator
         return PchipInterpolator(self.x, self.y)
 
     def _expression(self, x: Any) -> Any:
-        """Return the curve as a UFL expression."""
-        # as UFL constants: tables with as many points share one compiled form
+        """Return the curve at a UFL expression x, extrapolated linearly beyond the table, as a UFL expression."""
+        # numbers as UFL constants: tables with as many points share one compiled form
         domain = ufl.domain.extract_unique_domain(x)
         slopes = self._curve.derivative()(self.x[[0, -1]])
         ends = fem.Constant(domain, np.array([self.x[[0, -1]], self.y[[0, -1]], slopes]).T.copy())

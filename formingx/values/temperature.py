@@ -11,22 +11,22 @@ from ..errors import InputError, finite, known, positive, values
 from .table import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
-"""{unit: absolute zero}."""
+"""{unit of temperature: absolute zero in this unit}."""
 EVERYWHERE = (-np.inf, np.inf)
-"""Limits of a function that is known at all temperatures."""
+"""Lowest and highest temperature of a function that is known at all temperatures."""
 _MAX_LOG_SHIFT = 30.0
-"""log10 of the shift factor above which a material counts as one that does not relax."""
+"""log10 of the shift factor above which a material counts as elastic."""
 GAS_CONSTANT = 8.31446261815324
-"""J/(mol K)."""
+"""Molar gas constant, J/(mol K)."""
 
 
 class FunctionOfTemperature:
     """Function f(T) of the temperature of the scene, for arrays of shape (n,).
 
     Args:
-        function: the function f.
-        words: its name in messages.
-        limits: lowest and highest temperature at which it is known; default the limits of f, if it has any.
+        function: the function f, a `Table` or a function of arrays of temperatures, shape (n,).
+        words: name of the function in messages.
+        limits: lowest and highest temperature at which f is known; default the limits of f, if it has any.
 
     Attributes:
         limits: lowest and highest temperature; infinite if unlimited.
@@ -39,7 +39,7 @@ class FunctionOfTemperature:
                                 else f"of_temperature({getattr(function, '__qualname__', repr(function))})")
 
     def __call__(self, temperature: ArrayLike) -> np.ndarray:
-        """Return the values at temperatures, of their shape.
+        """Return the values of the function at temperatures, of their shape.
 
         Raises:
             InputError: the function fails, or a value is not finite.
@@ -50,9 +50,9 @@ class FunctionOfTemperature:
         return values(f"the constant {self!r}", self.function, {"temperature": T})
 
     def clamped(self, temperature: ArrayLike) -> np.ndarray:
-        """Return the values at temperatures, of their shape; beyond `limits` the values at the nearer limit.
+        """Return the values at temperatures, of their shape; beyond `limits` the value at the nearer limit.
 
-        This is used during a run, in which the temperature of a body changes. A scene refuses an initial temperature
+        It is used during a run, in which the temperature of a body changes. A scene refuses an initial temperature
         beyond the limits. A check before the run reports temperatures of tools and air beyond them.
         """
         return self(np.clip(temperature, *self.limits))
@@ -90,7 +90,7 @@ class WLF:
         self.limits = self.reference - self.c2 + self.c1 * self.c2 / (_MAX_LOG_SHIFT + self.c1), np.inf
 
     def __call__(self, temperature: ArrayLike) -> Any:
-        """Return aT.
+        """Return the shift factor aT at temperatures, of their shape.
 
         Args:
             temperature: numbers, shape (...), or a UFL expression.
@@ -106,14 +106,18 @@ class WLF:
 
 
 class Arrhenius:
-    r"""Shift factor of Arrhenius with absolute temperatures T and Tr; called like `WLF`.
+    r"""Shift factor of Arrhenius, with absolute temperatures T and Tr.
+
+    Relaxation times at the temperature T are aT times those at the reference temperature Tr.
 
     .. math:: \ln a_T = \frac{E}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
 
+    R is the molar gas constant. Call it with numbers, shape (...), or with a UFL expression of the temperature.
+
     Args:
-        activation_energy: E, J/mol, above 0.
-        reference: reference temperature Tr.
-        unit: unit of temperatures, "C" or "K".
+        activation_energy: activation energy E, J/mol, above 0.
+        reference: reference temperature Tr, in the unit of `unit`.
+        unit: unit of the temperatures of the scene, "C" or "K".
 
     >>> slower = fx.Arrhenius(80e3, 180.0, unit="C")
     >>> round(float(slower(170.0)), 4)
@@ -127,7 +131,7 @@ class Arrhenius:
         _difference(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
 
     def __call__(self, temperature: ArrayLike) -> Any:
-        """Return aT.
+        """Return the shift factor aT at temperatures, of their shape.
 
         Args:
             temperature: numbers, shape (...), or a UFL expression.
@@ -144,7 +148,13 @@ class Arrhenius:
 
 
 def _difference(shift: Any, temperature: Any, limit: float, what: str) -> Any:
-    """Return a temperature minus a limit.
+    """Return a temperature minus the limit above which a shift factor is defined.
+
+    Args:
+        shift: the `WLF` or `Arrhenius`, for messages.
+        temperature: numbers, shape (...), or a UFL expression.
+        limit: the limit.
+        what: name of the limit, for messages.
 
     Raises:
         InputError: a number is not above the limit.
