@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
+    """Return the parser of the command line, for all commands but `demo`."""
     parser = argparse.ArgumentParser(prog="python -m formingx", description=_overview(),
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
@@ -93,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _overview() -> str:
-    """Return the overview that is printed without arguments."""
+    """Return the list of commands and demos, which is printed if there are no arguments."""
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
              "  check SCRIPT               look over the scene of a script before it runs",
@@ -126,6 +126,8 @@ def _demos() -> dict[str, str]:
 def _demo(words: list[str]) -> None:
     """Run a demo in this process, like `python demos/NAME.py OPTIONS`, also under mpirun.
 
+    words: name of the demo and its options.
+
     Raises:
         InputError: there is no such demo.
     """
@@ -149,13 +151,13 @@ def _demo(words: list[str]) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Print the findings on a script."""
+    """Print the findings on the first scene of a script (command `check`)."""
     from .checks.scripts import check_script
     _say(str(check_script(options.script, options.arguments)))
 
 
 def _compare(options: argparse.Namespace) -> None:
-    """Compare two tables."""
+    """Compare two curves, print the differences, and write picture and pairs (command `compare`)."""
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
     units: dict[str, float | str] = {}
@@ -173,7 +175,7 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _open(options: argparse.Namespace) -> None:
-    """Print the content of a checkpoint."""
+    """Print scene, states and end of the run in a checkpoint (command `open`)."""
     about, states = checkpoint_data.contents(options.folder)
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
@@ -182,7 +184,7 @@ def _open(options: argparse.Namespace) -> None:
 
 
 def _states(record: report.Record) -> list[str]:
-    """Return some states as rows: evenly spaced ones, limit points, jumps, and the last of each stage."""
+    """Return lines of a table of states: evenly spaced ones, limit points, jumps, and the last of each stage."""
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -196,7 +198,7 @@ def _states(record: report.Record) -> list[str]:
 
 
 def _report(options: argparse.Namespace) -> None:
-    """Write the report of a checkpoint."""
+    """Write the report of a checkpoint to an HTML file (command `report`)."""
     out = options.out or Path(options.folder) / "report.html"
     record = report.of_checkpoint(*checkpoint_data.contents(options.folder))
     report.write(record, out, options.title, None, MPI.COMM_WORLD, _units(options.units), options.density,
@@ -205,7 +207,7 @@ def _report(options: argparse.Namespace) -> None:
 
 
 def _units(given: str | None) -> Units:
-    """Return the units from an option such as mm,MPa.
+    """Return the units of the option --units, such as mm,MPa; None gives units without names.
 
     Raises:
         InputError: the option has another form.
@@ -219,12 +221,12 @@ def _units(given: str | None) -> Units:
 
 
 def _status(options: argparse.Namespace) -> None:
-    """Print the status of a run."""
+    """Print the status of a run with a checkpoint (command `status`)."""
     _say(str(status.of_folder(options.folder)))
 
 
 def _watch(options: argparse.Namespace) -> None:
-    """Print the status of a run after each new state."""
+    """Print the status of a run with a checkpoint after each new state (command `watch`)."""
     if not checkpoint_data.begun(options.folder):
         _say(f"waiting up to {options.patience:g} s for a run to write its first state to {options.folder}")
     for found in status.watch(options.folder, options.every, options.patience):
@@ -232,7 +234,12 @@ def _watch(options: argparse.Namespace) -> None:
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
-    """Return the two parts of an option OURS=THEIRS.
+    """Return the two parts of a word OURS=THEIRS.
+
+    Args:
+        option: name of the option, for messages.
+        word: the word.
+        both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
 
     Raises:
         InputError: the option has another form.

@@ -1,8 +1,8 @@
-"""Errors of public calls with arguments of a wrong kind or number: an InputError that names the allowed ones.
+"""Messages for calls of public functions with arguments of a wrong type or number.
 
-A call that fails is explained: its arguments are compared with its signature and its annotations. Each function
-checks the values itself (`errors.py`). Calls by a user are explained. Methods that the solver calls during a run stay
-plain functions.
+If a call fails, its arguments are compared with the signature and the annotations of the function. An argument that
+does not fit gives an InputError that names the type it must have. Each function checks the values of its arguments
+itself (`errors.py`). Methods that the solver calls during a run are left unchanged, because the comparison costs time.
 """
 
 from __future__ import annotations
@@ -26,24 +26,27 @@ from numpy.typing import ArrayLike
 from .errors import ConvergenceError, InputError
 from .tools.tool import PlaneTool, RigidTool
 
-_SAID = (InputError, ConvergenceError, OSError)              # their messages tell the fault already
+_CLEAR_ERRORS = (InputError, ConvergenceError, OSError)      # errors whose messages name the cause
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
 _PACKAGE = __name__.partition(".")[0]
-_SOLVER = {"physics", "contact", "forms", "problem", "measures", "solve"}
-"""Subpackages of objects whose methods the solver calls: only calls of their constructors are explained."""
-_ASKED = {name for protocol in (RigidTool, PlaneTool) for name in vars(protocol) if not name.startswith("_")}
+_INTERNAL = {"physics", "contact", "forms", "problem", "measures", "solve"}
+"""Folders of classes whose methods the solver calls: only their constructors are explained."""
+_TOOL_METHODS = {name for protocol in (RigidTool, PlaneTool) for name in vars(protocol) if not name.startswith("_")}
 """Methods of tools that the solver calls in every iteration."""
-_seen: set[type] = set()     # classes whose methods are explained
+_explained_classes: set[type] = set()                        # classes whose methods are explained
 
 
 class _WrongCall(InputError, TypeError):
-    """`InputError` that is also a `TypeError`, which Python raises for a wrong call."""
+    """InputError about the type or number of arguments; it is also the TypeError that Python raises for such a call."""
 
     __module__, __qualname__ = InputError.__module__, "InputError"
 
 
 def explain(module: types.ModuleType) -> None:
-    """Explain the calls that fail of all that a module of the package exports: functions, classes and their methods."""
+    """Make the public functions and classes of a module, and their methods, explain calls that fail.
+
+    module: a module of the package; the explained functions replace the plain ones.
+    """
     for name, item in list(vars(module).items()):
         if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):
             continue
@@ -56,33 +59,41 @@ def explain(module: types.ModuleType) -> None:
 
 
 def _explain_class(cls: type) -> None:
-    """Explain the public methods of a class and of its bases, and the methods of their results."""
-    _seen.add(cls)
+    """Make the public methods of a class and of its bases explain calls that fail."""
+    _explained_classes.add(cls)
     for base in cls.__mro__:
         if base.__module__.startswith(_PACKAGE):
             _explain_methods(base)
 
 
-def _in_solver(cls: type) -> bool:
-    return not _SOLVER.isdisjoint(cls.__module__.split(".")[1:2])
+def _is_internal(cls: type) -> bool:
+    """Return True if the solver calls the methods of a class during a run."""
+    return not _INTERNAL.isdisjoint(cls.__module__.split(".")[1:2])
 
 
 def _explain_methods(cls: type) -> None:
-    asked = _in_solver(cls)
+    """Make the constructor and the public methods that a class defines itself explain calls that fail."""
+    internal = _is_internal(cls)
     for name, method in list(vars(cls).items()):
-        makes = name in ("__init__", "__new__")
-        if not makes and (asked or name in _ASKED or name.startswith("_") and name != "__call__"):
+        constructs = name in ("__init__", "__new__")
+        if not constructs and (internal or name in _TOOL_METHODS or name.startswith("_") and name != "__call__"):
             continue
-        known = cls.__name__ if makes else name
+        public_name = cls.__name__ if constructs else name
         if isinstance(method, types.FunctionType):
-            setattr(cls, name, _explained(method, known, skip=1))
+            setattr(cls, name, _explained(method, public_name, skip=1))
         elif isinstance(method, classmethod | staticmethod):
-            bound = makes or isinstance(method, classmethod)
-            setattr(cls, name, type(method)(_explained(method.__func__, known, skip=int(bound))))
+            bound = constructs or isinstance(method, classmethod)
+            setattr(cls, name, type(method)(_explained(method.__func__, public_name, skip=int(bound))))
 
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
-    """Return `call`, explained if it fails; `skip`: number of leading arguments that are the object or its class."""
+    """Return a function that calls another and explains its errors by its arguments.
+
+    Args:
+        call: the function.
+        name: name of the function, for messages.
+        skip: number of first arguments (self, cls) that a user does not write.
+    """
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
 
@@ -90,24 +101,33 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
     def explained(*args: Any, **given: Any) -> Any:
         try:
             result = call(*args, **given)
-        except _SAID:
+        except _CLEAR_ERRORS:
             raise
         except Exception as error:
-            makes = call.__name__ in ("__init__", "__new__")
-            owner = None if makes or not skip else args[0] if isinstance(args[0], type) else type(args[0])
-            why = _wrong(call, f"{owner.__name__}.{name}" if owner else name, skip, args, given)
-            if why is None:
+            constructs = call.__name__ in ("__init__", "__new__")
+            owner = None if constructs or not skip else args[0] if isinstance(args[0], type) else type(args[0])
+            fault = _fault(call, f"{owner.__name__}.{name}" if owner else name, skip, args, given)
+            if fault is None:
                 raise
-            raise _WrongCall(why) from error
-        if (made := type(result)) not in _seen and made.__module__.startswith(_PACKAGE) and not _in_solver(made):
-            _explain_class(made)
+            raise _WrongCall(fault) from error
+        kind = type(result)
+        if kind not in _explained_classes and kind.__module__.startswith(_PACKAGE) and not _is_internal(kind):
+            _explain_class(kind)
         return result
     explained._is_explained = True                           # type: ignore[attr-defined]
     return explained
 
 
-def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
-    """Return the fault in the arguments of a call, as text; None: the signature finds no fault."""
+def _fault(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
+    """Return the fault in the arguments of a call as text, or None if they fit the signature and its annotations.
+
+    Args:
+        call: the function.
+        name: name of the function, for the message.
+        skip: number of first arguments (self, cls) that a user does not write.
+        args: positional arguments.
+        given: keyword arguments.
+    """
     signature = inspect.signature(call)
     try:
         bound = signature.bind(*args, **given).arguments
@@ -119,17 +139,17 @@ def _wrong(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
     except Exception:  # noqa: BLE001  of a user's own class: names that are known to a type checker alone
         return None
     for parameter, value in list(bound.items())[skip:]:
-        how, kind = signature.parameters[parameter].kind, kinds.get(parameter, Any)
-        values = (value if how is inspect.Parameter.VAR_POSITIONAL else
-                  value.values() if how is inspect.Parameter.VAR_KEYWORD else [value])
+        passing, kind = signature.parameters[parameter].kind, kinds.get(parameter, Any)
+        values = (value if passing is inspect.Parameter.VAR_POSITIONAL else
+                  value.values() if passing is inspect.Parameter.VAR_KEYWORD else [value])
         for entry in values:
-            if not _is(entry, kind):
-                return f"{name}: {parameter} = {_short(entry)}: must be {_said(kind)}"
+            if not _matches(entry, kind):
+                return f"{name}: {parameter} = {_short(entry)}: must be {_described(kind)}"
     return None
 
 
 def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
-    """Return the names of arguments that a function does not take, with what was meant, as text; or ""."""
+    """Return the unknown keyword arguments of a call, each with the most similar known name, as text; or ""."""
     kinds = {p.kind for p in signature.parameters.values()}
     unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [n for n in given if n not in signature.parameters]
     close = {n: difflib.get_close_matches(n, [p for p in signature.parameters if p not in given], 1) for n in unknown}
@@ -137,6 +157,7 @@ def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
 
 
 def _parameter(p: inspect.Parameter) -> str:
+    """Return a parameter of a signature as text: its name and its default, "..." for a long one."""
     if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD):
         return str(p.replace(annotation=p.empty))
     if p.default is p.empty:
@@ -145,24 +166,25 @@ def _parameter(p: inspect.Parameter) -> str:
 
 
 def _short(value: Any) -> str:
+    """Return a value as text of at most 100 characters."""
     text = repr(value)
     return text if len(text) < 100 else text[:97] + "..."
 
 
-def _is(value: Any, kind: Any) -> bool:
-    """Tell whether a value is of the kind that an annotation names; True where it cannot be told."""
+def _matches(value: Any, kind: Any) -> bool:
+    """Return True if a value fits an annotation, or if the annotation does not decide this."""
     origin, of = typing.get_origin(kind) or kind, typing.get_args(kind)
     if kind is Any or isinstance(kind, typing.TypeVar):
         return True
     if kind is np.ndarray or kind == ArrayLike:
-        return _numbers(value)
+        return _is_numeric(value)
     if origin in (typing.Union, types.UnionType):
-        return any(_is(value, entry) for entry in _either(of))
+        return any(_matches(value, entry) for entry in _alternatives(of))
     if origin is typing.Literal:
         return any(value is entry or value == entry for entry in of if type(value) is type(entry))
     if kind is float or kind is int:
         number = Real if kind is float else Integral
-        return isinstance(value, number) and not isinstance(value, bool) and _numbers(value)
+        return isinstance(value, number) and not isinstance(value, bool) and _is_numeric(value)
     if kind is bool:
         return isinstance(value, bool | np.bool_)
     if kind is None or kind is type(None):
@@ -178,34 +200,35 @@ def _is(value: Any, kind: Any) -> bool:
         return False
     entries: Any = value
     if issubclass(origin, Mapping) and len(of) == 2:
-        return all(_is(k, of[0]) and _is(v, of[1]) for k, v in entries.items())
+        return all(_matches(k, of[0]) and _matches(v, of[1]) for k, v in entries.items())
     if isinstance(value, Sequence) and of:
         if origin is tuple and of[-1] is not Ellipsis:
-            return len(value) == len(of) and all(map(_is, value, of))
-        return all(_is(entry, of[0]) for entry in value)
+            return len(value) == len(of) and all(map(_matches, value, of))
+        return all(_matches(entry, of[0]) for entry in value)
     return True
 
 
-def _either(kinds: Sequence[Any]) -> list[Any]:
-    """Return the kinds of a union, in which `ArrayLike`, a union too, is one."""
+def _alternatives(kinds: Sequence[Any]) -> list[Any]:
+    """Return the types of a union; those that make up `ArrayLike`, which is a union itself, are one entry."""
     array = set(typing.get_args(ArrayLike))
     return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 
 
-def _numbers(value: Any) -> bool:
+def _is_numeric(value: Any) -> bool:
+    """Return True if NumPy can convert a value to an array of floats."""
     try:
         return not isinstance(value, str | bytes) and np.asarray(value, float) is not None
     except (TypeError, ValueError, OverflowError):
         return False
 
 
-def _said(kind: Any) -> str:
-    """Return an annotation as text."""
+def _described(kind: Any) -> str:
+    """Return an annotation as text for messages, such as "a number or None"."""
     origin, of = typing.get_origin(kind) or kind, [k for k in typing.get_args(kind) if k is not Ellipsis]
     if kind is np.ndarray or kind == ArrayLike:
         return "numbers"
     if origin in (typing.Union, types.UnionType):
-        return " or ".join(dict.fromkeys(map(_said, _either(of))))
+        return " or ".join(dict.fromkeys(map(_described, _alternatives(of))))
     if origin is typing.Literal:
         return " or ".join(map(repr, of))
     if kind in _WORDS:
@@ -213,12 +236,12 @@ def _said(kind: Any) -> str:
     if origin is collections.abc.Callable:
         return "a function"
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        return "a dict" + (f" of {_said(of[0])}: {_said(of[1])}" if len(of) == 2 else "")
+        return "a dict" + (f" of {_described(of[0])}: {_described(of[1])}" if len(of) == 2 else "")
     if origin in (os.PathLike, Path):
         return "a path"
     if origin is tuple and of and Ellipsis not in typing.get_args(kind):
-        return f"({', '.join(map(_said, of))})"
+        return f"({', '.join(map(_described, of))})"
     if isinstance(origin, type) and issubclass(origin, Iterable) and of:
-        return f"a list of {_said(of[0])}"
+        return f"a list of {_described(of[0])}"
     name = getattr(origin, "__name__", str(origin))
     return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"

@@ -1,4 +1,4 @@
-"""The only place that knows DOLFINx versions: 0.9 is the floor, later ones are probed by feature."""
+"""Calls of DOLFINx that differ between its versions: 0.9 or later, which are distinguished by their features."""
 
 from __future__ import annotations
 
@@ -28,21 +28,23 @@ _compiled: dict[str, Any] = {}
 
 
 def compile_form(form: Any) -> Any:
-    """Return a compiled form."""
+    """Return a UFL form compiled by `_jit`, a form of DOLFINx that can be assembled."""
     return _compiled_here(lambda: fem.form(form, jit_options=JIT_OPTIONS))
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
-    """Return a compiled expression at points of the reference cell.
+    """Return a UFL expression compiled for points of the reference cell, shape (n, 2).
 
-    Its variables are numbered from 0: with UFL's numbers, which count on in a process and are part of its signature, it
-    would be compiled for every problem again.
+    The variables of the expression are numbered from 0 here. UFL numbers the variables of a process one after the
+    other, and these numbers are part of the signature, so that each problem would compile its own expression.
     """
     numbered = map_expr_dag(_Numbered(), expression)
     return _compiled_here(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
 
 
 class _Numbered(MultiFunction):
+    """Replacement of the labels of UFL variables in an expression by labels with the numbers 0, 1, ..."""
+
     def __init__(self) -> None:
         super().__init__()
         self._labels: dict[Any, Label] = {}
@@ -50,11 +52,15 @@ class _Numbered(MultiFunction):
     expr = MultiFunction.reuse_if_untouched
 
     def label(self, label: Label) -> Label:
+        """Return the label that replaces `label`."""
         return self._labels.setdefault(label, Label(len(self._labels)))
 
 
 def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
-    """Compile forms together (collective), which takes less time than one by one; `compile_form` then finds them."""
+    """Compile UFL forms by one call of the compiler, which takes less time than a call for each; collective.
+
+    `compile_form` then finds the compiled forms.
+    """
     options, form_options = jit.get_options(JIT_OPTIONS), ffcx.get_options({"scalar_type": default_scalar_type})
     if not _jit.supported(options):
         return
@@ -64,19 +70,23 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
 
 
 def _compiled_here(compiled: Any) -> Any:
-    """Return `compiled()`, whose form or expression is compiled by `_jit`, once in a process."""
+    """Return the result of `compiled()`, a call of DOLFINx in which `_jit` compiles the form or expression.
+
+    Each form is compiled once in a process.
+    """
     compiler = jit.ffcx_jit
 
-    def once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any], **more: Any) -> Any:
+    def compile_once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any],
+                     **others: Any) -> Any:
         options, form_options = jit.get_options(jit_options), ffcx.get_options(form_compiler_options)
         key = _jit.key(item, options, form_options)
         if not comm.allreduce(key in _compiled, op=MPI.LAND):    # ranks compile together, or none does
             if _jit.supported(options):
                 _compiled.update(_jit.compile_together(comm, {key: item}, options, form_options))
             else:
-                _compiled[key] = compiler(comm, item, form_compiler_options, jit_options, **more)
+                _compiled[key] = compiler(comm, item, form_compiler_options, jit_options, **others)
         return _compiled[key]
-    jit.ffcx_jit = once
+    jit.ffcx_jit = compile_once
     try:
         return compiled()
     finally:
@@ -84,11 +94,20 @@ def _compiled_here(compiled: Any) -> Any:
 
 
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
-    """Return (mesh, cell tags, facet tags), distributed, from arrays on rank 0 (of length 0 on other ranks).
+    """Return a distributed mesh of triangles with its tags; collective.
+
+    Rank 0 gives the arrays; on other ranks they have the length 0.
 
     Args:
-        cells, edges: indices of points, shapes (m, 3 or 6) and (k, 2 or 3), as DOLFINx orders them; a tag for each.
-        points: shape (n, 2), or in three dimensions (n, 3).
+        comm: MPI communicator.
+        cells: point numbers of the triangles, shape (m, 3 or 6), in the order of DOLFINx.
+        points: coordinates, shape (n, 2), or in three dimensions (n, 3), length.
+        cell_tags: tags of the triangles, shape (m,).
+        edges: point numbers of the edges of boundaries, shape (k, 2 or 3).
+        edge_tags: tags of these edges, shape (k,).
+
+    Returns:
+        The `dolfinx.mesh.Mesh`, the `MeshTags` of cells and the `MeshTags` of facets.
     """
     import basix.ufl
     from dolfinx import graph, mesh
@@ -106,19 +125,19 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
 
 
 def assemble_matrix(matrix: Any, form: Any, bcs: Any, diagonal: float = 1.0) -> None:
-    """Add the entries of a compiled form to a PETSc matrix.
+    """Add the entries of a compiled bilinear form to a PETSc matrix.
 
     Args:
-        matrix: the matrix.
+        matrix: the PETSc matrix.
         form: the compiled form.
-        bcs: boundary conditions; nothing is added in the rows and columns of constrained unknowns.
-        diagonal: entry on the diagonal of constrained unknowns.
+        bcs: boundary conditions of DOLFINx; the rows and columns of their unknowns receive no entries.
+        diagonal: diagonal entry of these rows.
     """
     fem_petsc.assemble_matrix(matrix, form, bcs, diagonal)  # type: ignore[misc]  # types of another variant
 
 
 def assemble_vector(vector: Any, form: Any) -> Any:
-    """Assemble a compiled linear form into a `la.Vector` and add what other ranks have for this one.
+    """Assemble a compiled linear form into a `la.Vector`, with the contributions of other ranks; collective.
 
     Returns:
         The owned entries, shape (n,): a view of the vector.
@@ -136,18 +155,24 @@ def interpolation_points(space: Any) -> Any:
 
 
 def coordinate_map(mesh: Any) -> Any:
-    """Return the map from reference to physical coordinates of the cells."""
+    """Return the `CoordinateElement` of a DOLFINx mesh, which maps reference to physical coordinates of its cells."""
     geometry = mesh.geometry
     return geometry.cmaps[0] if hasattr(geometry, "cmaps") else geometry.cmap
 
 
 def cell_nodes(mesh: Any) -> Any:
-    """Return the indices of the points (rows of `geometry.x`) of the cells, shape (cells, nodes of a cell)."""
+    """Return the nodes of the cells of a DOLFINx mesh, rows of `mesh.geometry.x`, shape (cells, nodes of a cell)."""
     geometry = mesh.geometry
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
 
 
 def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
-    """Return the tree of bounding boxes of cells (local indices), each enlarged by `padding`, length."""
+    """Return the tree of bounding boxes of cells of a DOLFINx mesh.
+
+    Args:
+        mesh: the mesh.
+        padding: length by which each box is enlarged, length.
+        cells: local numbers of the cells, shape (m,).
+    """
     from dolfinx import geometry
     return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)

@@ -27,6 +27,6 @@ def optional() -> Iterator[None]:
 
 
 def add(module: types.ModuleType, *objects: Any) -> None:
-    """Add functions or classes to a module, under their own names."""
+    """Add functions or classes of an extension to a module, each as the attribute of its own name."""
     for found in objects:
         setattr(module, found.__name__, found)

@@ -1,4 +1,4 @@
-"""Ctrl-C while the package is imported, which takes a while, ends with one line."""
+"""Message of one line for Ctrl-C while the package is imported, which takes some seconds."""
 
 import sys
 from typing import Any
@@ -7,6 +7,7 @@ _usual = sys.excepthook
 
 
 def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
+    """Print an uncaught KeyboardInterrupt as one line, other errors as before (arguments of `sys.excepthook`)."""
     if isinstance(error, KeyboardInterrupt):
         print("interrupted while formingx was imported", file=sys.stderr)
     else:
@@ -14,7 +15,7 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def imported() -> None:
-    """Complete the import: show uncaught errors as before it."""
+    """Restore `sys.excepthook` at the end of the import."""
     if sys.excepthook is _one_line:
         sys.excepthook = _usual
 

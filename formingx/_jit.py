@@ -1,8 +1,8 @@
-"""Compilation of forms: FFCx writes C, one call of the compiler makes a shared library, which needs no Python.
+"""Compilation of forms: FFCx writes C, and one call of the C compiler makes a shared library.
 
-DOLFINx makes an extension module of Python for each form, by distutils, at three times the processor time; its machine
-code is the same. A library appears in the cache whole, under its final name: a build that is interrupted leaves nothing
-that another process waits for.
+DOLFINx itself builds a Python extension module for each form, by distutils. This takes three times the processor time
+and gives the same machine code. A library receives its final name in the cache when it is complete. So an interrupted
+build leaves no file for which another process would wait.
 """
 
 from __future__ import annotations
@@ -35,34 +35,42 @@ from ffcx.codegeneration import jit as ffcx_jit
 
 
 def supported(jit_options: dict[str, Any]) -> bool:
-    """Return True if forms can be compiled here.
+    """Return True if this module can compile forms; otherwise DOLFINx does.
 
-    FFCx must have the interface of 0.9, a compiler must be there, and no option may ask for the build by distutils.
+    FFCx must be of version 0.9, there must be a C compiler, and no option may concern the build by distutils.
     """
     return (ffcx.__version__.startswith("0.9.") and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
 
 
 def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) -> str:
-    """Return the name of a form or of (an expression, its points), by all that its machine code depends on."""
+    """Return the name of the library of a form, a digest of everything on which its machine code depends.
+
+    Args:
+        item: UFL form, or (UFL expression, points).
+        jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
+        form_options: options of FFCx (`ffcx.get_options`).
+    """
     tag = f"{sorted(form_options.items())}{_command(jit_options)}{_program()}" if supported(jit_options) else ""
     return "form_" + naming.compute_signature([item], tag)
 
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
-    """Compile forms and expressions (collective): rank 0 builds all that the cache lacks by one call of the compiler.
+    """Return compiled forms and expressions; rank 0 builds the missing ones by one call of the C compiler. Collective.
 
     Args:
-        items: forms or (expression, points), by their `key`.
-        jit_options: options of the C compiler and of the cache.
-        form_options: options of FFCx.
+        comm: MPI communicator.
+        items: {key: UFL form, or (UFL expression, points)}, with the keys of the function `key`.
+        jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
+        form_options: options of FFCx (`ffcx.get_options`).
 
     Returns:
-        {key: (object of FFCx, namespace with `ffi` and `library`, (None, None))}, as DOLFINx's `ffcx_jit` returns it.
+        {key: (object of FFCx, namespace with its `ffi` and its library, (None, None))}, as `dolfinx.jit.ffcx_jit`
+        returns for one form.
 
     Raises:
-        RuntimeError: the compiler failed, or on other ranks than 0: FFCx refused an item.
+        RuntimeError: the compiler failed. On ranks other than 0: FFCx refused an item on rank 0.
     """
     folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
@@ -80,14 +88,18 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
 def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
-    """Return the compiled objects by their keys; those without a library that can be loaded are built first."""
+    """Return the compiled objects by their keys, after building those without a library in the cache `folder`.
+
+    Raises:
+        RuntimeError: the compiler failed, or a new library cannot be loaded.
+    """
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
     found = {name: _loaded(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
         folder = _writable(folder)
-        with _locked(folder, next(name for name, loaded in found.items() if not loaded)):
-            found = {name: loaded or _loaded(ffi, name, items[name], folder) for name, loaded in found.items()}
-            missing = {name: items[name] for name, loaded in found.items() if not loaded}
+        with _locked(folder, next(name for name, compiled in found.items() if not compiled)):
+            found = {name: compiled or _loaded(ffi, name, items[name], folder) for name, compiled in found.items()}
+            missing = {name: items[name] for name, compiled in found.items() if not compiled}
             if missing:
                 _build(missing, folder, jit_options, form_options)
         found |= {name: _loaded(ffi, name, item, folder) for name, item in missing.items()}
@@ -98,7 +110,14 @@ def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], j
 
 
 def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
-    """Return (object, module, code) of a library, or None if there is none, or none that can be loaded."""
+    """Return (object of FFCx, namespace, (None, None)) from the library of a form, or None if it cannot be loaded.
+
+    Args:
+        ffi: declarations of FFCx.
+        name: key of the form, the name of its library.
+        item: UFL form, or (UFL expression, points).
+        folder: folder of the library.
+    """
     kind, symbol = (("ufcx_form", naming.form_name(item, 0, name)) if isinstance(item, ufl.Form) else
                     ("ufcx_expression", naming.expression_name(item, name)))
     try:
@@ -111,7 +130,10 @@ def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
 
 @functools.cache
 def _declarations(scalar: str) -> cffi.FFI:
-    """Return FFCx's structures; functions of complex numbers, which are never called from Python, take `void *`."""
+    """Return the cffi interface with the structures of FFCx for a scalar type, such as "float64".
+
+    Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them.
+    """
     text = (ffcx_jit.UFC_HEADER_DECL.format(scalar) + ffcx_jit.UFC_INTEGRAL_DECL + ffcx_jit.UFC_FORM_DECL
             + ffcx_jit.UFC_EXPRESSION_DECL)
     ffi = cffi.FFI()
@@ -120,7 +142,7 @@ def _declarations(scalar: str) -> cffi.FFI:
 
 
 def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
-    """Make one library that holds all items, under the name of each."""
+    """Build one library of all items, with a link in the cache `folder` under the key of each."""
     code = "\n".join(ffcx.compiler.compile_ufl_objects([item], prefix=name, options=form_options)[1]
                      for name, item in items.items())
     files = [folder / f"{name}.so" for name in items]
@@ -140,7 +162,12 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
 
 
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
-    """Return the file of a library of functions in C, compiled if the cache has none.
+    """Return the file of a library of C functions, compiled if the cache does not contain it.
+
+    Args:
+        name: first part of the file name.
+        code: C source.
+        flags: flags of the compiler.
 
     Raises:
         RuntimeError: there is no compiler, or it failed.
@@ -162,20 +189,24 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 def compile_c(command: list[str], code: str) -> None:
     """Run the compiler on C code.
 
+    Args:
+        command: command and its arguments, which read the code from standard input.
+        code: the code.
+
     Raises:
-        RuntimeError: it failed, or is not there.
+        RuntimeError: the compiler failed, or there is none.
     """
     try:
-        done = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
+        result = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
     except OSError as error:
         raise RuntimeError(f"the C compiler cannot be run: {error}") from None
-    if done.returncode:
-        raise RuntimeError(f"the C compiler failed, with status {done.returncode}: {shlex.join(command)}\n"
-                           f"{done.stderr[-2000:]}")
+    if result.returncode:
+        raise RuntimeError(f"the C compiler failed, with status {result.returncode}: {shlex.join(command)}\n"
+                           f"{result.stderr[-2000:]}")
 
 
 def _command(jit_options: dict[str, Any]) -> list[str]:
-    """Return the call that compiles C of the standard input to a library, but for the library's name."""
+    """Return the command that compiles C from standard input to a library, without the option for the file name."""
     flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), *shlex.split(os.environ.get("CFLAGS", "")),
              "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
     libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]
@@ -195,14 +226,14 @@ def _compiler() -> tuple[str, ...] | None:
 
 @functools.cache
 def _program() -> str:
-    """Return path, size and date of the compiler: another one makes another machine code."""
+    """Return path, size and date of the C compiler as text; they change with its version."""
     program = Path(shutil.which((_compiler() or ("cc",))[0]) or "").resolve()
     status = program.stat()
     return f"{program} {status.st_size} {status.st_mtime_ns}"
 
 
 def _writable(folder: Path) -> Path:
-    """Return a folder for libraries: the cache, or one of this process alone if the cache cannot be written to."""
+    """Return the folder in which libraries are built: the cache `folder`, or a temporary one if it is read-only."""
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     return folder if os.access(folder, os.W_OK) else Path(_own_folder().name)
@@ -210,14 +241,15 @@ def _writable(folder: Path) -> Path:
 
 @functools.cache
 def _own_folder() -> tempfile.TemporaryDirectory:
+    """Return the temporary folder of this process, which is deleted at its end."""
     return tempfile.TemporaryDirectory(prefix="formingx_")
 
 
 @contextlib.contextmanager
 def _locked(folder: Path, name: str) -> Iterator[None]:
-    """Let processes build a form one after the other: the second finds the library of the first.
+    """Lock the build of form `name` in a folder for a block, so that a second process finds the library of the first.
 
-    The lock ends with its process. A file system without locks does without.
+    The lock ends with its process. On a file system without locks both processes build.
     """
     import fcntl
     file = folder / f"{name}.lock"

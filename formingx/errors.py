@@ -72,7 +72,7 @@ _usual: list[Any] = []
 
 
 def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
-    """Print an uncaught `Interrupted` as one line."""
+    """Print an uncaught `Interrupted` as one line, other errors as before (arguments of `sys.excepthook`)."""
     if isinstance(error, Interrupted):
         print(error, file=sys.stderr)
     else:
@@ -87,7 +87,7 @@ def positive(name: str, value: Any) -> float:
         value: the argument.
 
     Raises:
-        InputError: it is not finite, or not above 0.
+        InputError: the argument is not finite, or not above 0.
     """
     number = finite(name, value)
     if number <= 0:
@@ -103,7 +103,7 @@ def non_negative(name: str, value: Any) -> float:
         value: the argument.
 
     Raises:
-        InputError: it is not finite, or below 0.
+        InputError: the argument is not finite, or below 0.
     """
     number = finite(name, value)
     if number < 0:
@@ -119,7 +119,7 @@ def finite(name: str, value: Any) -> float:
         value: the argument.
 
     Raises:
-        InputError: it is not a finite number.
+        InputError: the argument is not a finite number.
     """
     try:
         not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
@@ -143,7 +143,7 @@ def count(name: str, value: Any) -> int:
         value: the argument.
 
     Raises:
-        InputError: it is not an integer, or below 1.
+        InputError: the argument is not an integer, or below 1.
     """
     number = finite(name, value)
     if number != int(number) or number < 1:
@@ -161,7 +161,7 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
         what: description of the type, for the message.
 
     Raises:
-        InputError: it is of another type.
+        InputError: the argument is of another type.
     """
     if not isinstance(value, kind):
         raise InputError(f"{name} = {value!r}: must be {what}")
@@ -177,7 +177,7 @@ def several(name: str, values: Any, what: str) -> list[Any]:
         what: description of the items, for the message.
 
     Raises:
-        InputError: it is not a list, a tuple or another sequence of items.
+        InputError: the argument is not a list, a tuple or another sequence of items.
     """
     is_item = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
     if not isinstance(values, Iterable) or is_item or getattr(values, "ndim", 1) == 0:
@@ -193,7 +193,7 @@ def pair(name: str, values: Any) -> tuple[float, float]:
         values: the argument.
 
     Raises:
-        InputError: they are not two finite numbers.
+        InputError: the argument is not two finite numbers.
     """
     first, second = _finite(name, values, 2, "two numbers")
     return first, second
@@ -207,7 +207,7 @@ def triple(name: str, values: Any) -> tuple[float, float, float]:
         values: the argument.
 
     Raises:
-        InputError: they are not three finite numbers.
+        InputError: the argument is not three finite numbers.
     """
     first, second, third = _finite(name, values, 3, "three numbers")
     return first, second, third
@@ -221,7 +221,7 @@ def direction(name: str, values: Any) -> np.ndarray:
         values: three numbers.
 
     Raises:
-        InputError: they are not three finite numbers, or all 0.
+        InputError: the argument is not three finite numbers, or all 0.
     """
     vector = np.array(triple(name, values))
     if not vector.any():
@@ -230,10 +230,16 @@ def direction(name: str, values: Any) -> np.ndarray:
 
 
 def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
-    """Return n finite numbers as floats.
+    """Return the n finite numbers of an argument as floats.
+
+    Args:
+        name: name of the argument, for the message.
+        values: the argument.
+        n: number of numbers.
+        what: description of the argument, for the message.
 
     Raises:
-        InputError: they are not n finite numbers.
+        InputError: the argument is not n finite numbers.
     """
     found = several(name, values, what)
     if len(found) != n:
@@ -261,7 +267,7 @@ def finite_array(name: str, values: Any) -> np.ndarray:
 
 
 def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
-    """Return points as an array, shape (n, components).
+    """Return points as an array of floats, shape (n, components).
 
     Args:
         name: name of the argument, for the message.
@@ -286,7 +292,7 @@ def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.nd
     Args:
         name: name of the function, for the message.
         function: the function.
-        at: {name: array} of its arguments in order, all of one shape.
+        at: {name: array} of the arguments of the function in order, all of one shape.
 
     Raises:
         InputError: the function fails, or a value is not finite. An InputError of the function itself is passed on.
@@ -315,7 +321,7 @@ def place(name: str, value: Any) -> Path:
         value: the argument.
 
     Raises:
-        InputError: it is not a name of a file.
+        InputError: the argument is not a name of a file.
     """
     if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in os.fsdecode(value):
         raise InputError(f"{name} = {value!r}: must be the name of a file or a folder")
@@ -331,14 +337,14 @@ def known(kind: str, name: Any, names: Any) -> None:
         names: the known names.
 
     Raises:
-        InputError: it is unknown; the message lists the known names.
+        InputError: the name is unknown; the message lists the known names.
     """
     if not isinstance(name, Hashable) or isinstance(name, bool) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 
 
 def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
-    """Call functions on all ranks, and raise an InputError of any rank on all of them; collective.
+    """Call functions on all ranks, and raise an InputError on all ranks if one of them raises it; collective.
 
     Args:
         comm: MPI communicator.

@@ -56,7 +56,9 @@ _registered: dict[Moment, list[Check[Any]]] = {"scene": [], "start": [], "end": 
 
 
 def register(moment: Moment) -> Callable[[_Check], _Check]:
-    """Return a decorator that registers a check for a moment; checks are called in the order of registration.
+    """Return a decorator that registers a check for a moment: "scene", "start", "end" or "failure".
+
+    Checks are called in the order of registration.
 
     Raises:
         InputError: the moment is unknown.
@@ -81,11 +83,11 @@ def worst_first(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def alarming(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the warnings and serious findings."""
+    """Return the findings that are warnings or serious."""
     return [finding for finding in findings if finding.severity != "note"]
 
 
 def tell(findings: Sequence[Finding], rank: int) -> None:
-    """Log each warning and serious finding once, on rank 0."""
+    """Log each warning and each serious finding once, on rank 0 (`rank`: number of this rank)."""
     for finding in dict.fromkeys(alarming(findings)) if rank == 0 else ():
         log.warning("%s: %s", finding.about, finding.text)

@@ -6,5 +6,13 @@ import numpy as np
 
 
 def gathered(comm: Any, own: Any) -> np.ndarray:
-    """Return the rows of all ranks, one rank after the other, on each of them; collective."""
+    """Return an array with the rows of all ranks, one rank after the other; collective.
+
+    Args:
+        comm: MPI communicator.
+        own: rows of this rank, shape (m, ...).
+
+    Returns:
+        Rows of all ranks, shape (n, ...), equal on all ranks.
+    """
     return np.concatenate(comm.allgather(own))

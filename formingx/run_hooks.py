@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from .errors import InputError
 from .measures.targets import Target
@@ -13,7 +13,13 @@ from .scene.scene import Scene
 
 
 class RunExtension:
-    """Extension of a run: `formingx.Remesh` for `trace(remesh=)`, `formingx.instability` for `trace(stop_at=)`."""
+    """Extension of a run: `formingx.Remesh` for `trace(remesh=)`, `formingx.instability` for `trace(stop_at=)`.
+
+    Attributes:
+        argument: argument of `formingx.trace` that takes the extension, "remesh" or "stop_at".
+    """
+
+    argument = ""
 
     def check(self, caller: str, scene: Scene, targets: Sequence[Target]) -> None:
         """Check that the extension can take part in a run.
@@ -24,13 +30,13 @@ class RunExtension:
             targets: targets of the run.
 
         Raises:
-            InputError: it cannot.
+            InputError: the extension cannot take part.
         """
 
     def attach(self, path: Path) -> None:
-        """Register functions in `path.record.hooks` (`RunHooks`).
+        """Register functions in `path.record.hooks` (`RunHooks`), which the run calls.
 
-        A function ends the run by a text in `path.record.ended`.
+        A function that sets `path.record.ended` to a text, the reason, ends the run.
 
         Args:
             path: the path that the run continues.
@@ -45,7 +51,7 @@ class MeshAdaptation(Protocol):
         """Check that a mesh can be adapted.
 
         Raises:
-            InputError: it cannot.
+            InputError: the mesh cannot be adapted.
         """
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
@@ -57,14 +63,30 @@ class MeshAdaptation(Protocol):
         """
 
 
+def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
+    """Check that an argument of a run is an extension for this argument.
+
+    Args:
+        caller: name of the calling function, for messages.
+        argument: "remesh" or "stop_at".
+        given: the argument.
+        what: description of the extension, for the message.
+
+    Raises:
+        InputError: the argument is no extension, or one for another argument.
+    """
+    if not isinstance(given, RunExtension) or given.argument != argument:
+        raise InputError(f"{caller}: {argument} = {given!r}: must be {what}")
+
+
 dry_runs: dict[str, Callable[..., None]] = {}
-"""{public name: function that replaces it during `check`}; it calls the user's code once without a run."""
+"""{public name: function that replaces it during `check`}. The function calls the user's code once, without a run."""
 
 _adaptation: list[MeshAdaptation] = []
 
 
 def register_adaptation(adaptation: MeshAdaptation) -> None:
-    """Register the mesh adaptation of `trace(adapt_mesh=...)` in place of an earlier one."""
+    """Register the mesh adaptation of `trace(adapt_mesh=...)`; it replaces an earlier one."""
     _adaptation[:] = [adaptation]
 
 

@@ -26,15 +26,15 @@ log = logging.getLogger("formingx")
 
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                         run: Callable[[Scene, Any], Path]) -> Path:
-    """Return the path of a run on the mesh that is adapted to a first run.
+    """Return the path of a run on a mesh that is adapted to a first run.
 
     Args:
-        caller: name of the calling function, for messages.
-        adapt_mesh: its argument.
-        start: its argument; must be None.
-        resume: its argument; must be False.
+        caller: name of the calling function, `trace` or `Process`, for messages.
+        adapt_mesh: argument of this function: True, or {argument of `mesh.adapted`: value}.
+        start: argument of this function; must be None.
+        resume: argument of this function; must be False.
         scene: the scene on the first mesh.
-        checkpoint: checkpoint of the second run.
+        checkpoint: folder of the checkpoint of the second run, or None.
         run: function of a scene and a checkpoint that returns the path of a run.
 
     Raises:
@@ -42,8 +42,8 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
         ConvergenceError: a run failed; a first run of three states or more is used nevertheless.
     """
     if start is not None or resume:
-        raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins at rest and makes the mesh; with"
-                         f" start or resume a run goes on with the mesh that it has: give only one of them")
+        raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
+                         f" the mesh; with start or resume a run continues on its own mesh: give only one of them")
     if adapt_mesh is not True and not isinstance(adapt_mesh, Mapping):
         raise InputError(f"{caller}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
                          f" such as {{'error': 0.02}}")
@@ -58,8 +58,8 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
         if error.path is None or len(error.path) < 3:
             raise
         first = error.path
-        log.warning("the pilot run ended early, at %s; the mesh is adapted to what it has"
-                    " computed", first.describe(first.last))
+        log.warning("the pilot run ended early, at %s; the mesh is adapted to the states before",
+                    first.describe(first.last))
     adapted = meshes.make(first, options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
         mesh.domain.topology.index_map(2).size_global for mesh in (scene.mesh, adapted)))
@@ -72,12 +72,12 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
     """Check that a process of given stages can continue from a state.
 
     Args:
-        state: a `State` of the path.
+        state: the state.
         stages: all stages of the process.
-        problem: the discretised problem.
+        problem: the discretised problem of the scene.
 
     Raises:
-        InputError: the state belongs to another scene or stage.
+        InputError: the state belongs to another scene, or to none of the stages.
     """
     number = state.setting.get("stage", -1)
     if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
@@ -94,10 +94,10 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     """Return a new path that begins with the states of another path, or with a state.
 
     Args:
-        curve: solver of its states.
-        start: the path, or the state; None to begin without states.
-        columns: additional columns.
-        allow_inadmissible: see `trace`.
+        curve: solver of the states of the new path.
+        start: the other path, or the state; None to begin without states.
+        columns: {name: quantity} of additional columns.
+        allow_inadmissible: argument of `trace`.
         found: findings of the checks before the run, which are logged here.
         timed: True if the process time is a column.
     """
@@ -113,11 +113,11 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
 
 
 def write_checkpoints(path: Path, checkpoint: Any) -> None:
-    """Register a checkpoint that is written after each step.
+    """Make a run write a checkpoint after each step and at its end.
 
     Args:
         path: path of the run.
-        checkpoint: the folder, or None.
+        checkpoint: folder of the checkpoint, or None for no checkpoint.
     """
     if checkpoint is not None:
         writer = Checkpoint(checkpoint, path)
@@ -126,14 +126,14 @@ def write_checkpoints(path: Path, checkpoint: Any) -> None:
 
 
 def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
-    """Return the path that a run continues: `start`, or with `resume` the path in its checkpoint, or None.
+    """Return the path that a run continues, or None: `start`, or with `resume` the path in the checkpoint.
 
     Args:
-        caller: name of the calling function, for messages.
-        resume: its argument.
-        checkpoint: its argument.
+        caller: name of the calling function, `trace` or `Process`, for messages.
+        resume: argument of this function, True or False.
+        checkpoint: argument of this function, a folder or None.
         scene: the scene.
-        start: its argument.
+        start: argument of this function, a path or None.
 
     Raises:
         InputError: `resume` is given together with `start`, or without a checkpoint.
@@ -141,16 +141,18 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
     if not resume:
         return start
     if checkpoint is None or start is not None:
-        raise InputError(f"{caller}: resume=True: give a checkpoint to go on from, and no start")
+        raise InputError(f"{caller}: resume=True: give a checkpoint to continue from, and no start")
     return Path(read(checkpoint, scene)) if holds_states(checkpoint, scene.mesh.comm) else None
 
 
 @contextlib.contextmanager
 def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
-    """Attach the path so far to the errors of a run within a block, and call its end listeners.
+    """Attach the computed path to the errors of a run within a block, and call the functions for the end of the run.
+
+    These functions are `path.record.hooks.on_end`.
 
     Args:
-        checkpoint: the folder, for messages; or None.
+        checkpoint: folder of the checkpoint, for messages; or None.
 
     Yields:
         Function that registers and returns the path of the run.
@@ -163,12 +165,12 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     paths: list[Path] = []
 
     def register(path: Path) -> Path:
-        """Return the path of the run after registering it."""
+        """Register the path of the run, and return it."""
         paths.append(path)
         return path
 
     def so_far() -> Path | None:
-        """Return the first path with a state, or None."""
+        """Return the first registered path that has a state, or None."""
         return next((path for path in paths if path.states), None)
 
     try:
@@ -186,9 +188,9 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         if path is None:
             raise Interrupted("interrupted before its first state") from None
         position = f"at {path.describe(path.last)}, after {len(path)} states"
-        advice = "it is lost; with checkpoint='folder', resume=True the same script would go on from there"
+        advice = "it is lost; with checkpoint='folder', resume=True the same script would continue from there"
         if checkpoint:
-            advice = f"checkpoint={str(checkpoint)!r} holds it: the same script goes on with resume=True"
+            advice = f"checkpoint={str(checkpoint)!r} holds it: the same script continues with resume=True"
         raise Interrupted(f"interrupted {position}; {advice}", path) from None
     path = paths[0]
     found = path.findings()
@@ -197,6 +199,12 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 
 def _call_listeners(path: Path, failure: str, found: list[Finding]) -> None:
-    """Call the listeners at the end of a run with the error message, or "", and the findings."""
+    """Call the functions for the end of a run.
+
+    Args:
+        path: path of the run.
+        failure: error message, or "".
+        found: findings of the checks after the run.
+    """
     for listener in path.record.hooks.on_end:
         listener(failure, found)

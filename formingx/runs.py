@@ -17,7 +17,7 @@ from .physics.contact import Contact
 from .problem.problem import Problem
 from .results.files.checkpoint import read
 from .results.path import Path
-from .run_hooks import RunExtension
+from .run_hooks import RunExtension, check_argument
 from .run_parts import check_start, first_path, new_path, run_errors, run_on_adapted_mesh, write_checkpoints
 from .scene import aims, clearance
 from .scene.scene import Scene
@@ -48,7 +48,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         intermediate: further targets to be met exactly; a target that does not occur is skipped.
         step: step control; default `StepControl()`.
         tolerances: convergence criteria; default `Tolerances()`.
-        max_steps: largest number of accepted states. Default: the run gives up when it comes no nearer to its target.
+        max_steps: largest number of accepted states. Default: the run ends when it no longer approaches its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: path of this scene to be continued, for example from `formingx.load`; it is not changed. Without `step`
             the step length continues, too. Targets that the path has met count as met. If another target lies behind
@@ -90,13 +90,13 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     """
     instance("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
-        instance("trace: remesh", remesh, RunExtension, "a formingx.Remesh")
+        check_argument("trace", "remesh", remesh, "a formingx.Remesh")
         remesh.check("trace", scene, [*intermediate, until])
         if adapt_mesh is not False or stop_at is not None:
             raise InputError("trace: remesh: cannot be combined with adapt_mesh or stop_at")
     if adapt_mesh is not False:
         def run(scene: Scene, checkpoint: Any) -> Path:
-            """Return the path on one of the two meshes."""
+            """Return the path of a run on the mesh of `scene`."""
             return trace(scene, until=until, intermediate=intermediate, step=step, tolerances=tolerances,
                          max_steps=max_steps, progress=progress, checkpoint=checkpoint, record=record,
                          at_limit_point=at_limit_point, allow_inadmissible=allow_inadmissible, stop_at=stop_at)
@@ -109,7 +109,8 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     instance("trace: step", step, StepControl | None, "a StepControl or None")
     instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     instance("trace: progress", progress, bool, "True or False")
-    instance("trace: stop_at", stop_at, RunExtension | None, "fx.instability(modes=...) or None")
+    if stop_at is not None:
+        check_argument("trace", "stop_at", stop_at, "fx.instability(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
@@ -171,7 +172,7 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     if increments > max_steps:
         raise InputError(f"solve: increments = {increments}: must be at most max_steps = {max_steps}")
     if to == 0:
-        raise InputError("solve: to = 0: the body is at rest there")
+        raise InputError("solve: to = 0: the unloaded body is in equilibrium there")
     driven = scene.items.index(scene.driven)
     name = scene.driven.quantity
     with run_errors() as register:
@@ -220,7 +221,7 @@ class Process:
                 are fractions of the duration.
             tolerances: convergence criteria; default `Tolerances()`.
             max_steps: largest number of accepted states of a stage, or of a straight piece of its tables. Default: the
-                run gives up when it comes no nearer to its target.
+                run ends when it no longer approaches its target.
             progress: show a progress bar on runs of more than two seconds (rank 0).
             start: path of these stages to be continued, for example from `formingx.load`, or one of its states.
             checkpoint: folder to which every accepted state is written (`formingx.load`).
@@ -244,13 +245,13 @@ class Process:
         """
         stages = self._check_stages(stages)
         if remesh is not None:
-            instance("Process: remesh", remesh, RunExtension, "a formingx.Remesh")
+            check_argument("Process", "remesh", remesh, "a formingx.Remesh")
             remesh.check("Process", self.scene, [t for s in stages for t in (*s.intermediate, s.until) if t])
             if adapt_mesh is not False:
                 raise InputError("Process: remesh: cannot be combined with adapt_mesh")
         if adapt_mesh is not False:
             def run(scene: Scene, checkpoint: Any) -> Path:
-                """Return the path on one of the two meshes."""
+                """Return the path of a run on the mesh of `scene`."""
                 return Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
                                           progress=progress, checkpoint=checkpoint, record=record, accuracy=accuracy,
                                           allow_inadmissible=allow_inadmissible)
@@ -288,7 +289,11 @@ class Process:
         return path
 
     def _check_tool_paths(self, plan: Plan, travel: Callable[[int], float]) -> None:
-        """Check the tool paths of a stage from the known travels at its start.
+        """Check that the tools can move as a stage states, once the travels at its start are known.
+
+        Args:
+            plan: the stage.
+            travel: function of the number of an item that returns its travel at the start of the stage, length.
 
         Raises:
             InputError: a tool cannot move as the stage states.
@@ -297,7 +302,7 @@ class Process:
         clearance.check(self.scene, [plan], contacts)
 
     def _check_stages(self, stages: Any) -> list[Stage]:
-        """Return the stages as a list.
+        """Return the argument `stages` of `run` as a list.
 
         Raises:
             InputError: there is no stage, or two have the same name.
@@ -315,7 +320,7 @@ class Process:
 
 
 def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
-    """Return the path in a checkpoint, to be examined or continued: `trace(..., start=load("run", scene))`.
+    """Return the path in a checkpoint, to be examined, or continued by `trace(..., start=load("run", scene))`.
 
     Args:
         folder: folder written by `trace(..., checkpoint=folder)` or `Path.save(folder)`, on any number of ranks.

@@ -5,7 +5,7 @@ from typing import Any
 
 from .errors import InputError, finite, known
 
-# in m, and in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
+# lengths in m, stresses in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 1e5, "atm": 101325.0,
             "psi": 6894.757293168, "kg/cm2": 98066.5, "kgf/cm2": 98066.5}
@@ -82,7 +82,7 @@ class Units:
         return self._whole(self._derived(_ENERGIES, 3))
 
     def per_depth(self) -> "Units":
-        """Return the units in plane strain, where forces, energies, volumes and areas are per unit depth.
+        """Return these units for plane strain, where forces, energies, volumes and areas are per unit depth.
 
         >>> fx.Units(length="mm", stress="MPa").per_depth().force
         'N/mm'
@@ -90,7 +90,7 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """Return the unit of a quantity of the whole body; `_UnitsPerDepth` divides it by a length."""
+        """Return the unit of a quantity of the whole body, such as its volume; in plane strain it is per depth."""
         return unit
 
     @property
@@ -102,7 +102,7 @@ class Units:
         """Return the mass of a volume in grams, in plane strain per unit depth.
 
         Args:
-            volume: volume, length^3; without a unit of length, cm^3.
+            volume: volume, length^3; in cm^3 if the unit of length is not given.
             density: density, g/cm3.
 
         Raises:
@@ -146,7 +146,12 @@ class Units:
         return f"{column} [{unit}]" if unit else column
 
     def _derived(self, names: dict[str, float], power: int) -> str:
-        """Return the unit of a power of length times stress, from a table of named units."""
+        """Return the unit of stress times a power of length.
+
+        Args:
+            names: {named unit: its size in SI units}; a unit of equal size gives its name.
+            power: power of length.
+        """
         if not (self.length and self.stress):
             return ""
         size = STRESSES[self.stress] * LENGTHS[self.length] ** power
@@ -155,15 +160,15 @@ class Units:
 
 
 class _UnitsPerDepth(Units):
-    """Units of a body in plane strain."""
+    """Units of the numbers of a script in plane strain, per unit depth."""
 
     def _whole(self, unit: str) -> str:
-        """Return the unit divided by a length."""
+        """Return a unit of the whole body divided by the unit of length."""
         return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 
 _MAX_DENSITY = 25.0
-"""Largest density, g/cm3."""
+"""Largest density that is accepted, g/cm3."""
 
 NONE: Any = Units()
-"""Units that are not given."""
+"""Units of a script that states none."""

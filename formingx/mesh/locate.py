@@ -15,7 +15,7 @@ OUTSIDE = 1e-3
 
 
 class LocatedPoints(NamedTuple):
-    """Those of the sought points that lie in cells of this rank, and their cells.
+    """Sought points that lie in cells of this rank, and their cells.
 
     Attributes:
         numbers: numbers of these points among the sought ones, shape (m,).

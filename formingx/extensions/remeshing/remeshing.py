@@ -85,6 +85,7 @@ class Remesh(RunExtension):
     size: float
     corner: float | None = None
     volume_ratio: tuple[float, float] = (0.6, 1.5)
+    argument = "remesh"
 
     def __post_init__(self) -> None:
         positive("Remesh: size", self.size)

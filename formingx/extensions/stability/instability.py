@@ -339,6 +339,8 @@ class InstabilityCondition(RunExtension):
         modes: wave numbers: n round the axis; in plane strain k along the depth, 1/length.
     """
 
+    argument = "stop_at"
+
     def __init__(self, modes: Any):
         self.modes = modes
 
