@@ -86,7 +86,7 @@ class Contact(Part):
         name: name in a process and in columns.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: an argument is not allowed.
 
     >>> plug = fx.Contact("top", fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0), 0.3, direction=(0, -1), name="plug")
     >>> plug.driven
@@ -117,15 +117,15 @@ class Contact(Part):
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
         self.elastic_slip = positive(f"{name}: elastic_slip", elastic_slip)
         if not self.separates and not three_d and (self.friction_by_temperature or 0 < self.mu < math.inf):
-            raise InputError(f"{name}: friction = {friction!r} with separates=False: what pulls at the tool has no"
-                             f" Coulomb friction; use 'stick' or 'none'")
+            raise InputError(f"{name}: friction = {friction!r} with separates=False: a point that pulls at the tool has"
+                             f" no Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = contact_points(f"{name}: points", points)
         self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
             raise InputError(f"{name}: friction = {friction!r}, separates = {self.separates!r} with present_area=True:"
-                             f" what a point holds on to would change with its penalty; use 'none', or a larger"
-                             f" penalty")
+                             f" the traction of a sticking or bonded point would change with its penalty; use 'none',"
+                             f" or a larger penalty")
         numbers: Callable = pair if tool.components == 2 else triple
         self.direction = None if direction is None else numbers(f"{name}: direction", direction)
         if self.direction is not None and not any(self.direction):
@@ -194,7 +194,7 @@ class Contact(Part):
             mu, a number, or the values at the points, shape (n,).
 
         Raises:
-            InputError: mu has no value at a temperature, or a negative one.
+            InputError: mu has no value or a negative value at a temperature, or depends on a temperature that is None.
         """
         if not self.friction_by_temperature:
             return self.mu
@@ -211,16 +211,16 @@ class Contact(Part):
 
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
-        """Return the contact law, the function that gives the tractions, at points of the face.
+        """Return the contact law that gives the tractions at n contact points of the face.
 
         Args:
             k: penalty, shape () or (n,), stress/length.
-            thickness: thickness of the sheet, length.
-            points: reference positions of the points, shape (n, 2), length.
+            thickness: thickness of the sheet, length; the ramp and the elastic slip are multiplied by it.
+            points: reference positions of the points, shape (n, 2), length; not used in three dimensions.
             temperature: temperature of the body at the points, shape (n,), if friction depends on the temperature.
 
         Returns:
-            The contact law of this friction, with penalty, ramp and elastic slip in units of length and stress.
+            The contact law, for positions in the user's unit of length and tractions in the unit of stress.
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:

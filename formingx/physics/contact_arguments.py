@@ -28,7 +28,7 @@ def coefficient(name: str, friction: Any) -> Any:
     if isinstance(friction, str) and friction in words:
         return words[friction]
     if isinstance(friction, Table):
-        non_negative(f"{name} = {friction!r}: its least value", float(friction.y.min()))   # monotone between its points
+        non_negative(f"{name} = {friction!r}: its smallest value", float(friction.y.min()))   # monotone between points
         return FunctionOfTemperature(friction)
     if isinstance(friction, FunctionOfTemperature):
         return friction
@@ -46,7 +46,7 @@ def contact_points(name: str, points: Any) -> str | int:
         points: "nodes", or the number of Gauss points of each facet.
 
     Returns:
-        The same value.
+        The argument `points`.
 
     Raises:
         InputError: `points` is neither "nodes" nor a number from 1 to 100.

@@ -1,7 +1,7 @@
 """Total Lagrangian kinematics of a meridional plane, a cross-section, or a sheet in three dimensions.
 
-Coordinates X = (R, Z), displacement u = (u_r, u_z), in the mesh's unit of length. The factor 2 pi R appears in this
-module only.
+A section has reference coordinates X = (R, Z) and the displacement u = (u_r, u_z), in the mesh's unit of length. The
+factor 2 pi R of axisymmetric integrals appears in this module only.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 
 
 class Kinematics:
-    """Kinematics of a section of the body.
+    """Base class of the kinematics of a body: coordinates, deformation gradient, areas and rigid motions.
 
     Attributes:
-        axes: names of the coordinates.
+        axes: names of the components of a displacement.
         components: number of components of a displacement, and of a deformed position.
         coordinates: number of coordinates of a reference point, which tables and functions take.
         axisymmetric: True if the section turns about R = 0.
@@ -47,17 +47,17 @@ class Kinematics:
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
-        """Return the constraints of a support with components numbered as the coordinates.
+        """Return the constraints of a support, with component numbers that index `axes`.
 
         Args:
             support: the `Support`, for the message.
-            items: its constraints.
+            items: its constraints, with component numbers that index `formingx.physics.supports.NAMES`.
 
         Returns:
-            Constraints with the numbers of the coordinates.
+            The constraints with numbers in `axes`.
 
         Raises:
-            InputError: a component that the body does not have.
+            InputError: the body does not have a component.
         """
         for item in items:
             if NAMES[item.component] not in self.axes:
@@ -78,48 +78,62 @@ class Kinematics:
         raise NotImplementedError
 
     def weight(self, X: Any) -> Any:
-        """Return the reference volume per area of the plane, which is the reference area per length of a line.
+        r"""Return the reference volume per area of the section, equal to the reference area per length of a line in it.
+
+        .. math:: w = 2 \pi R \text{ (axisymmetric)}, \qquad w = 1 \text{ (plane strain, three dimensions)}
 
         Args:
-            X: reference position (shape (2,), length).
+            X: reference position (UFL or numbers, shape (2,), length; in three dimensions shape (3,)).
 
         Returns:
-            Weight, length; 1 in plane strain.
+            Weight w, length; dimensionless if it is 1.
         """
         raise NotImplementedError
 
     def area_vector(self, u: Any, X: Any, N: Any) -> Any:
-        r"""Return the current area vector per unit reference length by Nanson's formula, with its weight.
+        r"""Return the current area vector per unit length of a reference line, by Nanson's formula.
 
-        .. math:: w(X) \, J F^{-T} N
+        .. math:: a = w(X) \, J F^{-T} N = \begin{cases} 2 \pi (R + u_r) \, \mathrm{cof}(I + \nabla u) N &
+                  \text{axisymmetric} \\ \mathrm{cof}(I + \nabla u) N & \text{else} \end{cases}
+
+        For quadratic displacements of an axisymmetric body it is a polynomial of degree 3, without division by R. In
+        three dimensions it is the area vector per unit reference area of the sheet.
 
         Args:
-            u: displacement (UFL, shape (2,), length).
-            X: reference position (UFL, shape (2,), length).
-            N: reference normal (UFL, shape (2,)).
+            u: displacement (UFL, shape (2,) or (3,), length).
+            X: reference position (UFL, shape of u, length).
+            N: unit normal of the line in the reference configuration (UFL, shape of u).
 
         Returns:
-            Area vector (UFL, shape (2,)).
+            Area vector a (UFL, shape of u), in the unit of the weight w of `weight`.
         """
         raise NotImplementedError
 
     def rigid_motions(self) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
-        """Return the rigid motions, which cause no strain.
+        """Return the infinitesimal rigid motions of the body that its symmetry permits.
 
         Returns:
-            {name: function from points, shape (n, 2), to displacements, shape (n, 2)}.
+            {name: function from points, shape (n, 2), to displacements, shape (n, 2)}; in three dimensions (n, 3).
         """
         raise NotImplementedError
 
     def mode_gradient(self, mode: Any, X: Any, number: Any) -> Any:
-        r"""Return the change H of F by a circumferential mode.
+        r"""Return the amplitude H of the change of the deformation gradient F by a non-axisymmetric mode.
 
         .. math:: u_r = U \cos n\theta, \quad u_z = W \cos n\theta, \quad u_\theta = V \sin n\theta
+
+        The entries of H are amplitudes of a sine or a cosine. In plane strain the mode varies along the depth instead,
+        as the cosine and sine of k x3. H of an axisymmetric body, and in plane strain, is
+
+        .. math:: \begin{bmatrix} U_{,R} & U_{,Z} & -(n U + V)/R \\ W_{,R} & W_{,Z} & -n W/R \\
+                  V_{,R} & V_{,Z} & (n V + U)/R \end{bmatrix}, \qquad
+                  \begin{bmatrix} U_{,R} & U_{,Z} & -k U \\ W_{,R} & W_{,Z} & -k W \\ V_{,R} & V_{,Z} & k V
+                  \end{bmatrix}
 
         Args:
             mode: amplitudes (U, W, V) (UFL, shape (3,), length).
             X: reference position (UFL, shape (2,), length).
-            number: number n of waves; in plane strain the wave number k along the depth, cos(k x3).
+            number: number n of waves; in plane strain the wave number k along the depth, 1/length.
 
         Returns:
             H (UFL, shape (3, 3)), components r, z, and hoop or depth.
@@ -127,13 +141,16 @@ class Kinematics:
         raise NotImplementedError
 
     def rigid_modes(self, number: float) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Return the rigid-body modes of the deformed body, as amplitudes of waves out of the section.
+        """Return the rigid-body motions of the deformed body that have the form of modes, see `mode_gradient`.
+
+        In plane strain these are the motions in the section and the translation along the depth, for the wave number 0.
 
         Args:
-            number: circumferential wave number n; in plane strain the wave number along the depth, 1/length.
+            number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
 
         Returns:
-            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3).
+            Functions from deformed positions, shape (m, 2), to amplitudes (U, W, V), shape (m, 3); empty if no rigid
+            motion has this wave number.
         """
         raise NotImplementedError
 
@@ -159,18 +176,6 @@ class Axisymmetric(Kinematics):
         return 2 * ufl.pi * X[0]
 
     def area_vector(self, u, X, N):
-        r"""Return the current area vector; in P2 displacements a polynomial of degree 3 without division by R.
-
-        .. math:: 2 \pi (R + u_r) \, \mathrm{cof}(1 + \nabla u) N
-
-        Args:
-            u: displacement (UFL, shape (2,), length).
-            X: reference position (UFL, shape (2,), length).
-            N: reference normal (UFL, shape (2,)).
-
-        Returns:
-            Area vector (UFL, shape (2,), length).
-        """
         return 2 * ufl.pi * (X[0] + u[0]) * _cofactor(ufl.Identity(2) + ufl.grad(u)) * N
 
     def rigid_motions(self):
@@ -181,13 +186,16 @@ class Axisymmetric(Kinematics):
         return _rows(ufl.grad(mode), [-(number * U + V) / X[0], -number * W / X[0], (number * V + U) / X[0]])
 
     def rigid_modes(self, number):
-        """Return the motions along and about the axis (n = 0), or the translation and rotation across it (n = 1).
+        r"""Return the motions along and about the axis (n = 0), or the translation and rotation across it (n = 1).
+
+        .. math:: n = 0: \; (0, 1, 0), \; (0, 0, r), \qquad n = 1: \; (1, 0, -1), \; (z, -r, -z)
 
         Args:
             number: number of waves n.
 
         Returns:
-            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3).
+            Functions from deformed positions (r, z), shape (m, 2), to amplitudes (U, W, V), shape (m, 3); empty for
+            other n.
         """
         def mode(*components):
             return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)
@@ -198,7 +206,9 @@ class Axisymmetric(Kinematics):
 
 
 class PlaneStrain(Kinematics):
-    """Plane strain of a long body: F33 = 1, forces and volumes per unit depth.
+    r"""Plane strain of a long body: forces and volumes are per unit depth.
+
+    .. math:: F = \begin{bmatrix} 1 + u_{r,R} & u_{r,Z} & 0 \\ u_{z,R} & 1 + u_{z,Z} & 0 \\ 0 & 0 & 1 \end{bmatrix}
 
     >>> fx.PlaneStrain().axes, list(fx.PlaneStrain().rigid_motions())
     (('r', 'z'), ['translation along R', 'translation along Z', 'rotation'])
@@ -224,15 +234,6 @@ class PlaneStrain(Kinematics):
         return _rows(ufl.grad(mode), [-number * mode[0], -number * mode[1], number * mode[2]])
 
     def rigid_modes(self, number):
-        """Return the rigid motions as modes; only modes that are constant along the depth have any.
-
-        Args:
-            number: wave number along the depth.
-
-        Returns:
-            Functions from deformed positions, shape (n, 2), to amplitudes (U, W, V), shape (n, 3); empty unless
-            `number` is 0.
-        """
         plane = [lambda x, f=f: np.column_stack([f(x), 0 * x[:, 0]]) for f in self.rigid_motions().values()]
         return [] if number else [*plane, lambda x: np.column_stack([0 * x, 1 + 0 * x[:, 0]])]
 
@@ -240,8 +241,8 @@ class PlaneStrain(Kinematics):
 class ThreeD(Kinematics):
     """Sheet in three dimensions: a surface with a thickness, coordinates (x, y, z).
 
-    The gradient of a displacement is the surface gradient. The normal of I + grad u is not stretched, so its cofactor
-    gives the area vector; `Surface` adds the stretch through the thickness.
+    The gradient of a displacement is the surface gradient, so I + grad u does not stretch the normal of the sheet. Its
+    cofactor gives the area vector. `formingx.extensions.space.surface.Surface` adds the stretch through the thickness.
 
     >>> fx.ThreeD().axes, fx.ThreeD().coordinates                                       # a reference point is (x, y)
     (('x', 'y', 'z'), 2)
@@ -251,14 +252,14 @@ class ThreeD(Kinematics):
     components = 3
 
     def in_axes(self, support, items):
-        """Return the constraints of a support; a hinge constrains all nodes of its rim, along y too.
+        """Return the constraints of a support; a clamp or a hinge constrains all nodes of its rim along x, y and z.
 
         Args:
             support: the `Support`.
-            items: its constraints.
+            items: its constraints, with component numbers that index `formingx.physics.supports.NAMES`.
 
         Returns:
-            Constraints with the numbers of the axes.
+            The constraints with numbers in `axes`.
         """
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
@@ -277,7 +278,8 @@ class ThreeD(Kinematics):
     def rigid_motions(self):
         """Return the rigid motions in the plane of the sheet, and its translation normal to the plane.
 
-        A rotation of a flat sheet out of its plane, about a straight rim, is allowed: the tension resists it.
+        Rotations out of the plane are not among them: a support may leave a flat sheet free to turn about a straight
+        rim, because the tension of the inflated sheet resists.
 
         Returns:
             {name: function from points, shape (n, 3), to displacements, shape (n, 3)}.
@@ -287,7 +289,7 @@ class ThreeD(Kinematics):
 
 
 def _along_z(X):
-    """Return unit displacements along Z, shape (n, 2)."""
+    """Return unit displacements along Z at positions X, shape (n, 2) each."""
     return np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)
 
 
@@ -300,7 +302,7 @@ def volume_ratio(F):
         F: deformation gradient (UFL, shape (3, 3)).
 
     Returns:
-        J (UFL scalar); for an F with block structure the only nonzero product.
+        J (UFL scalar); products that vanish for an F with block structure are left out.
     """
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
@@ -309,13 +311,13 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """Return whether a deformation gradient has the block structure of this module.
+    """Return whether the entries 13, 23, 31 and 32 of a deformation gradient are zero by construction.
 
     Args:
         F: deformation gradient (UFL, shape (3, 3)).
 
     Returns:
-        False for the F of a mode, which is a list of entries.
+        True for an F of this module, the F of a section; False if one of these entries is an expression, as in a mode.
     """
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
@@ -374,7 +376,7 @@ def sum_of_powers(F, alpha):
 
 
 def _in_plane_determinant(F):
-    """Return the in-plane determinant of C = F^T F."""
+    """Return the determinant C11 C22 - C12^2 of the in-plane part of C = F^T F."""
     det = (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]) ** 2
     if is_block(F):
         return det
@@ -410,7 +412,11 @@ def _powers_across(F, b, a):
 
 
 def cofactor_change(F, H):
-    """Return the first-order change of the cofactor of F.
+    r"""Return the first-order change of the cofactor of F.
+
+    .. math:: (\delta \, \mathrm{cof} F)_{ij} = F_{ac} H_{bd} + H_{ac} F_{bd} - F_{ad} H_{bc} - H_{ad} F_{bc}
+
+    Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3).
 
     Args:
         F: deformation gradient (UFL, shape (3, 3)).
@@ -426,15 +432,15 @@ def cofactor_change(F, H):
 
 
 def _rows(gradient, last):
-    """Return the tensor of a mode: its in-plane gradient, and the last column (UFL, shape (3, 3))."""
+    """Return the tensor with the in-plane gradient of a mode and a given last column (UFL, shape (3, 3))."""
     return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 
 def _block(F2, F33):
-    """Return F with an in-plane block and F33 (UFL, shape (3, 3))."""
+    """Return F with the in-plane block F2, shape (2, 2), and the entry F33 (UFL, shape (3, 3))."""
     return ufl.as_tensor([[F2[0, 0], F2[0, 1], 0], [F2[1, 0], F2[1, 1], 0], [0, 0, F33]])
 
 
 def _cofactor(F2):
-    """Return the cofactor of a tensor of shape (2, 2)."""
+    """Return the cofactor of an in-plane tensor F2 (UFL, shape (2, 2))."""
     return ufl.as_tensor([[F2[1, 1], -F2[1, 0]], [-F2[0, 1], F2[0, 0]]])

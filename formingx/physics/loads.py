@@ -16,8 +16,8 @@ class Load(Part):
     """Base class of loads, also of user-defined ones; a subclass must define `virtual_work`.
 
     Args:
-        on: name of the boundary on which it acts; None for a body force.
-        value: fixed value, in the user's units; None: the value is a control of the run.
+        on: name of the boundary on which the load acts; None for a body force.
+        value: fixed value of the load, in the user's units; None: the value is a control of the run.
         name: name in a process and in columns.
     """
 
@@ -34,10 +34,11 @@ class Load(Part):
         return self.value is None
 
     def virtual_work(self, body: Any, value: Any) -> Any:
-        """Return the virtual work of the load.
+        """Return the virtual work of the load for a virtual displacement of the body.
 
         Args:
-            body: a `formingx.forms.loaded_body.LoadedBody`: u, du, X, F, kinematics, `integral`, `face`.
+            body: a `formingx.forms.loaded_body.LoadedBody`. It has the displacement `u`, the virtual displacement `du`,
+                the reference position `X`, the deformation gradient `F`, and integrals by `integral` and `face`.
             value: value of the load (UFL scalar, user's units).
 
         Returns:
@@ -46,28 +47,30 @@ class Load(Part):
         raise NotImplementedError
 
     def mode_work(self, body: Any, value: Any) -> Any:
-        """Return the change of the virtual work by a circumferential mode.
-
-        The form is bilinear in `body.dmode` and `body.mode`, amplitudes (u_r, u_z, u_hoop), shape (3,), length.
+        """Return the change of the virtual work of the load by a non-axisymmetric mode, for the stability analysis.
 
         Args:
-            body: as in `virtual_work`, with the change `body.H` of F by the mode, shape (3, 3).
+            body: as in `virtual_work`, with the amplitudes (u_r, u_z, u_hoop) of a mode and of its variation, `mode`
+                and `dmode` (UFL, shape (3,), length), and the change `H` of F by the mode (UFL, shape (3, 3)).
             value: value of the load (UFL scalar, user's units).
 
         Returns:
-            UFL form; None for a dead load.
+            UFL form, bilinear in `body.mode` and `body.dmode`; None for a dead load.
 
         Raises:
-            InputError: the load does not define it.
+            InputError: the class of the load does not define this method.
         """
         raise InputError(f"{self!r}: stability: how it changes with a mode is not known: give the load a method"
                          f" mode_work(body, value) that returns a form, or None if it does not")
 
     def unit(self, body: Any) -> float:
-        """Return the value that scales the amplitude of a controlled load.
+        r"""Return the value of the load that corresponds to a dimensionless amplitude of 1.
 
-        By default its forces in the reference configuration add up to shear modulus times volume over length of the
-        body.
+        By default the nodal forces :math:`f_i` of this value in the reference configuration add up to
+
+        .. math:: \sum_i |f_i| = \frac{\mu V}{L}
+
+        with the largest shear modulus mu, the volume V and the largest extent L of the body.
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody`.
@@ -111,12 +114,29 @@ class Pressure(Load):
         return -value * ufl.inner(area, body.du) * face.measure
 
     def mode_work(self, body, value):
+        r"""Return the change of the virtual work of the pressure by a non-axisymmetric mode v.
+
+        .. math:: -p \int_{\Gamma} \left(\delta \, \mathrm{cof} F[H] \, N\right) \cdot \delta v \, dA
+
+        `formingx.physics.kinematics.cofactor_change` gives the change of the cofactor by the change H of F.
+
+        Args:
+            body: as in `Load.mode_work`.
+            value: pressure p (UFL scalar, stress).
+
+        Returns:
+            UFL form, bilinear in `body.mode` and `body.dmode`.
+        """
         face = body.face(self.on, self.quadrature_degree)
         N = ufl.as_vector([face.normal[0], face.normal[1], 0])
         return -value * face.integral(ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
 
     def unit(self, body):
-        """Return stress times thickness over length, with the volume of the body over the loaded area as thickness.
+        r"""Return the pressure that corresponds to a dimensionless amplitude of 1.
+
+        .. math:: p = \frac{\mu \, h}{L}, \qquad h = \frac{V}{A}
+
+        Here mu is the largest shear modulus, L the largest extent and V the volume of the body, and A the loaded area.
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody`.
@@ -128,14 +148,15 @@ class Pressure(Load):
 
 
 class Gravity(Load):
-    r"""Weight along -Z, a dead load.
+    r"""Weight of the body along -Z, a dead load.
 
     .. math:: \delta W = -\int_{V} \rho \, g \, \delta u_z \, dV
 
     Args:
-        density: density in the reference configuration, positive, or {layer: density} for layers with weight. Its unit
-            is kg/m3 with Pa, m and s, and t/mm3 with MPa, mm and s.
-        value: acceleration g, length/time^2 (9.81 m/s2 or 9810 mm/s2; negative: upward); None: a control of the run.
+        density: density rho in the reference configuration, positive; {layer: density} if only some layers have weight.
+            Its unit is kg/m3 with Pa, m and s, and t/mm3 with MPa, mm and s.
+        value: acceleration g, length/time^2, such as 9.81 m/s2 or 9810 mm/s2, negative for an upward load; None: g is a
+            control of the run.
         name: name in a process and in columns.
 
     >>> fx.Gravity(density=0.95e-9, value=9810.0)                                        # t/mm3, mm/s2
@@ -156,13 +177,13 @@ class Gravity(Load):
 
 
 class CentrifugalLoad(Load):
-    r"""Centrifugal force of a body that rotates about the axis.
+    r"""Centrifugal force on a body that rotates about the axis R = 0.
 
     .. math:: \delta W = \int_{V} \rho \, \omega^2 (R + u_r) \, \delta u_r \, dV
 
     Args:
-        density: see `Gravity`.
-        value: omega^2, the square of the angular speed, 1/time^2; None: a control of the run.
+        density: density rho in the reference configuration, see `Gravity`.
+        value: omega^2, the square of the angular speed, 1/time^2; None: omega^2 is a control of the run.
         name: name in a process and in columns.
 
     >>> fx.CentrifugalLoad(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
@@ -179,15 +200,26 @@ class CentrifugalLoad(Load):
         return value * _weighed(body, self.density, (body.X[0] + body.u[0]) * body.du[0])
 
     def mode_work(self, body, value):
+        r"""Return the change of the virtual work of the centrifugal force by a mode of amplitudes (U, W, V).
+
+        .. math:: \int_{V} \rho \, \omega^2 (U \, \delta U + V \, \delta V) \, dV
+
+        Args:
+            body: as in `Load.mode_work`.
+            value: omega^2 (UFL scalar, 1/time^2).
+
+        Returns:
+            UFL form, bilinear in `body.mode` and `body.dmode`.
+        """
         return value * _weighed(body, self.density, body.mode[0] * body.dmode[0] + body.mode[2] * body.dmode[2])
 
 
 def _density(caller: str, given: Any) -> dict[str | None, float]:
-    """Return {layer: density}; the layer None stands for all layers."""
+    """Return {layer: density} for a density or {layer: density}; the layer None stands for all layers."""
     each = given if isinstance(given, Mapping) else {None: given}
     return {layer: positive(f"{caller}: density", value) for layer, value in each.items()}
 
 
 def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:
-    """Return the integral (UFL) of density times an integrand."""
+    """Return the integral of density times an integrand over the reference volume (UFL); density: {layer: value}."""
     return sum(body.integral(body.constant(rho) * integrand, layer) for layer, rho in density.items())

@@ -12,7 +12,8 @@ same penalty reads
     W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
 
 Both are equal for small J - 1. The second has far better Newton convergence, since the linearised constraint has no
-wrong stress k (J - 1).
+wrong stress k (J - 1). Models remove the isotropic stress of W in the reference configuration, see
+`formingx.materials.material`.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ _WRONG = 0.05                              # expected error above which a scene 
 
 
 class Locking(NamedTuple):
-    """Triangles in which the element of "P1dg" locks.
+    """Warning that the element of `MixedPressure(space="P1dg")` locks in slender triangles of a mesh.
 
     Attributes:
-        error: expected relative error of the bending stiffness.
-        slenderness: largest height over width of a triangle across the thickness.
+        error: expected relative error of the bending stiffness of the body.
+        slenderness: height over width of the triangle with the largest expected error.
         at: place of this triangle.
     """
 
@@ -52,11 +53,11 @@ class Locking(NamedTuple):
 
 
 class Model:
-    """Model of a body.
+    """Base class of the models of a body: solid or membrane, and the treatment of incompressibility.
 
     Attributes:
         solid: True if the body has bending stiffness and a stress through its thickness.
-        volume_stiffness: see `MixedPressure`.
+        volume_stiffness: bulk stiffness at each point over the shear modulus, see `MixedPressure`.
     """
 
     solid = True
@@ -68,35 +69,39 @@ class Model:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
-        """Raise an InputError if the scene has items that this model cannot have.
+        """Check that the model allows all items of a scene.
 
         Args:
             scene: the `Scene`.
+
+        Raises:
+            InputError: the model does not allow an item.
         """
 
     def locking(self, mesh: Any) -> Locking | None:
-        """Return the triangles in which the elements lock enough for a warning; collective.
+        """Estimate the locking of the elements in the triangles of a mesh; collective.
 
         Args:
             mesh: the `Mesh`.
 
         Returns:
-            The triangles, or None.
+            The warning, or None if no warning is necessary.
         """
         return None
 
 
 class Membrane(Model):
-    r"""Membrane model of a thin sheet: its mid-surface, with the thickness as data (Adkins and Rivlin 1952).
+    r"""Membrane model of a thin sheet: the mid-surface deforms, its reference thickness is given.
 
     .. math:: \lambda_3 = \frac{1}{\lambda_1 \lambda_2}
 
-    The thickness stretch preserves the volume exactly. Layers are bonded and their energies add up. A membrane has no
-    bending stiffness, so a rim cannot be clamped, and no stress through the thickness.
+    The thickness stretch preserves the volume exactly (Adkins and Rivlin 1952). Layers are bonded and their energies
+    add up. A membrane has no stress through its thickness. It has no bending stiffness either, so the rim of a section
+    cannot be clamped.
 
     Args:
-        wrinkles: in three dimensions, part of the stiffness, up to 1, that remains where the membrane wrinkles
-            (tension-field theory, see `formingx.extensions.space.surface`), for example 0.01; None: the full stiffness.
+        wrinkles: fraction of the stiffness, up to 1, that remains where a sheet in three dimensions wrinkles, for
+            example 0.01; None: the full stiffness. `formingx.extensions.space.surface` states the tension-field theory.
 
     >>> thin = fx.Scene(mesh=sheet, materials=scene.materials, supports=scene.supports, loads=scene.loads,
     ...                 model=fx.Membrane())
@@ -123,17 +128,17 @@ class Membrane(Model):
             raise InputError("Scene: expansion: a membrane keeps its volume: use a solid model, MixedPressure()")
         if self.wrinkles is not None and scene.kinematics.components == 2:
             raise InputError("Scene: Membrane(wrinkles=...): is for a sheet in space; a section has no wrinkles along"
-                             " its hoop: use a solid model")
+                             " the hoop: use a solid model")
         if scene.contacts and scene.kinematics.components == 2:
             raise InputError(f"Scene: {scene.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
                              f" MixedPressure() for one")
 
 
 class PressureSpace(NamedTuple):
-    """Pair of elements on triangles.
+    """Element of the pressure on triangles, and the enrichment of the quadratic displacement that belongs to it.
 
     Attributes:
-        family: family of the pressure element.
+        family: family of the pressure element, "Lagrange" or "DG" (discontinuous).
         degree: degree of the pressure element.
         bubble: True if a cubic bubble enriches the P2 displacement.
     """
@@ -144,7 +149,7 @@ class PressureSpace(NamedTuple):
 
     @property
     def continuous(self) -> bool:
-        """True if the pressure is continuous within a layer; each layer then needs a field of its own."""
+        """True if the pressure is continuous within a layer; each layer then needs its own pressure field."""
         return self.family == "Lagrange"
 
 
@@ -156,12 +161,15 @@ _SPACES = {
 
 
 class MixedPressure(Model):
-    """Solid with the pressure as an unknown: P2 displacement and one of three pressure spaces.
+    r"""Solid with the pressure as an unknown: quadratic (P2) displacement and one of three pressure spaces.
 
-    The pressure may jump across the interface of two materials.
+    .. math:: W(F) - \sigma_0 \ln J + p (J - 1) - \frac{\epsilon p^2}{16 \mu}
+
+    The stress :math:`\sigma_0` makes the reference configuration free of stress, see `formingx.materials.material`. The
+    pressure may jump across the interface of two materials.
 
     Args:
-        eps: dimensionless penalty parameter; 0 preserves the volume exactly (weakly, in the pressure space).
+        eps: dimensionless penalty parameter epsilon; 0 preserves the volume exactly (weakly, in the pressure space).
         space: one of the following pressure spaces.
 
             - "P1": continuous in each layer (Taylor-Hood).
@@ -171,7 +179,7 @@ class MixedPressure(Model):
               preserves the volume of each element. Triangles must not be slender across a thick sheet: the inf-sup
               constant decreases with width over height, and the element locks (`locking`). A scene with an expected
               error of 5 % is refused.
-        volume_stiffness: k over the shear modulus of an additional energy k (J - 1)^2/2 at each point, for example 10.
+        volume_stiffness: kappa of an additional energy :math:`\kappa \mu (J - 1)^2/2` at each point, for example 10.
             Pressures preserve the volume of an element, not of its parts. The pressure may vary within an element by
             more than the shear modulus, as in a block pressed very flat. Then one part collapses and another opens. The
             additional energy prevents this; thin sheets on coarse meshes become stiffer. (The grad-div stabilisation of
@@ -197,10 +205,10 @@ class MixedPressure(Model):
             raise InputError(f"Scene: {found}")
 
     def locking(self, mesh):
-        r"""Return triangles so slender across a thick sheet that bending is too stiff by more than 0.3 %; collective.
+        r"""Estimate how much slender triangles across a thick sheet stiffen its bending; collective.
 
-        The inf-sup constant decreases as 2 width/height. For hinged sheets 2 to 15 times wider than thick the error is
-        at most (benchmarks/thickness.py)
+        The inf-sup constant of "P1dg" decreases as 2 width/height of the triangles. For hinged sheets 2 to 15 times
+        wider than thick the error of the bending stiffness is at most (benchmarks/thickness.py)
 
         .. math::
             0.3 \, \frac{\text{height}}{\text{width}}
@@ -213,7 +221,7 @@ class MixedPressure(Model):
             mesh: the `Mesh`.
 
         Returns:
-            The triangles, or None.
+            The warning, if the mean error over the area of the section exceeds 0.3 %, else None.
         """
         if not self.pressure.bubble:
             return None
@@ -224,15 +232,15 @@ class MixedPressure(Model):
         return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > _TOO_STIFF else None
 
     def terms(self, J, p, modulus, eps):
-        r"""Return the energy densities of incompressibility.
+        r"""Return the energy density that enforces incompressibility, a Lagrange multiplier with a penalty.
 
         .. math:: p (J - 1) - \frac{\epsilon p^2}{16 \mu}
 
         Args:
             J: det F (UFL scalar).
-            p: pressure (UFL scalar, stress).
+            p: pressure, positive in tension (UFL scalar, stress).
             modulus: shear modulus mu of the layer (UFL scalar, stress).
-            eps: penalty parameter (UFL scalar).
+            eps: penalty parameter epsilon (UFL scalar); not used if the model has eps = 0.
 
         Returns:
             List of (energy density (UFL, stress), quadrature metadata).
@@ -244,14 +252,22 @@ class MixedPressure(Model):
 
 
 class DisplacementPenalty(Model):
-    """Solid with displacement unknowns only; a reduced rule integrates the penalty (Song 1993, section 3.4).
+    r"""Solid with displacement unknowns only; a reduced rule integrates the penalty (Song 1993, section 3.4).
+
+    .. math:: W(F) - \sigma_0 \ln J + \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad I_3 = J^2
+
+    The term with the stress :math:`\sigma_0` makes the reference configuration free of stress, see
+    `formingx.materials.material`.
 
     Args:
-        eps: dimensionless penalty parameter, positive (thesis: 2e-2 to 1e-7).
-        points: 3 (interior, degree 2: the usable rule), 4 (degree 3, one weight negative: the tangent becomes
-            indefinite in bending for eps <= 1e-3) or 7 (full: locks).
-        stress_free: False keeps the energy as printed in (3.4.1), which has a stress in the reference configuration.
-            The unloaded body then swells or shrinks to I3 - 1 of the order of eps.
+        eps: dimensionless penalty parameter epsilon, positive (thesis: 2e-2 to 1e-7).
+        points: number of quadrature points of the penalty.
+
+            - 3: interior points, exact to degree 2, the usable rule.
+            - 4: exact to degree 3, one weight is negative; the tangent becomes indefinite in bending for eps <= 1e-3.
+            - 7: full integration; the elements lock.
+        stress_free: False leaves the term with :math:`\sigma_0` out, as printed in (3.4.1). The reference configuration
+            then has a stress, and the unloaded body swells or shrinks to I3 - 1 of the order of eps.
 
     >>> fx.DisplacementPenalty(eps=1e-4)
     DisplacementPenalty(eps=0.0001)
@@ -277,15 +293,15 @@ class DisplacementPenalty(Model):
                                  f" no constants that vary over the body, and no histories; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
-        r"""Return the energy density of the penalty.
+        r"""Return the energy density of the penalty, eq. (3.4.1) of Song (1993), with its quadrature rule.
 
-        .. math:: \frac{\mu}{\epsilon} (J^2 - 1)^2
+        .. math:: \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad I_3 = J^2
 
         Args:
             J: det F (UFL scalar).
             p: not used.
             modulus: shear modulus mu of the layer (UFL scalar, stress).
-            eps: penalty parameter (UFL scalar).
+            eps: penalty parameter epsilon (UFL scalar).
 
         Returns:
             List of (energy density (UFL, stress), quadrature metadata).

@@ -9,7 +9,7 @@ from .part import Part
 
 R, Z = 0, 1
 NAMES = ("r", "z", "y", "x")
-"""Names of the components that supports constrain, by number; in three dimensions r of a support of a rim is x."""
+"""Names of displacement components by the number that a constraint uses; in three dimensions "r" stands for "x"."""
 
 
 class Constrained(NamedTuple):
@@ -19,7 +19,7 @@ class Constrained(NamedTuple):
         component: number of the component in `NAMES`.
         on: name of the boundary, or None.
         point: reference position of the node, (r, z), length, or None.
-        driven: True if the component follows the control of the run instead.
+        driven: True if the component follows the control of the run instead of being 0.
     """
 
     component: int
@@ -29,14 +29,18 @@ class Constrained(NamedTuple):
 
 
 class ConstrainedMean(NamedTuple):
-    """Constraint of the mean of one displacement component over a boundary to 0, by a Lagrange multiplier.
+    r"""Constraint of the mean of one displacement component over a boundary to 0, by a Lagrange multiplier.
+
+    .. math:: \int_{\Gamma} w \, u_i \, dA = 0
+
+    The weight w is 1 or the shear modulus of the layer. The multiplier is a traction in proportion to w.
 
     Attributes:
-        component: number of the component in `NAMES`.
+        component: number i of the component in `NAMES`.
         on: name of the boundary.
-        by_stiffness: True if layers count, and carry the force, in proportion to their shear modulus.
-        point: None.
-        driven: False.
+        by_stiffness: True if w is the shear modulus of the layer, False if w = 1.
+        point: None, for the interface of `Constrained`.
+        driven: False, for the interface of `Constrained`.
     """
 
     component: int
@@ -50,10 +54,10 @@ class Support(Part):
     """Base class of supports, also of user-defined ones; a subclass defines `constraints`, `stored_energy`, or both.
 
     Args:
-        on: name of the boundary that it supports.
+        on: name of the supported boundary.
 
     Attributes:
-        resists: components, "r" or "z", along which its energy resists a motion of the whole boundary.
+        resists: names of the components, "r" or "z", in which the stored energy resists a motion of the whole boundary.
     """
 
     resists: tuple[str, ...] = ()
@@ -62,12 +66,13 @@ class Support(Part):
         self.on = instance(f"{type(self).__name__}: on", on, str, "the name of a boundary")
 
     def stored_energy(self, body: Any) -> Any:
-        """Return the energy of an elastic support.
+        """Return the energy of an elastic support, whose derivative by the displacement enters the residual.
 
-        Its derivative by the displacement enters the residual. In a stage without the support the energy is 0.
+        In a stage in which the support is inactive the energy is 0.
 
         Args:
-            body: a `formingx.forms.loaded_body.LoadedBody`: u, X, F, `face`, `integral`.
+            body: a `formingx.forms.loaded_body.LoadedBody`. It has the displacement `u`, the reference position `X`,
+                the deformation gradient `F`, and integrals by `integral` and `face`.
 
         Returns:
             UFL form of rank 0 (stress length^3, per unit depth stress length^2); None if the support has no energy.
@@ -75,7 +80,9 @@ class Support(Part):
         return None
 
     def all_constraints(self) -> list[Constrained | ConstrainedMean]:
-        """Return the constraints, and constraints of the components that the energy resists.
+        """Return the constraints of the support, as if the components in `resists` were constrained too.
+
+        The check for rigid motions uses them.
 
         Returns:
             List of `Constrained` and `ConstrainedMean`.
@@ -88,7 +95,7 @@ class Support(Part):
 
 
 class _OneComponent(Support):
-    """Support of one component of the displacement of a boundary."""
+    """Support that constrains or drives one displacement component of a boundary, given by its name `value`."""
 
     described = ("component",)
 
@@ -101,15 +108,17 @@ class _OneComponent(Support):
 
 
 class Symmetry(_OneComponent):
-    """Symmetry line along Z (an axis, `normal="r"`) or R (`normal="z"`), without displacement across it.
+    """Axis or plane of symmetry: the displacement normal to the boundary is 0, the boundary slides freely along it.
 
-    If a flat end of the body lies in it, the part continues behind it as the mirror image of the body. Results then
-    belong to the whole part: see `Scene.symmetry_factor`.
+    If the boundary is a flat end of the body, the part continues behind it as the mirror image of the body. Results
+    then belong to the whole part, see `Scene.symmetry_factor`. The axis of an axisymmetric body is no such end.
 
     Args:
         on: name of the boundary.
-        normal: constrained component, "r" or "z"; in three dimensions "x", "y" or "z".
-        mirror: True: antisymmetric modes count too, see `Path.stability`.
+        normal: constrained component: "r" for an axis or a plane along Z, "z" for a plane along R; in three dimensions
+            "x", "y" or "z".
+        mirror: True: the stability analysis includes modes that are antisymmetric about the plane, see
+            `Path.stability`.
         guide: True: the part ends at a frictionless wall along which it slides, so results belong to the body alone.
 
     >>> [fx.Symmetry("axis"), fx.Symmetry("middle", normal="z", mirror=True)]
@@ -132,9 +141,13 @@ class Symmetry(_OneComponent):
 
 
 class Clamped(Support):
-    """Clamped boundary, without displacement.
+    """Clamped boundary: all displacement components are 0.
 
-    The corner of a clamped rim is singular: docs/validation.md gives the resulting uncertainty of a limit pressure.
+    The stress at the corner of a clamped rim is singular: docs/validation.md gives the resulting uncertainty of a limit
+    pressure.
+
+    Args:
+        on: name of the boundary.
 
     >>> [(c.component, c.on) for c in fx.Clamped("rim").constraints()]          # u_r and u_z
     [(0, 'rim'), (1, 'rim')]
@@ -147,14 +160,17 @@ class Clamped(Support):
 
 
 class SimplySupported(Support):
-    """Hinge: the mean displacement of a rim face is 0, rotation and thinning of the face are free.
+    r"""Hinge: the mean displacement of a rim face is 0, while the face rotates and thins freely.
+
+    .. math:: \int_{\Gamma} w \, u \, dA = 0
 
     A support of a single node would be a point support, which has no limit under mesh refinement.
 
     Args:
         on: name of the boundary.
-        weight: "area": plain mean, every layer carries the same traction; "stiffness": mean weighted with the shear
-            modulus of the layers. Soft layers may need it if they cannot carry that traction.
+        weight: weight w of the mean. "area": w = 1, every layer carries the same traction. "stiffness": w is the shear
+            modulus of the layer, and tractions are proportional to it; for soft layers that cannot carry the traction
+            of the others.
 
     >>> scene.supports
     [Symmetry('axis', 'r'), SimplySupported('rim')]
@@ -173,9 +189,9 @@ class SimplySupported(Support):
 
 
 class PinnedNode(Support):
-    """Fixed node: the hinge of the thesis' coarse grids.
+    """Node with a displacement of 0: the hinge of the coarse grids of Song (1993).
 
-    It is a point support in a solid: results drift with mesh refinement. Prefer `SimplySupported`.
+    In a solid it is a point support: results drift with mesh refinement. Prefer `SimplySupported`.
 
     Args:
         r: reference radius of the node, length.
@@ -196,11 +212,11 @@ class PinnedNode(Support):
 
 
 class PrescribedDisplacement(_OneComponent):
-    """Displacement component of a boundary that follows a control of the run (a length).
+    """Displacement component of a boundary that equals a control of the run, the travel of the boundary.
 
     Args:
         on: name of the boundary.
-        component: "r" or "z".
+        component: "r" or "z"; in three dimensions "x", "y" or "z".
         name: name in a process and in columns.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
@@ -222,7 +238,7 @@ class PrescribedDisplacement(_OneComponent):
 
 
 def _component(name: str, value: str) -> int:
-    """Return the number of a component in `NAMES`."""
+    """Return the number in `NAMES` of a component given by its name `value`; `name` begins the error message."""
     if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
     return NAMES.index(value)
