@@ -154,7 +154,7 @@ def test_a_sheet_cools_while_it_waits():
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
     c10 = path.problem.forms.terms[0].constants["c10"].ufl_operands[0]        # times how it goes on in a step
     with path.problem.state_context(path.last):
-        assert path.problem.temperature.at(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
+        assert path.problem.temperature.at_points(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
         stiffer = c10.x.array.max()
     with path.problem.state_context(path.states[0]):
         assert np.all(path.problem.temperature.T.x.array == 150.0)
@@ -170,8 +170,8 @@ def test_relaxation_times_are_those_in_the_middle_of_a_step():
     terms, = Problem(scene(melt, 150.0, fx.MixedPressure(), heat=heat)).forms.terms
     forms, rate, begins, step = terms.forms, 0.7, 1.0, 0.4
     terms.start.value, forms._time[0].value, forms._time[1].value = begins, begins + step, 0.0
-    for followed in terms._followed:
-        followed._rate.x.array[:], followed._since.value = rate, begins
+    for coefficient in terms._coefficients:
+        coefficient._rate.x.array[:], coefficient._since.value = rate, begins
     found = {name: _compat.compile_expression(terms.constants[name], terms.places).eval(
         forms.domain, np.arange(2, dtype=np.int32)) for name in ("c10", "tau_1")}
     assert found["c10"] == pytest.approx(1.0 * np.exp(rate * step))

@@ -79,13 +79,13 @@ class Body(Triangles):
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
         self.highest = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
-            control = None if stage.control is None else scene.items[scene.number(stage.who, stage.control)]
+            control = None if stage.control is None else scene.items[scene.number(stage.label, stage.control)]
             for target in (*stage.intermediate, stage.until):
                 self.aims += [] if target is None else self._aim(target, control)
             for name, table in stage.tables:
-                item = scene.items[scene.number(stage.who, name)]
+                item = scene.items[scene.number(stage.label, name)]
                 value = float(table[np.argmax(np.abs(table[:, 1])), 1])
-                self.aims.append(Aim(item, str(item.quantity), value, f"the table of {name!r} in {stage.who}"))
+                self.aims.append(Aim(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
 
     def format(self, value: float, kind: str) -> str:
         """Return a number with its unit as text.

@@ -261,8 +261,8 @@ class Approach:
             Relative difference over all ranks.
         """
         face, before = self.face, self.face.law.pressure(self.face.history)
-        off = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
-        sums = np.array([face.rule.area @ np.where(before > 0, off, 0.0), face.rule.area @ before])
+        difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
+        sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
         return float(change / (pressure + LIMITS.weak * face.force_scale))
 

@@ -87,9 +87,9 @@ class FaceContact:
         """
         self._base, self._rate, self.present = base, rate, present
 
-    def shift_distances(self, by: np.ndarray) -> None:
-        """Reduce the signed distances of the points by `by`, shape (n,), length; called after remeshing."""
-        self.shift = by
+    def shift_distances(self, shift: np.ndarray) -> None:
+        """Reduce the signed distances of the points by `shift`, shape (n,), length; called after remeshing."""
+        self.shift = shift
         self.law = self._law(self._penalty)
 
     def _temperatures(self) -> np.ndarray | None:

@@ -9,7 +9,7 @@ import basix
 import basix.ufl
 from dolfinx import fem
 
-from .followed import Followed
+from .temperature_coefficient import TemperatureCoefficient
 
 
 class FreeStretch:
@@ -37,14 +37,13 @@ class FreeStretch:
         stretch.x.array[:] = 1.0
         self._cells = [forms.cells_of([name]) for name in expansion]
         self._temperatures = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
-        self._followed = Followed(forms, stretch, [(cells, partial(law.stretch, clamped=True)) for cells, law in
-                                                   zip(self._cells, expansion.values())],
-                                  map(self._temperatures, self._cells))
-        self.stretch = self._followed.at(forms.time)
+        laws = [(cells, partial(law.stretch, clamped=True)) for cells, law in zip(self._cells, expansion.values())]
+        self._coefficient = TemperatureCoefficient(forms, stretch, laws, map(self._temperatures, self._cells))
+        self.stretch = self._coefficient.at_time(forms.time)
 
     def take_temperature(self) -> None:
         """Update the stretch to a changed temperature."""
-        self._followed.take(map(self._temperatures, self._cells))
+        self._coefficient.take(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:
         """Return the elastic part of a deformation gradient.

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..materials.constants import Varying
 from ..materials.tensors import isochoric
 from ..mesh.nodes import own_cells
-from .followed import Followed
+from .temperature_coefficient import TemperatureCoefficient
 
 
 class MaterialTerms:
@@ -46,7 +46,7 @@ class MaterialTerms:
         self.cells = forms.cells_of(names)
         self.own_cells = self.cells[self.cells < len(own_cells(forms.domain))]
         self.X = forms.X
-        self._followed: list[Followed] = []
+        self._coefficients: list[TemperatureCoefficient] = []
         cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
         self.places = basix.make_quadrature(cell, degree)[0]
         self.start = forms.constant(0.0)
@@ -65,7 +65,7 @@ class MaterialTerms:
     @property
     def follows_temperature(self) -> bool:
         """True if a constant depends on the temperature."""
-        return bool(self._followed)
+        return bool(self._coefficients)
 
     @property
     def has_history(self) -> bool:
@@ -113,9 +113,9 @@ class MaterialTerms:
         """
         forms, found = self.forms, self.quadrature_function()
         law = getattr(function, "clamped", function)          # a user's own constant may be any function
-        followed = Followed(forms, found, [(self.cells, law)], [forms.temperatures(self)])
-        self._followed.append(followed)
-        return followed.at(forms.time - (self._time_step / 2 if self._in_middle else 0))
+        coefficient = TemperatureCoefficient(forms, found, [(self.cells, law)], [forms.temperatures(self)])
+        self._coefficients.append(coefficient)
+        return coefficient.at_time(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
     def take_temperature(self) -> None:
         """Update the constants to a changed temperature.
@@ -123,9 +123,9 @@ class MaterialTerms:
         Raises:
             InputError: a constant has no finite value at a temperature.
         """
-        temperatures = [self.forms.temperatures(self)] if self._followed else []
-        for followed in self._followed:
-            followed.take(temperatures)
+        temperatures = [self.forms.temperatures(self)] if self._coefficients else []
+        for coefficient in self._coefficients:
+            coefficient.take(temperatures)
 
     def of_mesh(self, expression: Any) -> Any:
         """Return a coefficient that is given on the scene's mesh.

@@ -149,7 +149,7 @@ class MidSurface(Formulation):
         shapes: Any = geometry.tabulate(0, terms.places)
         R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
         points = np.column_stack([R.ravel(), self.mid(terms.names[0], R.ravel(), Z.ravel())])
-        return self.temperature.at(points).reshape(1, *R.shape)
+        return self.temperature.at_points(points).reshape(1, *R.shape)
 
     def probe(self, problem: Any, points: Any) -> MidSurfaceProbe:
         return MidSurfaceProbe(problem, points)

@@ -43,7 +43,7 @@ class Temperature:
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
-    def at(self, points: np.ndarray) -> np.ndarray:
+    def at_points(self, points: np.ndarray) -> np.ndarray:
         """Return the temperatures at reference points that each rank chooses; collective.
 
         Args:

@@ -288,7 +288,7 @@ class Path(States):
             raise InputError("temperature: the scene has none: give Scene a temperature=...")
         state = state or self.last
         with self.segment(state).problem.state_context(state) as problem:
-            return problem.temperature.at(problem.followed(as_points("Path.temperature: points", points)))
+            return problem.temperature.at_points(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """Return the force on each whole tool in all states.

@@ -42,10 +42,10 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
                 try:
                     scene.check_travel(tools[i], where[i])
                 except InputError as error:
-                    raise InputError(f"{plan.stage.who}: {error}") from None
+                    raise InputError(f"{plan.stage.label}: {error}") from None
             for part in np.linspace(0, 1, _POSITIONS) if where != travels else [1.0]:
                 now = {i: travels[i] + part * (where[i] - travels[i]) for i in tools}
-                _check_overlap(scene, plan.stage.who, present, outlines, now)
+                _check_overlap(scene, plan.stage.label, present, outlines, now)
             travels = where
     return unsure
 

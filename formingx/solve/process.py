@@ -115,9 +115,9 @@ class Execution:
             try:
                 bound = target.bind(self.problem)
             except InputError as error:
-                raise InputError(f"{stage.who}: {error}") from None
+                raise InputError(f"{stage.label}: {error}") from None
             if isinstance(bound, Amplitude) and not bound.moves:
-                raise InputError(f"{stage.who}: target {target}: this stage does not drive that")
+                raise InputError(f"{stage.label}: target {target}: this stage does not drive that")
             found.append((target, bound))
         return found
 
@@ -156,7 +156,7 @@ class Execution:
         try:
             return self.curve.resume(self.record.last.x, control)
         except Failure as failure:
-            raise ConvergenceError(f"{self._stage.who} cannot begin: {failure.reason}") from None
+            raise ConvergenceError(f"{self._stage.label} cannot begin: {failure.reason}") from None
 
     def _take_up(self, state: State) -> None:
         """Accept a state that is known without an iteration, as a completed step."""
@@ -188,7 +188,7 @@ class Execution:
                 try:
                     self.problem.bring_in(i, x, control)
                 except InputError as error:
-                    raise InputError(f"{self._stage.who}: {error}") from None
+                    raise InputError(f"{self._stage.label}: {error}") from None
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.inactive != self._inactive
             start = 0.0 if fading else control
             self._enter(self._amplitudes(), still, 0, start, fading)
@@ -254,12 +254,12 @@ class Execution:
         measure, course = stage.flow
         corners = [] if callable(course) else course[:, 0].tolist()
         if corners and corners[0] > now:
-            raise InputError(f"{stage.who}: the table begins at time {corners[0]:g}, but the process time is"
+            raise InputError(f"{stage.label}: the table begins at time {corners[0]:g}, but the process time is"
                              f" {now:g}: nothing is given for the time between")
         last = corners[-1] if end is None else end.value
         if last <= now:
-            raise InputError(f"{stage.who}: ends at time {last:g}, but the process time is {now:g} already: time cannot"
-                             f" go back")
+            raise InputError(f"{stage.label}: ends at time {last:g}, but the process time is {now:g} already: time"
+                             f" cannot go back")
         at = course if callable(course) else lambda time: np.interp(time, *course.T)
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
@@ -307,7 +307,7 @@ class Execution:
         for waited, bound in left:
             if waited is requested and not self.record.ended:
                 last = self.record.last
-                raise ConvergenceError(f"{self._stage.who}: {waited} was not reached within its duration of"
+                raise ConvergenceError(f"{self._stage.label}: {waited} was not reached within its duration of"
                                        f" {self._stage.duration:g}: it is"
                                        f" {self.curve.value(bound, last.x, last.control):.6g} then: give it longer")
         return left
@@ -315,7 +315,7 @@ class Execution:
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
         """Raise an InputError if tables contradict the process time `now`, or the values of their items, at their
         start."""
-        caller = self._stage.who
+        caller = self._stage.label
         if end <= now:
             raise InputError(f"{caller}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
                              f" back")

@@ -116,19 +116,19 @@ class Aim:
                 start.orientation = -start.orientation
         return start
 
-    def short_of_targets(self, old: State, by: float) -> float:
+    def short_of_targets(self, old: State, change: float) -> float:
         """Return the change of the control in a snap-through, reduced so that no open target of the control is passed.
 
         Args:
             old: state before the snap-through.
-            by: change of the control, dimensionless.
+            change: change of the control, dimensionless.
         """
         for target, bound in self.open:
             if isinstance(bound, Amplitude) and bound.moves:
                 then, now = (self._curve.value(bound, old.x, c) - target.value
-                             for c in (old.control + by, old.control))
-                by *= now / (now - then) if now * then < 0 else 1.0
-        return by
+                             for c in (old.control + change, old.control))
+                change *= now / (now - then) if now * then < 0 else 1.0
+        return change
 
     # reasons for a run to give up, as text; "" if there is none
 
@@ -217,14 +217,14 @@ class Progress:
             self._bar.update(0)
         self._speak()
 
-    def limited(self, by: str, length: float) -> None:
+    def limited(self, reason: str, length: float) -> None:
         """Show a shortened or failed step.
 
         Args:
-            by: the reason, as text.
+            reason: the reason, as text.
             length: length of the next attempt.
         """
-        self._limits[by] += 1
+        self._limits[reason] += 1
         self._length = length
         self._speak()
 
@@ -239,7 +239,8 @@ class Progress:
             return
         spent, won = now - self._said, self._gained - self._gained_then
         left = f"about {_in_words((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer to it since"
-        limits = ", ".join(f"{by} ({n} times)" for by, n in self._limits.most_common(2)) or "their own control only"
+        common = self._limits.most_common(2)
+        limits = ", ".join(f"{reason} ({n} times)" for reason, n in common) or "their own control only"
         self._bar.clear()
         log.log(self._level, "%s: %.3g %% of the way in %d states and %s of processor time; since the last line steps"
                 " of %.2g, limited by %s; %s", self._words, 100 * self._gained, self._states,

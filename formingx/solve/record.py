@@ -178,16 +178,16 @@ class Record:
             log.warning("beyond %s: %s", self.describe(state), state.verdict)
         self.counts.steps += state.kind != "start"
 
-    def complete_step(self, step: StepControl, until: Target, **more: Any) -> None:
+    def complete_step(self, step: StepControl, until: Target, **entries: Any) -> None:
         """Complete a step: store in the last state the data with which the run continues, and call `hooks.on_step`.
 
         Args:
             step: step control of the next step.
             until: the target that ends the run.
-            more: further data to store in `State.stepping`.
+            entries: further data to store in `State.stepping`.
         """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
-                              "column": self.equations.shown(0.0)[0].replace(" ", "_"), **more}
+                              "column": self.equations.shown(0.0)[0].replace(" ", "_"), **entries}
         for listener in self.hooks.on_step:
             listener()
 

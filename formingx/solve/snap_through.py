@@ -155,7 +155,7 @@ class _Motion:
         passed: earlier states of the path, to which the body must not return.
 
     Attributes:
-        at: present position of the body, as a state.
+        state: present position of the body, as a state.
         lost: energy dissipated so far, dimensionless.
         solved: number of viscous solutions so far.
         rest: unbalanced forces, relative to the support forces.
@@ -171,7 +171,7 @@ class _Motion:
         self._newton = BorderedNewton(curve.problem, settings.tolerances, curve.norm, drag=self._drag)
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
-        self.at, self.lost, self.solved = old, 0.0, 0
+        self.state, self.lost, self.solved = old, 0.0, 0
         self.rest, self.near = np.inf, settings.near_rest   # unbalanced forces; their limit for trying equilibrium
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
@@ -180,7 +180,7 @@ class _Motion:
         """Return True while eta and the distance moved by the body are within their bounds."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
-        return settings.least < eta < most and self.curve.moved(self._old, self.at) < settings.too_far
+        return settings.least < eta < most and self.curve.moved(self._old, self.state) < settings.too_far
 
     def move(self, origin: Array, eta: float) -> float:
         """Solve once with viscosity.
@@ -195,13 +195,13 @@ class _Motion:
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
         try:
-            _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.at)
+            _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.state)
         except Failure as failure:
             self.curve.spend(len(failure.history))
             return self._hold_back()
         self.curve.spend(len(history) - 1)
         x, limit = self._x.array_r.copy(), self.problem.limit
-        last, new = self.at, replace(self.at, x=x, control=self.control)
+        last, new = self.state, replace(self.state, x=x, control=self.control)
         if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
             return self._hold_back()
         if self._goes_back(last, new):                      # to the unstable state where the motion began
@@ -214,7 +214,7 @@ class _Motion:
         before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.rest < min(self.near, before)
         self._lose(origin, x, pull)                         # from the last or the predicted position
-        self._pull, self.at = pull, new
+        self._pull, self.state = pull, new
         self.problem.advance(x, self.control)
         if limit:
             limit.prepare(TrialStep(x, self.control, x - last.x, 0.0, 1.0))
@@ -242,19 +242,19 @@ class _Motion:
         """
         try:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
-                state = self.curve.solve(self.at.x, self.control, fixed(self.control), "jump", self.at)
+                state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
             if self.rest > self._settings.at_rest:
                 self.settles, self.near = False, 0.3 * self.rest
                 return None
             if not self.problem.has_history:                # another branch starts here
                 raise
-            state = self.curve.resume(self.at.x, self.control)
+            state = self.curve.resume(self.state.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
         if self._goes_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
             self.settles, self.near = False, 0.3 * self.rest
             return None
-        self._lose(self.at.x, state.x, np.zeros(len(state.x)))
+        self._lose(self.state.x, state.x, np.zeros(len(state.x)))
         energy, length = self.problem.units
         state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
@@ -289,7 +289,7 @@ class _Motion:
         self._x.destroy()
 
 
-def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: SnapThrough,
+def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
     """Return the equilibrium state that the body reaches from a state when the control changes further.
@@ -297,7 +297,7 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
     Args:
         curve: solver of the path.
         old: the state from which the body snaps.
-        by: change of the control, dimensionless; its sign is the direction of the process.
+        change: change of the control, dimensionless; its sign is the direction of the process.
         ahead: True to start at the end of the tangent of `old`, False to start at `old`.
         settings: criteria and settings.
         solutions: largest number of viscous solutions; default `settings.solutions`.
@@ -314,8 +314,8 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
             the history variables of `old` again.
     """
     problem, kept = curve.problem, curve.problem.memory
-    motion = _Motion(curve, old, old.control + by, settings, onward, passed)
-    origin = old.x + by / old.slope * old.direction if ahead else old.x
+    motion = _Motion(curve, old, old.control + change, settings, onward, passed)
+    origin = old.x + change / old.slope * old.direction if ahead else old.x
     eta, solutions = settings.eta, solutions or settings.solutions
     try:
         while motion.solved < solutions and motion.goes_on(eta):
@@ -325,10 +325,10 @@ def snap_through(curve: Curve, old: State, by: float, ahead: bool, settings: Sna
             listener()
             state = motion.end() if motion.settles else None
             if state is not None:
-                if state.slope * by < 0:
+                if state.slope * change < 0:
                     state.direction, state.slope = -state.direction, -state.slope
                 return state
-            eta *= motion.move(motion.at.x if motion.solved else origin, eta)
+            eta *= motion.move(motion.state.x if motion.solved else origin, eta)
         kind, where = (NoEquilibrium, "it comes to rest nowhere") if motion.solved else (
             Failure, "even the largest artificial viscosity finds no next state")
         raise kind(f"no equilibrium is found that the body could snap to: {where}", [])

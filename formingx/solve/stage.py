@@ -66,7 +66,7 @@ class Stage:
                  constant: Target | None = None):
         if not isinstance(name, str) or not name:
             raise InputError(f"Stage: name = {name!r}: must be a word")
-        caller = self.who = f"Stage {name!r}"
+        caller = self.label = f"Stage {name!r}"
         self.name, self.control, self.until = name, control, until
         self.intermediate = several(f"{caller}: intermediate", intermediate, "targets, such as pole_stretch(3)")
         self.inactive = several(f"{caller}: inactive", inactive, "items of the scene")
@@ -112,7 +112,7 @@ class Stage:
         Raises:
             InputError: the arguments contradict each other, or one is missing.
         """
-        caller, until = self.who, self.until
+        caller, until = self.label, self.until
         if self.constant is not None and (self.control is None
                                           or self.duration is None or until or amplitudes is not None):
             raise InputError(f"{caller}: constant = {self.constant}: give it control=..., what is adjusted to hold"
@@ -151,18 +151,19 @@ class Stage:
             InputError: the argument is not of this form, or a function of time has no end.
         """
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
-            raise InputError(f"{self.who}: both control and amplitudes are given: then amplitudes must be {{measure:"
+            raise InputError(f"{self.label}: both control and amplitudes are given: then amplitudes must be {{measure:"
                              f" [(time, value), ...]}} with a function that makes targets, such as enclosed_volume")
         ((measure, course),) = amplitudes.items()
         if callable(course):
             if self.until is None:
-                raise InputError(f"{self.who}: follows a function of time: until when? give it until=process_time(...)")
+                raise InputError(f"{self.label}: follows a function of time: until when? give it"
+                                 " until=process_time(...)")
         else:
             ((measure, course),) = self._tables(amplitudes)
             if len(course) < 2:
-                raise InputError(f"{self.who}: the table of {measure!r} must have two points at least")
+                raise InputError(f"{self.label}: the table of {measure!r} must have two points at least")
         first = course(0.0) if callable(course) else course[0, 1]
-        instance(f"{self.who}: amplitudes", measure(finite(f"{self.who}: amplitudes: value", first)), Target,
+        instance(f"{self.label}: amplitudes", measure(finite(f"{self.label}: amplitudes: value", first)), Target,
                  "made by its measure")
         return measure, course
 
@@ -179,10 +180,10 @@ class Stage:
             InputError: the argument is not of this form, or its times do not increase.
         """
         if not isinstance(amplitudes, Mapping) or not amplitudes:
-            raise InputError(f"{self.who}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
+            raise InputError(f"{self.label}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
         tables = []
         for item, knots in amplitudes.items():
-            table = f"{self.who}: the table of {item!r}"
+            table = f"{self.label}: the table of {item!r}"
             rows = [several(table, row, "two numbers") for row in several(table, knots, "(time, value)")]
             if not rows or any(len(row) != 2 for row in rows):
                 raise InputError(f"{table}: must be [(time, value), ...]")
@@ -240,8 +241,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         InputError: an item cannot be controlled or is missing in the scene, the body is free to move, or a target
             cannot be met.
     """
-    caller = stage.who
-    off = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})
+    caller = stage.label
+    inactive = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})
     driven = [stage.control] if stage.control is not None else [item for item, _ in stage.tables]
     numbers = [scene.number(caller, item) for item in driven]
     for number in numbers:
@@ -249,16 +250,16 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         if not item.driven:
             raise InputError(f"{caller}: {item!r} cannot be driven: a Pressure without value, a"
                              f" PrescribedDisplacement, or a Contact with a direction can")
-        if number in off and item.direction is None:                  # an inactive tool may return to its start
+        if number in inactive and item.direction is None:        # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{caller}: one thing has two tables")
-    present = [item for i, item in enumerate(scene.items) if i not in off]
+    present = [item for i, item in enumerate(scene.items) if i not in inactive]
     try:
         supports = [item for item in present if item in scene.supports]
         scene.check_constrained(supports, any(contact in present for contact in scene.contacts))
         scene.check_driven(supports)
-        aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], off)
+        aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], inactive)
     except InputError as error:
         raise InputError(f"{caller}: {error}") from None
     for number, (_, table) in zip(numbers, stage.tables):
@@ -266,5 +267,5 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         if (why := aims.beyond_all(scene, item.quantity, most)) is not None:
             raise InputError(f"{caller}: the table of {item!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
-    return Plan(stage, scene.together(numbers[0]) if stage.control is not None else [], tables, off,
+    return Plan(stage, scene.together(numbers[0]) if stage.control is not None else [], tables, inactive,
                 list(map(repr, scene.items)))

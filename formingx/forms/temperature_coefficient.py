@@ -10,7 +10,7 @@ import ufl
 from dolfinx import fem
 
 
-class Followed:
+class TemperatureCoefficient:
     r"""Coefficient f(T) at the quadrature points of the energy, for temperatures that may change with time.
 
     The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
@@ -36,7 +36,7 @@ class Followed:
             self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)
         self.take(temperatures)
 
-    def at(self, time: Any) -> Any:
+    def at_time(self, time: Any) -> Any:
         """Return the coefficient at a time of the step.
 
         Args:
