@@ -1,4 +1,4 @@
-"""Findings of checks of a scene, of a run or of its failure, with one scale of severity."""
+"""Findings of the checks of a scene, of a run or of a failed run, with one scale of severity."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SEVERITIES: tuple[Severity, ...] = ("serious", "warning", "note")
 scene may differ from the intended one, or a result is less accurate than usual. note: the accuracy is as usual."""
 
 Moment = Literal["scene", "start", "end", "failure"]
-"""Moment of a check. scene: on request (`check`). start: on request, and before every run. end: after a run.
-failure: after a failed run."""
+"""Moment at which a check is called. scene: on request (`check`). start: on request, and before every run. end: after
+a run. failure: after a failed run."""
 
 Subject = TypeVar("Subject", contravariant=True)
 _Check = TypeVar("_Check", bound=Callable[..., Iterable["Finding"]])
@@ -28,9 +28,9 @@ class Finding(NamedTuple):
 
     Attributes:
         severity: "serious", "warning" or "note" (`SEVERITIES`).
-        about: part of the scene or of the result that is concerned.
-        text: description, with numbers and the place.
-        advice: advice, or "".
+        about: part of the scene or of the result that the finding is about.
+        text: description of the fault, with numbers and its place.
+        advice: advice on how to mend it, or "".
     """
 
     severity: Severity
@@ -43,9 +43,10 @@ class Finding(NamedTuple):
 
 
 class Check(Protocol[Subject]):
-    """Interface of a check.
+    """Interface of a check: a function of its subject.
 
-    Its subject is the body before a run (`Body`), a `Path` at its end, or the facts of a failure (dict).
+    The subject is the body before a run (`formingx.checks.sizes.Body`), the `Path` after a run, or a failed run
+    (`formingx.solve.diagnose.Failure`).
     """
 
     def __call__(self, subject: Subject, /) -> Iterable[Finding]:
@@ -56,9 +57,10 @@ _registered: dict[Moment, list[Check[Any]]] = {"scene": [], "start": [], "end": 
 
 
 def register(moment: Moment) -> Callable[[_Check], _Check]:
-    """Return a decorator that registers a check for a moment: "scene", "start", "end" or "failure".
+    """Return a decorator that registers a function as a check; checks are called in the order of registration.
 
-    Checks are called in the order of registration.
+    Args:
+        moment: moment at which the check is called: "scene", "start", "end" or "failure".
 
     Raises:
         InputError: the moment is unknown.
@@ -66,28 +68,38 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
     known("register: moment", moment, _registered)
 
     def add(check: _Check) -> _Check:
-        """Return the check after registering it."""
+        """Register a check, and return it unchanged."""
         _registered[moment].append(check)
         return check
     return add
 
 
 def found_at(moment: Moment, subject: Any) -> list[Finding]:
-    """Return the findings of all checks that are registered for a moment, the worst first; collective."""
+    """Return the findings of all checks that are registered for a moment, the worst first; collective.
+
+    Args:
+        moment: the moment, one of `Moment`.
+        subject: subject of the checks (`Check`).
+    """
     return worst_first(finding for check in _registered[moment] for finding in check(subject))
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings sorted by severity; the order within one severity is kept."""
+    """Return findings sorted by severity, the worst first; the order within one severity is kept."""
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))
 
 
 def alarming(findings: Iterable[Finding]) -> list[Finding]:
-    """Return the findings that are warnings or serious."""
+    """Return those findings that are more severe than notes, in the given order."""
     return [finding for finding in findings if finding.severity != "note"]
 
 
 def tell(findings: Sequence[Finding], rank: int) -> None:
-    """Log each warning and each serious finding once, on rank 0 (`rank`: number of this rank)."""
+    """Log each warning and each serious finding once, as a warning of the logger "formingx".
+
+    Args:
+        findings: the findings; notes are left out.
+        rank: rank of the calling process; only rank 0 logs.
+    """
     for finding in dict.fromkeys(alarming(findings)) if rank == 0 else ():
         log.warning("%s: %s", finding.about, finding.text)

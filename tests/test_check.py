@@ -72,9 +72,20 @@ def test_a_soft_layer_of_long_elements():
         mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.02, "b": 0.02, "c": 0.02}, elements=(along, 1), **mesh)
         hard = fx.NeoHookean(c10=1000.0)
         return fx.check(fx.Scene(mesh=mesh, materials={"a": hard, "b": fx.NeoHookean(c10=1.0), "c": hard},
-                                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
-    assert "1e+03 times softer than 'a' and 0.02 thick, its elements 0.0539 long" in str(layered(20))
+                                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]),
+                        units=MM)
+    assert "1e+03 times softer than 'a' and 0.02 mm thick, its elements 0.0539 mm long" in str(layered(20))
     assert layered(50).healthy and layered(20, concentrate={1.0: 0.3}).healthy
+
+
+def test_numbers_of_findings_have_units():
+    """Lengths, stresses and forces of every check before a run; a force of plane strain is per depth."""
+    assert " MPa, press the face" in str(fx.check(formed(penalty=1e-3), units=MM))
+    assert re.search(r"fillet of radius 0.1 mm .* is 0.157 mm long", str(fx.check(formed(elements=(4, 1)), units=MM)))
+    strip = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(8, 1)), materials=fx.NeoHookean(c10=2.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], kinematics=fx.PlaneStrain(),
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), direction=(0, -1))])
+    assert "shear modulus x thickness = 0.328 N/mm" in str(fx.check(strip, targets=[fx.force(1e9)], units=MM))
 
 
 @pytest.mark.parametrize("scene", [

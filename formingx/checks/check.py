@@ -1,4 +1,4 @@
-"""Check of a scene before a run, or of a run; a sound scene has no findings."""
+"""Check of a scene before its run, or of a finished run; a sound scene has no findings."""
 
 from collections.abc import Sequence
 
@@ -18,10 +18,13 @@ __all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "ranges", 
 
 
 class Report:
-    """Findings of `check`, the worst first; prints as text.
+    """Findings of `check`; it prints as text, one finding a line.
+
+    Args:
+        findings: findings in any order; equal ones are kept once.
 
     Attributes:
-        findings: list of `Finding`; empty for a sound scene.
+        findings: list of `Finding`, the worst first; empty for a sound scene.
     """
 
     def __init__(self, findings: Sequence[Finding]):
@@ -44,9 +47,9 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
 
     The check covers:
 
-    * Elements: their shape, their number through a thick layer, their size at edges of tools.
-    * Penalties and the accuracy that they allow.
-    * Quantities that suggest mixed units.
+    * Elements: their shape, their number through a thick layer, their size at fillets of tools.
+    * Contact and volume penalties, and the accuracy that they allow.
+    * Quantities whose magnitudes suggest mixed units.
     * Pressures and blow ratios that the material cannot bear.
     * Tools that move away from the body, and open moulds.
     * A modulus that rises on cooling.
@@ -56,12 +59,12 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
 
     Args:
         scene: the scene, or the `Path` of a run. For a path, its warnings and its branch points are added.
-        targets: targets of the run, to be checked, too.
+        targets: targets of the run; whether they can be reached is checked, too.
         stages: stages of the process; their targets and tables are checked, too.
-        units: units of the numbers in the findings.
+        units: units of the script, for the numbers in the findings.
 
     Returns:
-        The findings, the worst first.
+        A `Report`: the findings, the worst first.
 
     Raises:
         InputError: an argument is of the wrong type, or a stage belongs to another scene.
@@ -87,11 +90,14 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:
-    """Return the findings at the beginning of every run: on units, magnitudes and paths of tools; collective.
+    """Return the findings of the checks that precede every run: on magnitudes and on paths of tools; collective.
 
     Args:
         scene: the scene.
         targets: targets of the run.
         stages: stages of the process.
+
+    Returns:
+        The findings, the worst first; `check` returns further ones.
     """
     return found_at("start", Body(scene, targets, stages, NONE))

@@ -7,10 +7,10 @@ import numpy as np
 
 
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
-    """Yield pairs (cause, expected stretch) of a flat sheet.
+    """Yield the stretches that a flat axisymmetric sheet is expected to reach, as (cause, stretch).
 
-    A free dome has its largest stretch at the pole. In a mould, the stretch is estimated as the root of the areal draw
-    ratio.
+    The cause is a target of the run or a mould, as text. A free dome has its largest stretch at the pole. In a mould,
+    the stretch is estimated as the root of the areal draw ratio.
 
     Args:
         body: the `Body` to be checked.
@@ -28,9 +28,16 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
 
 
 def _of_cap(target: Any, radius: float) -> float | None:
-    """Return the stretch at the pole of a disc inflated to a spherical cap, 1 + (height / radius)^2.
+    """Return the pole stretch of a disc inflated to a spherical cap that meets a target, 1 + (height / radius)^2.
 
-    This holds for a thin disc whose points move at right angles to the successive caps. It is None for other targets.
+    This holds for a thin disc whose points move at right angles to the successive caps.
+
+    Args:
+        target: a `Target` that is a pole stretch, a pole height or an enclosed volume.
+        radius: radius of the disc, length.
+
+    Returns:
+        The stretch, or None for another target.
     """
     if target.name == "pole_stretch":
         return float(target.value)
@@ -45,5 +52,5 @@ def _of_cap(target: Any, radius: float) -> float | None:
 
 
 def _area(line: np.ndarray) -> float:
-    """Return 1/pi times the area that a line, shape (n, 2), sweeps about the axis, length^2."""
+    """Return 1/pi times the area that a polyline of points (r, z), shape (n, 2), sweeps about the axis, length^2."""
     return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

@@ -15,19 +15,19 @@ _COVERED = 0.5  # fraction of a face with a tool in front of it, above which the
 
 
 def moulds(scene: Scene) -> list[Contact]:
-    """Return the contacts whose fixed tool lies in front of at least half of their undeformed face."""
+    """Return the contacts of a scene with a mould: a fixed tool in front of at least half of the undeformed face."""
     return [contact for contact in scene.contacts if contact.direction is None and _is_before(scene, contact)]
 
 
 def sign_towards(contact: Contact, load: Any) -> float:
-    """Return the direction of a positive pressure relative to a tool.
+    """Return whether a positive pressure pushes a sheet towards a tool or away from it.
 
     Args:
-        contact: the contact with the tool.
-        load: the pressure.
+        contact: the `Contact` of one face of the sheet with the tool.
+        load: the `Pressure` on the same face or on the opposite one.
 
     Returns:
-        1 towards the tool, -1 away from it, 0 if unknown.
+        1 towards the tool, -1 away from it, 0 if a boundary is not a face of a sheet.
     """
     if contact.on not in _OPPOSITE or load.on not in _OPPOSITE:
         return 0.0
@@ -35,16 +35,16 @@ def sign_towards(contact: Contact, load: Any) -> float:
 
 
 def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, limit: float) -> np.ndarray:
-    """Return the distances from points to a tool along given directions.
+    """Return the distances from points to a tool, measured along a given direction at each point.
 
     Args:
         tool: the tool.
-        points: shape (n, c), length.
+        points: positions outside the tool, shape (n, c), length.
         directions: unit vectors, shape (n, c).
-        limit: largest distance, length.
+        limit: largest distance that is examined, length.
 
     Returns:
-        The distances, shape (n,), length; infinity beyond `limit`.
+        The distances, shape (n,), length; infinity if the tool is not met within `limit`.
     """
     distance = np.zeros(len(points))
     for _ in range(1000):                                    # the gap to the tool is a safe advance
@@ -56,14 +56,15 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
 
 
 def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of a face and its outward directions, away from the opposite face.
+    """Return points of a face of a sheet, and unit vectors there that point away from the opposite face.
 
     Args:
-        points: nodes of the face, shape (n, 2), length.
-        opposite: nodes of the opposite face, shape (m, 2), length.
+        points: nodes (R, Z) of the face, shape (n, 2), length.
+        opposite: nodes (R, Z) of the opposite face, shape (m, 2), length.
 
     Returns:
-        The points that do not lie on both faces, and unit vectors, shape (k, 2) each.
+        The k nodes of the face that do not lie on the opposite face, shape (k, 2), length. The unit vectors point to
+        each of them from the nearest node of the opposite face, shape (k, 2).
     """
     directions = points - opposite[np.argmin(np.hypot(*(points[:, None] - opposite).transpose(2, 0, 1)), axis=1)]
     size = np.hypot(*directions.T)
@@ -71,7 +72,7 @@ def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.nda
 
 
 def _is_before(scene: Scene, contact: Contact) -> bool:
-    """Return True if the tool lies in front of at least half of the face."""
+    """Return True if the tool of a contact lies in front of at least half of the undeformed face of the contact."""
     opposite = _OPPOSITE.get(contact.on)
     if opposite is None or opposite not in scene.mesh.boundaries:
         return False

@@ -11,10 +11,12 @@ WITHOUT_GAIN = 1_150_000
 
 
 def unknowns(scene: Scene) -> int:
-    """Return the number of unknowns, without multipliers and pressures of further layers; collective.
+    """Return the approximate number of unknowns of a scene, without compiling its forms; collective.
+
+    Lagrange multipliers are left out, and pressure unknowns at an interface between layers count once.
 
     Args:
-        scene: the scene; of an axisymmetric membrane the solid of its mesh is counted.
+        scene: the scene. For an axisymmetric membrane, the displacements of the triangles of its mesh are counted.
     """
     topology = scene.mesh.domain.topology
     topology.create_entities(1)
@@ -28,7 +30,7 @@ def unknowns(scene: Scene) -> int:
 
 @register("start")
 def _ranks(body: Body) -> Iterator[Finding]:
-    """Report ranks that save no time."""
+    """Report a run on several ranks whose mesh is so small that one rank is as fast."""
     size, number = body.scene.mesh.comm.size, unknowns(body.scene)
     if size > 1 and number < WITHOUT_GAIN:
         yield Finding("note", "ranks", f"{size} ranks for {number} unknowns: up to {WITHOUT_GAIN} unknowns an iteration"

@@ -37,7 +37,7 @@ def moduli(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def friction(body: Body) -> Iterator[Finding]:
-    """Report coefficients of friction above the largest one of rubber on steel."""
+    """Report coefficients of friction above 5; rubber on dry steel has up to 4."""
     for contact in body.scene.contacts:
         if contact.sticks:
             continue
@@ -45,13 +45,13 @@ def friction(body: Body) -> Iterator[Finding]:
         value = float(table.y.max()) if isinstance(table, Table) else contact.mu
         if isinstance(value, float) and value > _LARGEST_FRICTION:
             yield Finding("warning", repr(contact),
-                          f"its coefficient of friction is {value:.4g}: that of polymers on metal is 0.05 to 1, of"
-                          f" rubber up to 4. Is it a percentage? For a sheet that sticks use 'stick'")
+                          f"its coefficient of friction is {value:.4g}: polymers on metal have 0.05 to 1, rubber up to"
+                          f" 4. Is it a percentage? For a sheet that sticks use 'stick'")
 
 
 @register("start")
 def weight(body: Body) -> Iterator[Finding]:
-    """Report weights and centrifugal forces that are too large or too small for the stiffness of the body."""
+    """Report weights and centrifugal forces that are far too large or too small for the shear modulus of the body."""
     for load in body.scene.loads:
         if not isinstance(load, Gravity | CentrifugalLoad) or load.value is None:
             continue
@@ -69,7 +69,7 @@ def weight(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def pressures(body: Body) -> Iterator[Finding]:
-    """Report pressures that all act away from the moulds."""
+    """Report a scene whose pressures all push the body away from its moulds."""
     acting = [pressure for pressure in body.pressures() if pressure.item is not None and pressure.value]
     found = moulds(body.scene) if acting else []
     towards = [np.sign(value) * sign_towards(contact, load) for load, _, value, _ in acting for contact in found]
@@ -77,5 +77,5 @@ def pressures(body: Body) -> Iterator[Finding]:
         load, _, value, text = acting[0]
         yield Finding("warning", text,
                       f"it pushes the body away from the mould {found[0].name or found[0].on!r}: {load!r} acts"
-                      f" {'on the face of that mould' if value > 0 else 'as suction on the other face'}. Give the"
-                      f" pressure to the other face, or turn its sign")
+                      f" {'on the face that touches the mould' if value > 0 else 'as suction on the other face'}. Put"
+                      f" the pressure on the other face, or change its sign")

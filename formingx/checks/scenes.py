@@ -1,4 +1,4 @@
-"""Checks of a scene before a run: mesh, penalties, units, targets."""
+"""Checks of a scene before a run: mesh, penalties, orders of magnitude, targets."""
 
 from collections.abc import Iterator
 
@@ -21,16 +21,16 @@ _PENETRATION = 0.01         # largest penetration over the thickness
 
 @register("scene")
 def _driven(body: Body) -> Iterator[Finding]:
-    """Report a scene without a controlled load, support or tool."""
+    """Report a scene in which no load, support or tool can be controlled."""
     if not body.scene.drivable:
-        yield Finding("warning", "loads", "nothing is driven: only a process of stages that wait can run; give one"
-                                          " load no value, as Pressure('bottom'), or add a"
+        yield Finding("warning", "loads", "nothing is driven: only a process of stages with a duration can run; give"
+                                          " one load no value, as Pressure('bottom'), or add a"
                                           " PrescribedDisplacement support")
 
 
 @register("scene")
 def _edges(body: Body) -> Iterator[Finding]:
-    """Report unsupported edges of a sheet in three dimensions; a flat membrane has no stiffness across them."""
+    """Report unsupported edges of a sheet in three dimensions; a flat membrane has no stiffness normal to its plane."""
     if body.scene.kinematics.components == 3:
         supported = {support.on for support in body.scene.supports}
         for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - supported):
@@ -40,19 +40,19 @@ def _edges(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _elements(body: Body) -> Iterator[Finding]:
-    """Report elements that are much longer than high."""
+    """Report elements whose longest edge is more than 110 times their height."""
     if not body.scene.model.solid:
         return
     worst = int(np.argmax(body.slenderness))
     if body.slenderness[worst] > _ASPECT_RATIO:
         yield Finding("warning", "mesh", f"an element at {body.place(worst)} is {body.slenderness[worst]:.3g} times"
                                          f" longer than high (up to 100 was tried): use more elements along the sheet,"
-                                         f" or Membrane() for one so thin")
+                                         f" or Membrane() for so thin a sheet")
 
 
 @register("scene")
 def _locking(body: Body) -> Iterator[Finding]:
-    """Report elements that lock."""
+    """Report elements that lock (`locking` of the model of the scene)."""
     found = body.scene.model.locking(body.scene.mesh)
     if found is not None:
         yield Finding("warning", "mesh", str(found))
@@ -60,11 +60,11 @@ def _locking(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _layers(body: Body) -> Iterator[Finding]:
-    """Report a thick layer with one element through it, which cannot bend, and layers of very different modulus.
+    """Report a thick layer with one element through it, which cannot bend, and layers of very different shear modulus.
 
-    Long elements of a soft layer also misrepresent its shear at a rim. In a hinged sheet with a layer 1000 times
-    softer, the stretch jumped by 66 % between elements of 2.5 thicknesses. With shorter elements it jumped by 30 %, at
-    the singular corner. The number of elements through the layer made no difference.
+    Elements of a soft layer that are long compared with its thickness misrepresent its shear at a rim. In a hinged
+    sheet with a layer 1000 times softer, the stretch jumped by 66 % between elements of 2.5 thicknesses. With shorter
+    elements it jumped by 30 %, at the singular corner. The number of elements through the layer made no difference.
     """
     if not body.scene.model.solid:
         return
@@ -83,19 +83,20 @@ def _layers(body: Body) -> Iterator[Finding]:
     depth, edge = body.area[body.layer == soft].sum() / body.length, body.edge[body.layer == soft].min()
     if 100 < ratio <= 1e5 and edge > _SOFT_ELEMENT_LENGTH * depth:
         yield Finding("warning", f"layer {soft!r}",
-                      f"it is {ratio:.3g} times softer than {hard!r} and {depth:.3g} thick, its elements {edge:.3g}"
-                      f" long or more: near a rim its shear rises within a few thicknesses, and on such elements its"
-                      f" stretch jumps by up to 70 % from one to the next; use elements no longer than it is thick, at"
-                      f" least near the rim (concentrate)")
+                      f"it is {ratio:.3g} times softer than {hard!r} and {body.format(depth, 'travel', 3)} thick, its"
+                      f" elements {body.format(edge, 'travel', 3)} long or more: near a rim its shear rises within a"
+                      f" few thicknesses, and on such elements its stretch jumps by up to 70 % from one to the next;"
+                      f" use elements no longer than it is thick, at least near the rim (concentrate)")
     if ratio > 1e5:
-        yield Finding("warning", "materials", f"layer {hard!r} (shear modulus {body.moduli[hard]:.4g}) is {ratio:.2g}"
-                                              f" times stiffer than {soft!r} ({body.moduli[soft]:.4g}): are the units"
-                                              f" of stress the same (Pa and MPa)?")
+        yield Finding("warning", "materials",
+                      f"layer {hard!r} (shear modulus {body.format(body.moduli[hard], 'stress')}) is {ratio:.2g} times"
+                      f" stiffer than {soft!r} ({body.format(body.moduli[soft], 'stress')}): are the units of stress"
+                      f" the same (Pa and MPa)?")
 
 
 @register("scene")
 def _fillets(body: Body) -> Iterator[Finding]:
-    """Report fillets of a tool that are shorter than two elements of the face."""
+    """Report fillets of a tool that are shorter than two elements of the face that touches it."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -112,19 +113,25 @@ def _fillets(body: Body) -> Iterator[Finding]:
             need = int(np.ceil(total * _ELEMENTS_PER_FILLET * edge / length))
             middle = smallest.centre + smallest.radius * np.array([np.cos(smallest.start + smallest.sweep / 2),
                                                                    np.sin(smallest.start + smallest.sweep / 2)])
-            yield Finding("warning", repr(contact), f"its fillet of radius {smallest.radius:.4g} at (R, Z) ="
-                          f" ({middle[0]:.4g}, {middle[1]:.4g}) is {length:.3g} long, {length / edge:.2g} elements of"
-                          f" the face ({edge:.3g} each): use {need} or more elements along it, or a larger fillet")
+            yield Finding("warning", repr(contact),
+                          f"its fillet of radius {body.format(smallest.radius, 'travel')} at (R, Z) = ({middle[0]:.4g},"
+                          f" {middle[1]:.4g}) is {body.format(length, 'travel', 3)} long, {length / edge:.2g} elements"
+                          f" of the face ({body.format(edge, 'travel', 3)} each): use {need} or more elements along it,"
+                          f" or a larger fillet")
 
 
 def _n_owned(scene: Scene, facets: np.ndarray) -> int:
-    """Return the number of locally owned facets."""
+    """Return how many of the given facets, local numbers of shape (n,), this rank owns."""
     return int(np.sum(facets < scene.mesh.domain.topology.index_map(1).size_local))
 
 
 @register("scene")
 def _contact_penalties(body: Body) -> Iterator[Finding]:
-    """Report penalties with too much penetration, about traction / (penalty mu) thicknesses, or too much round-off."""
+    """Report contact penalties that are too small, so that faces penetrate, or so large that round-off grows.
+
+    The penetration over the thickness is about the traction over penalty x shear modulus. A contact ramp above 0.05
+    thicknesses is reported, too.
+    """
     stress = max(body.moduli.values())
     pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"
     presses = [abs(t.value) for t in body.targets if t.name.endswith("pressure")] if pressed else []
@@ -133,9 +140,9 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
         depth = traction / (contact.penalty * stress)
         if depth > _PENETRATION:
             cause = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
-            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause}, {traction:.3g}, press"
-                          f" the face {100 * depth:.2g} % of the thickness into the tool: use"
-                          f" {traction / (0.001 * stress):.1g} or more")
+            yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause},"
+                          f" {body.format(traction, 'stress', 3)}, press the face {100 * depth:.2g} % of the thickness"
+                          f" into the tool: use {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: so stiff that round-off"
                           f" leaves few digits for the body; the default is 2e5")
@@ -146,9 +153,10 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _volume_penalty(body: Body) -> Iterator[Finding]:
-    """Report a volume penalty eps with a volume change above 1 %.
+    """Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
 
-    The change is about eps stretch^2 / 8: a pressure of about mu stretch^2 over the bulk modulus 8 mu/eps.
+    The change is about eps stretch^2 / 8: a pressure of about mu stretch^2 over the bulk modulus 8 mu/eps, where mu is
+    the shear modulus.
     """
     model = body.scene.model
     if not model.solid:
@@ -170,26 +178,29 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def _units(body: Body) -> Iterator[Finding]:
-    """Report forces, gaps and tools whose orders of magnitude do not fit the body."""
+    """Report target forces, gaps and sizes of tools whose orders of magnitude do not fit the body."""
     natural = body.natural * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
     for target in body.targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
-            yield Finding("warning", str(target), f"it is {abs(target.value) / natural:.2g} times shear modulus x"
-                          f" thickness x length = {natural:.3g}: are the units of force, length and stress the same?")
+            product = "shear modulus x thickness" + " x length" * (body.scene.kinematics.dimension_of_volume == 3)
+            yield Finding("warning", str(target), f"it is {abs(target.value) / natural:.2g} times {product} ="
+                          f" {body.format(natural, 'force', 3)}: do the units of force, length and stress belong to one"
+                          f" system?")
     for contact in body.scene.contacts:
         tool = contact.tool
         gap = float(-tool.signed_distance(body.scene.mesh.nodes_of(contact.on)).max())
         if gap > 20 * body.length:
-            yield Finding("warning", repr(contact), f"the tool is {gap:.3g} away from a body of length"
-                          f" {body.length:.3g}: are the units of length the same (mm and m)?")
+            yield Finding("warning", repr(contact), f"the tool is {body.format(gap, 'travel', 3)} away from a body of"
+                          f" length {body.format(body.length, 'travel', 3)}: are the units of length the same (mm and"
+                          f" m)?")
             continue
         if tool.components == 3:                             # checked by Scene
             continue
         arcs = [p.radius for p in tool.pieces if isinstance(p, Arc) and p.radius > 0]
         shaped = len(tool.pieces) > 2 or tool.closed
         if shaped and not 0.01 < tool.size / body.length < 100 or arcs and min(arcs) > 1e3 * body.length:
-            yield Finding("warning", repr(contact), f"the tool is {tool.size:.3g} large, the body {body.length:.3g}:"
-                          f" are the units of length the same (mm and m)?")
+            yield Finding("warning", repr(contact), f"the tool is {body.format(tool.size, 'travel', 3)} large, the body"
+                          f" {body.format(body.length, 'travel', 3)}: are the units of length the same (mm and m)?")
 
 
 @register("scene")
@@ -201,7 +212,8 @@ def _targets(body: Body) -> Iterator[Finding]:
             yield Finding("serious" if body.scene.driven is not None else "warning", str(target), reason)
         is_length = target.name.endswith(("pole_height", "travel")) or target.name.startswith("u_")
         if is_length and abs(target.value) > 20 * body.length:
-            yield Finding("warning", str(target), f"that is {abs(target.value) / body.length:.3g} times the length of"
-                                                  f" the body, {body.length:.4g}: are the units of length the same?")
+            yield Finding("warning", str(target), f"it is {abs(target.value) / body.length:.3g} times the length of"
+                                                  f" the body, {body.format(body.length, 'travel')}: are the units of"
+                                                  f" length the same?")
         if target.name == "pole_stretch" and target.value < 1 and not body.scene.contacts:
             yield Finding("warning", str(target), "a sheet starts at 1, and its pole stretch grows as it is inflated")

@@ -1,4 +1,4 @@
-"""Check of a script: it is executed up to its first run, whose scene and targets are checked."""
+"""Check of a script: the script is executed up to its first run, and the scene and targets of this run are checked."""
 
 import inspect
 import os
@@ -18,9 +18,12 @@ from .check import Report, check
 
 
 class _DryRun(BaseException):
-    """Exception raised in place of the first run.
+    """Exception raised in place of the first run of a script.
 
     It is not an `Exception`, so that a script does not catch it.
+
+    Args:
+        report: findings on the scene of the run.
     """
 
     def __init__(self, report: Report):
@@ -54,14 +57,14 @@ def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
         return found.report
     finally:
         sys.argv, sys.path[:] = before
-    raise InputError(f"check: {str(file)!r} runs no scene in this process: there is nothing to look over")
+    raise InputError(f"check: {str(file)!r} runs no scene in this process: there is nothing to check")
 
 
 def _check_python(file: Path) -> None:
-    """Compile a script.
+    """Check that a file is Python source.
 
     Raises:
-        InputError: it is not Python.
+        InputError: it is not.
     """
     try:
         compile(file.read_bytes(), os.fspath(file), "exec")
@@ -73,7 +76,10 @@ def _check_python(file: Path) -> None:
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
-    """Replace `trace`, `solve`, `Process.run` and similar functions by a check of their scene, within a block."""
+    """Replace `trace`, `solve`, `Process.run` and similar functions within a block by a check of their scene.
+
+    The check raises `_DryRun`.
+    """
     def trace(scene, *, until, intermediate=(), **_):
         raise _DryRun(check(scene, targets=[*intermediate, until]))
 

@@ -24,24 +24,24 @@ Found = Iterator[Finding]
 
 _LARGEST_PRESSURE = 100.0  # pressure over shear modulus that fills every corner
 _SMALLEST_PRESSURE = 1e-4  # pressure over shear modulus x thickness / length that has no effect
-_ABOVE_PEAK = 1.1          # pressure over the maximum of a cap (3 % below the one of a disc)
+_ABOVE_PEAK = 1.1          # pressure over the maximum of a spherical cap, which is 3 % below the maximum of a disc
 _REMAINING_PRESSURE = 0.8  # lowest pressure beyond the limit point of a tube over its maximum (tests/test_check.py)
 _BLOW_RATIO = 8.0          # largest blow ratio of bottles
 _MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
 _WIDTH_RATIO = 4.0         # width of a sheet over its mould, or the inverse, that suggests different units
 _CORNER_ANGLE = 10.0       # degrees by which a profile turns at a sharp corner
-_POSITIONS = 400           # examined positions of a moving tool
+_POSITIONS = 400           # number of examined positions of a moving tool
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
 
 
 class Aim(NamedTuple):
-    """Target of a run that is a pressure or a travel.
+    """Pressure or travel that a run aims at, or a constant pressure of the scene.
 
     Attributes:
-        item: the load, support or tool; None if it is not known.
+        item: the load, support or tool of the scene; None if it is not known.
         quantity: "pressure" or "travel".
-        value: stress or length.
-        text: its name in findings.
+        value: the pressure, stress, or the travel, length.
+        text: name of the target, load or table in findings.
     """
 
     item: Any
@@ -51,27 +51,28 @@ class Aim(NamedTuple):
 
 
 class Body(Triangles):
-    """Body before its run, with the targets of the run.
+    """Body before its run, with the targets of the run: the subject of the checks "scene" and "start".
 
     Args:
         scene: the scene.
         targets: targets of the run.
         stages: stages of the process.
-        units: units of the numbers in the findings.
+        units: units of the script, for the numbers in the findings.
 
     Attributes:
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
-        natural: shear modulus x thickness / length, the magnitude of pressures that deform a sheet, stress.
-        aims: target pressures and travels, and the largest values of tables.
+        natural: largest shear modulus x thickness / length, the magnitude of pressures that deform a sheet, stress.
+        aims: list of `Aim`: target pressures and travels, and the largest values of the stages' tables.
         goals: True if there are targets or stages.
         targets: all targets of the run and of its stages.
-        highest: upper bounds of quantities in the stages.
+        highest: largest value of each table that a controlled quantity follows, as a `Target` (`Stage.highest`).
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
         super().__init__(scene.mesh)
-        self.scene, self._units = scene, units
+        self.scene = scene
+        self._units = units.per_depth() if scene.kinematics.dimension_of_volume == 2 else units
         self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
         self.natural = max(self.moduli.values()) * self.thickness / self.length
         self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
@@ -87,18 +88,23 @@ class Body(Triangles):
                 value = float(table[np.argmax(np.abs(table[:, 1])), 1])
                 self.aims.append(Aim(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
 
-    def format(self, value: float, kind: str) -> str:
+    def format(self, value: float, kind: str, digits: int = 4) -> str:
         """Return a number with its unit as text.
 
         Args:
             value: the number.
             kind: "pressure", "travel" (a length), "force" or "stress".
+            digits: number of significant digits.
         """
-        unit = self._units.of(kind)
-        return f"{value:.4g}" + (f" {unit}" if unit else "")
+        return f"{value:.{digits}g} {self._units.of(kind)}".rstrip()
 
     def _aim(self, target: Target, control: Any) -> list[Aim]:
-        """Return the `Aim` of a target in a list, empty for other quantities."""
+        """Return the `Aim` of a target in a list; an empty list for a target that is no pressure and no travel.
+
+        Args:
+            target: the target.
+            control: the load, support or tool that the run controls, to which a target without a name belongs.
+        """
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
@@ -107,14 +113,14 @@ class Body(Triangles):
         return [Aim(item, quantity, target.value, str(target))]
 
     def pressures(self) -> list[Aim]:
-        """Return all pressures that act or are targets."""
+        """Return all pressures of the run as `Aim` objects: constants, targets, and largest values of tables."""
         fixed = [Aim(load, "pressure", load.value, repr(load)) for load in self.scene.loads
                  if load.quantity == "pressure" and not load.driven]
         return [*fixed, *(aim for aim in self.aims if aim.quantity == "pressure")]
 
     @cached_property
     def pressurised_faces(self) -> list[PressurisedFace]:
-        """Faces under pressure: opposite to fixed tools, or of a free sheet."""
+        """Faces of the sheet on which a pressure acts; empty if the body is not a sheet."""
         found = []
         for load in (load for load in self.scene.loads if load.quantity == "pressure"):
             try:
@@ -127,23 +133,23 @@ class Body(Triangles):
 
 
 class PressurisedFace:
-    """Face of a sheet under pressure.
+    """Face of a sheet on which a pressure acts, with the fixed tools on the other side of the sheet.
 
     Args:
-        body: the body.
-        load: the pressure.
+        body: the `Body`.
+        load: the `Pressure`.
         line: nodes of the face, shape (n, 2), length.
         tools: contacts of the opposite face with fixed tools.
 
     Attributes:
-        load: the pressure.
+        load: the `Pressure`.
         tools: contacts of the opposite face with fixed tools.
-        line: nodes of the face, shape (n, 2), length.
+        line: nodes (R, Z) of the face, shape (n, 2), length.
         length: length of the face in the section.
-        round: True if axisymmetric.
-        tall: True for a tube.
-        flat: True for a flat sheet.
-        radius: mean radius of a tube, or outer radius of a disc, length.
+        round: True for an axisymmetric body.
+        tall: True for a tube: the face is higher than twice its largest R.
+        flat: True for a flat sheet: the face is lower than 0.05 times its largest R.
+        radius: mean radius of a tube, or outer radius of another body, length.
     """
 
     def __init__(self, body: Body, load: Any, line: np.ndarray, tools: list[Contact]):
@@ -157,9 +163,10 @@ class PressurisedFace:
 
     @cached_property
     def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the opposite face, and the points of the tools straight ahead of them, shape (n, 2), length.
+        """Points of the opposite face, and the points at which they would meet the tools, shapes (n, 2), length.
 
-        The latter are infinite where there is no tool ahead.
+        The points move normal to the sheet, away from the face under pressure. Where no tool is met, the second array
+        is infinite.
         """
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         points, directions = outward_directions(points, self.line)
@@ -169,7 +176,11 @@ class PressurisedFace:
         return points, np.where(found, points + np.where(found, distance, 0.0) * directions, np.inf)
 
     def peak(self) -> Peak | None:
-        """Return the state of the free sheet at its maximum pressure; None if there is none or it is unknown."""
+        """Return stretch and pressure of the free sheet or tube at its first pressure maximum, without tools.
+
+        Returns:
+            The maximum; None if there is none, or if it is not known for this shape or material.
+        """
         materials = self._body.scene.materials
         if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
@@ -177,14 +188,14 @@ class PressurisedFace:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the lowest pressure of a free tube beyond its limit point, relative to the limit point.
+        """Return the lowest pressure of a free tube beyond its limit point, over the pressure at the limit point.
 
         Args:
-            blow_ratio: largest stretch of the tube, mould over parison radius.
+            blow_ratio: largest hoop stretch of the tube: radius of the mould over radius of the parison.
 
         Returns:
-            The lowest pressure between the limit point and the blow ratio over the pressure at the limit point, and
-            the state at the limit point. None if there is no limit point below the blow ratio.
+            The ratio for stretches up to `blow_ratio`, and the limit point. None if there is no limit point below
+            the blow ratio.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -193,7 +204,7 @@ class PressurisedFace:
         return float(pressures.min()) / peak.pressure, peak
 
     def _layers(self) -> list[tuple[Any, float]]:
-        """Return (material, thickness) of each layer."""
+        """Return (material, mean thickness, length) of each layer."""
         body = self._body
         return [(material, float(body.area[body.layer == name].sum()) / self.length)
                 for name, material in body.scene.materials.items()]
@@ -211,11 +222,13 @@ def _pressures(body: Body) -> Found:
                           f" and moves nothing: are the units of stress the same (Pa, kPa, MPa)?")
         free = not body.scene.contacts and abs(value) > 1e3 * body.natural
         if free or abs(value) > _LARGEST_PRESSURE * stiff:
-            size, what, enough = (stiff, "shear modulus", "some ten times that fill a corner as small as the wall")
+            size, what = stiff, "shear modulus"
+            usual = "about ten times the shear modulus fills a corner as small as the wall"
             if free:
-                size, what, enough = body.natural, "shear modulus x thickness / length", "a free sheet bears about that"
+                size, what = body.natural, "shear modulus x thickness / length"
+                usual = "a free sheet bears about as much"
             yield Finding("warning", name,
-                          f"it is {abs(value) / size:.2g} times {what} = {body.format(size, 'pressure')}: {enough}: are"
+                          f"it is {abs(value) / size:.2g} times {what} = {body.format(size, 'pressure')}; {usual}: are"
                           f" the units of stress the same (Pa, kPa, MPa)?")
 
 
@@ -236,7 +249,10 @@ def _limit_pressures(body: Body) -> Found:
 
 @register("scene")
 def _blow_ratio(body: Body) -> Found:
-    """Report a tube whose pressure falls far below its peak: it bulges locally, and becomes thin there."""
+    """Report a tube blown into a mould that is too wide for it.
+
+    Such a tube is blown up more than 8-fold, or its pressure falls far below its maximum, so that it bulges locally.
+    """
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.round):
             continue
@@ -260,7 +276,7 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _open_moulds(body: Body) -> Found:
-    """Report an open mould: a sheet that passes beside it bears only the pressure of a free sheet."""
+    """Report an open mould: where a sheet meets no tool, it bears only the pressure of a free sheet."""
     for face in body.pressurised_faces:
         if not face.tools:
             continue
@@ -286,14 +302,17 @@ def _open_moulds(body: Body) -> Found:
 
 
 def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray:
-    """Return the mean direction in which the pressure pushes points of the opposite face."""
+    """Return the unit vector (r, z) in which the pressure pushes given points (n, 2) of the opposite face.
+
+    It is radial for a tube and axial for other bodies.
+    """
     offset = points.mean(0) - face.line.mean(0)
     return np.array([0.0, np.sign(offset[1])]) if not face.tall else np.array([1.0, 0.0])
 
 
 @register("start")
 def _mould_sizes(body: Body) -> Found:
-    """Report a sheet that is many times wider or narrower than its mould."""
+    """Report a flat sheet that is many times wider or narrower than its mould."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -313,7 +332,7 @@ def _mould_sizes(body: Body) -> Found:
 
 @register("start")
 def _tool_paths(body: Body) -> Found:
-    """Report a tool that moves away from its face, or past it."""
+    """Report a moving tool that moves away from the body or never reaches it."""
     for i, tool in enumerate(body.scene.items):
         if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
             continue
@@ -347,17 +366,26 @@ def _tool_paths(body: Body) -> Found:
             yield Finding("warning", repr(tool),
                           f"it touches nothing on its way: over a travel of {body.format(travel_range, 'travel')} it"
                           f" comes no nearer to {tool.on!r} than {body.format(gaps.min(), 'travel')}: place it nearer"
-                          f" (moved), turn its way, or let it travel farther")
+                          f" (moved), change its direction, or let it travel farther")
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) -> float:
-    """Return the smallest gap between tools and nodes of their faces after a travel along a direction, length."""
+    """Return the smallest gap between tools and faces after a travel of the tools, length.
+
+    Args:
+        faces: pairs (tool, nodes of the face that it touches, shape (n, c)).
+        direction: direction of motion of all tools, shape (c,).
+        travel: the travel, length for a unit vector.
+    """
     return min(float(-tool.signed_distance(nodes - travel * np.array(direction)).max()) for tool, nodes in faces)
 
 
 @register("scene")
 def _sharp_edges(body: Body) -> Found:
-    """Report sharp edges of sliding tools: the force depends on the positions of the nodes (tests/test_check.py)."""
+    """Report convex sharp edges of moving tools over which the body slides, if there are two or more rows of elements.
+
+    The force there depends on the positions of the nodes (tests/test_check.py).
+    """
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -378,5 +406,5 @@ def _sharp_edges(body: Body) -> Found:
 
 
 def _names(body: Body) -> str:
-    """Return the names of the materials."""
+    """Return the materials of a body as text."""
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))

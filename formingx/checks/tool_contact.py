@@ -12,12 +12,18 @@ from ..contact.tooling import Tooling
 from ..findings import Finding, register
 from .mould_side import moulds
 
-_GAP_GROWTH = 1.1  # mean distance of the face from its mould, end over start
+_GAP_GROWTH = 1.1  # smallest ratio of the mean distances of a face from its mould, end over start, that is reported
 
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
-    """Report tools that never touched the body in their stages, and moulds from which it moved away; collective."""
+    """Report tools that never touched the body while they were active, and moulds from which the body moved away.
+
+    Collective.
+
+    Args:
+        path: the `Path` of the run. A remeshed run is not examined.
+    """
     segment = path.segments[-1]
     problem, states = segment.problem, segment.states
     if len(path.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
@@ -50,9 +56,15 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states that can show contact: the last one with a force on the tool, or else all with contact.
+    """Return the states in which a tool may touch the body.
 
-    The side walls of a mould bear no force along Z.
+    This is the last state with a force on the tool. Without a force, all states with contact of any tool are returned,
+    because the side walls of a mould bear no force along Z.
+
+    Args:
+        path: the `Path` of the run.
+        states: states in which the tool is active.
+        name: name of the tool (`Tooling.names`).
     """
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
@@ -61,14 +73,17 @@ def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    """Return True if a contact touches in a state."""
+    """Return True if one of the given `FaceContact` objects has closed points in a state."""
     with problem.state_context(state):
         return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
                    if contact in problem.present)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Return the distances between faces and their tools in a state, of all ranks, shape (n,), length."""
+    """Return the gaps at the n contact points of given `FaceContact` objects in a state, all ranks, shape (n,), length.
+
+    A gap is negative inside the tool.
+    """
     with problem.state_context(state):
         found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
                  for contact in contacts]
