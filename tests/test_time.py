@@ -300,3 +300,5 @@ def test_limit_points_of_pressure_in_a_flow():
         else:
             alone = fx.trace(scene, until=fx.enclosed_volume(4.0), progress=False)
             assert top == pytest.approx(alone.limit_points[0].measures["pressure"], rel=1e-6)
+            soon = run(scene, blow(T=1e-8, volume=4.0, held=5e-9), accuracy=2e-3)      # in another unit of time
+            assert soon["pressure"] == pytest.approx(path["pressure"], rel=1e-9)

@@ -31,7 +31,7 @@ class FlowSteps:
         stretched: a step ends at the next prescribed time within this number of step lengths. The last step is then
             never much shorter than the others.
         cut: largest factor of the length of a step that is repeated because it was too long.
-        still: relative change of the control below which it counts as constant, up to round-off.
+        still: relative change of the control in a step below which the control counts as constant, up to round-off.
         located: tolerance of the time of a limit point, over the duration of the step.
         met: relative tolerance of a target whose state is solved for inside a step.
         contact: smallest admissible ratio of the step length that new contact allows to the length of the step.
@@ -133,12 +133,16 @@ class Flow(Run):
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
-        before, after = (
-            _rate([*predictor.before(self.states[:-1], old.time, 2), old]),
-            _rate([*predictor.before(self.states, new.time, 2), new])) if self.problem.relaxes else (
-            old.slope, new.slope)                            # else the tangents of the path show an extremum
-        still = _STEPS.still * max(abs(old.control), abs(new.control)) / (new.time - old.time)
-        if before * after >= 0 or min(abs(before), abs(after)) < still or self.curve.distance(old, new) < _STEPS.still:
+        length = self.curve.distance(old, new)
+        if length < _STEPS.still:
+            return new
+        if self.problem.relaxes:
+            before = _rate([*predictor.before(self.states[:-1], old.time, 2), old])
+            after, step = _rate([*predictor.before(self.states, new.time, 2), new]), new.time - old.time
+        else:                                                # the tangents of the path show an extremum
+            before, after, step = old.slope, new.slope, length
+        still = _STEPS.still * max(abs(old.control), abs(new.control)) / step
+        if before * after >= 0 or min(abs(before), abs(after)) < still:
             return new
         tried: list[State] = []
 
