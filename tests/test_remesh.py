@@ -95,11 +95,11 @@ def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
     """The path of a run that fails at once on its new mesh ends before that."""
     from formingx.extensions.remeshing import remeshing
 
-    def fails(record, state, remesh, look=remeshing._look):
+    def fails(record, state, remesh, check=remeshing._check_mesh):
         if state.kind == "remesh":
             raise fx.ConvergenceError("nothing is found")
-        look(record, state, remesh)
-    monkeypatch.setattr(remeshing, "_look", fails)
+        check(record, state, remesh)
+    monkeypatch.setattr(remeshing, "_check_mesh", fails)
     with pytest.raises(fx.ConvergenceError) as caught:
         pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
     assert len(caught.value.path.segments) == 1 and caught.value.path.last.measures["travel"] > 0
@@ -110,12 +110,12 @@ def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
     from formingx.extensions.remeshing import remeshing
     failed = []
 
-    def fails(path, remesh, tolerances, best=remeshing._best):
+    def fails(path, remesh, tolerances, best=remeshing._best_mesh):
         if not failed:
             failed.append(len(path.states))
             raise fx.ConvergenceError("nothing is found")
         return best(path, remesh, tolerances)
-    monkeypatch.setattr(remeshing, "_best", fails)
+    monkeypatch.setattr(remeshing, "_best_mesh", fails)
     path = pressed("stick", 0.55, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
     first = next(k for k, state in enumerate(path.states) if state.kind == "remesh")
     assert first == failed[0] + 1 and path.last.measures["travel"] == pytest.approx(0.55)

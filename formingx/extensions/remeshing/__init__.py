@@ -11,7 +11,8 @@ from .remeshing import Remesh
 
 
 def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
-    """Return the problem of a checkpoint on a mesh that was made during the run."""
+    """Return the problem of a checkpoint on a mesh that was made during the run; `data` is the result of `files.save`.
+    """
     return files.load((problem, last), data, Preformed)
 
 

@@ -1,7 +1,7 @@
-"""Transfer of contact tractions from the old to the new mesh of a remeshed body.
+"""Transfer of contact tractions from the old to the new mesh of a remeshed body; on one rank.
 
-On one rank. Values are interpolated linearly between neighbouring points of the old face. A node on the axis has an
-area that only the quadrature rule defines (`Lobatto`). It takes the pressure of its neighbour, without friction.
+Values are interpolated linearly between neighbouring points of the old face. A node on the axis has no area of its own
+(`Lobatto` defines one). It takes the pressure of its neighbour, without friction.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from ...physics.contact_law import ContactHistory
 
 
 class ContactState(NamedTuple):
-    """Contact state of a face on the old mesh, with n points in m pairs of neighbours.
+    """Contact state of a face on the old mesh, at n contact points; m pairs of these are neighbours.
 
     Attributes:
-        position: positions in the frame of the tool, shape (n, 2), length.
-        distance: distances from the tool, shape (n,), length.
-        touches: mask of points in contact, shape (n,).
-        traction: pressure and friction per present area, shape (n, 2), stress.
-        pairs: pairs of neighbours, shape (m, 2).
-        slip: largest elastic slip over the thickness.
+        position: positions of the points in the frame of the tool, shape (n, 2), length.
+        distance: signed distances from the surface of the tool, positive inside the tool, shape (n,), length.
+        touches: mask of the points in contact, shape (n,).
+        traction: pressure and friction per present area at the points, shape (n, 2), stress.
+        pairs: numbers of neighbouring points, shape (m, 2).
+        slip: largest elastic slip of the points over the thickness of the body.
     """
 
     position: np.ndarray
@@ -36,12 +36,12 @@ class ContactState(NamedTuple):
 
     @classmethod
     def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> ContactState:
-        """Return the contact state of a face.
+        """Return the contact state of a face in the present state of the old mesh.
 
         Args:
             face: the face on the old mesh.
-            fields: locally owned unknowns.
-            control: value of the control.
+            fields: locally owned unknowns of the problem.
+            control: control of the state.
 
         Returns:
             The contact state.
@@ -54,22 +54,23 @@ class ContactState(NamedTuple):
         touches, d = face.touching(fields, control), face.contact.tool.signed_distance(x)
         for axis in np.flatnonzero(~rule.has_area):
             ends = rule.edges[(rule.edges == axis).any(1), :2].ravel()
-            beside = ends[ends != axis][0]
-            traction[axis], touches[axis], d[axis] = (traction[beside, 0], 0.0), touches[beside], d[beside]
+            neighbour = ends[ends != axis][0]
+            traction[axis], touches[axis], d[axis] = (traction[neighbour, 0], 0.0), touches[neighbour], d[neighbour]
         slip = 0.0 if face.history is None else np.abs(face.history.slip).max(initial=0.0) / face.thickness
         return cls(x, d, touches, traction, pairs, slip)
 
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return the motion out of the tool that gives points the depth of their neighbours in contact.
+        """Return how far points of a new mesh must move out of the tool to be as deep as the old face beside them.
 
-        A point is moved until it is as deep as its neighbours in contact.
+        Between two old points in contact this is their interpolated depth; elsewhere points in the tool move to its
+        surface, or to the depth of an old neighbour in contact.
 
         Args:
-            x: positions in the frame of the tool, shape (n, 2), length.
-            d: their distances from the tool, shape (n,), length.
+            x: positions of the new points in the frame of the tool, shape (n, 2), length.
+            d: signed distances of the new points from the tool, positive inside, shape (n,), length.
 
         Returns:
-            Motion, shape (n,), length.
+            Motion against the normal into the tool, shape (n,), length.
         """
         pair, share = self._near(x)
         both = self.touches[pair]
@@ -78,20 +79,21 @@ class ContactState(NamedTuple):
         return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
 
     def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Interpolate pressure and friction at points.
+        """Interpolate the tractions of the old face at points of a new one.
 
         Args:
-            x: positions in the frame of the tool, shape (n, 2), length.
+            x: positions of the new points in the frame of the tool, shape (n, 2), length.
 
         Returns:
-            Pressure and friction, stress, and mask of the points between two contacts, shape (n,) each.
+            Pressure and friction, stress, and mask of the points between two old points in contact, shape (n,) each.
         """
         pair, share = self._near(x)
         found = _between(self.traction[pair], share[:, None])
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
     def _near(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest pair of neighbours, shape (n, 2), and the position between its points, shape (n,)."""
+        """Return the nearest pair of old points for each position, shape (n, 2), and the position between them, 0 to 1.
+        """
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         offset = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
@@ -100,15 +102,15 @@ class ContactState(NamedTuple):
 
 
 def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
-    """Transfer the pressure and friction per present area of the old face to a new one.
+    """Transfer the pressure and friction per present area of a face on the old mesh to the same face on the new mesh.
 
-    The distance of each point is offset so that the contact law gives this pressure at any depth in the tool.
+    The distance of each contact point is offset, so that the contact law gives this pressure at any depth in the tool.
 
     Args:
-        face: the face on the new mesh.
-        old: contact state on the old mesh.
-        fields: locally owned unknowns.
-        control: value of the control.
+        face: the face on the new mesh, changed in place.
+        old: contact state of the face on the old mesh.
+        fields: locally owned unknowns of the new problem.
+        control: control of the state.
     """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
@@ -121,17 +123,17 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
     if not face.remembers:
         return
     law, zero = face.law, np.zeros(len(x))
-    slip, arrived = zero, np.zeros(len(x), dtype=bool)
+    slip, newly_closed = zero, np.zeros(len(x), dtype=bool)
     if law.has_friction:
         tangential = law.tractions(x, ContactHistory(x, depth, zero + 1e-9 * theta, x)).tangential
         slip = np.divide(friction * share * 1e-9 * theta, tangential, out=zero.copy(),
                          where=touches & (tangential != 0))
-        most = 2 * old.slip * face.thickness               # no friction without pressure
-        slip = np.clip(slip, -most, most)
+        bound = 2 * old.slip * face.thickness               # under a small pressure the slip would be unbounded
+        slip = np.clip(slip, -bound, bound)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
-    face.put(Memory(ContactHistory(x, distance, slip, x), arrived, np.ones(len(x))))
+    face.put(Memory(ContactHistory(x, distance, slip, x), newly_closed, np.ones(len(x))))
 
 
 def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return the values interpolated between pairs, shape (n, 2, ...)."""
+    """Return values of pairs, shape (n, 2, ...), interpolated at a share of 0 to 1 from the first to the second."""
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

@@ -1,4 +1,8 @@
-"""Positions of points between the first mesh of a remeshed body and its present one."""
+"""Positions of material points on the successive meshes of a remeshed body.
+
+A new mesh has the deformed body as reference configuration. A point of the first mesh therefore has another position on
+each later mesh.
+"""
 
 from __future__ import annotations
 
@@ -13,20 +17,20 @@ from ...forms.probes import Probe
 from ...mesh.nodes import of_mesh, of_space
 
 _NEAR = 0.02
-"""Distance from the outline over the element size below which a point is moved onto it: new edges differ from old."""
-
+"""Distance from the outline over the length of an edge below which a point is moved onto it: new edges differ from old.
+"""
 
 
 class FollowedProbe(Probe):
-    """Probe of the displacement at points of the first mesh, tracked from mesh to mesh.
+    """Probe of the displacement of material points since the start of a remeshed run.
 
     Args:
         problem: the `Problem` on the present mesh.
-        points: positions (R, Z) on the first mesh, shape (n, 2), length.
+        points: positions (R, Z) of the points on the first mesh, shape (n, 2), length.
 
     Attributes:
-        points: (R, Z) on the first mesh, shape (n, 2), length.
-        so_far: their displacement when the last mesh was made, shape (n, 2), length.
+        points: positions (R, Z) of the points on the first mesh, shape (n, 2), length.
+        so_far: displacement of the points from the first to the present mesh, shape (n, 2), length.
     """
 
     def __init__(self, problem: Any, points: Any):
@@ -35,15 +39,17 @@ class FollowedProbe(Probe):
         self.points, self.so_far = first, self.points - first
 
     def _read(self) -> np.ndarray:
-        """Return the displacement at the points for the current fields, shape (n, 2), length."""
+        """Return the displacement of the points since the start of the run for the present fields, shape (n, 2)."""
         return super()._read() + self.so_far
 
 
 def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
-    """Return the first-mesh positions of points of a new mesh, fitted to the nodes of the old mesh.
+    """Return the positions on the first mesh of points of a new mesh.
+
+    They are interpolated from the nodes of the old mesh, in the deformed body.
 
     Args:
-        preformed: the transferred deformation.
+        preformed: the `Preformed` of the new mesh.
         points: positions on the new mesh, shape (n, 2), length.
 
     Returns:
@@ -57,11 +63,11 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on(mesh: Any, preformed: Any) -> Any:
-    """Return the scene of the old mesh on a new mesh of the deformed body, with its last temperature.
+    """Return the scene of the old mesh on a new mesh of the deformed body, with the last temperature.
 
     Args:
         mesh: the new mesh.
-        preformed: the transferred deformation.
+        preformed: the `Preformed` of the new mesh.
 
     Returns:
         The scene.
@@ -78,14 +84,14 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Return the positions in the mesh of a problem of points of the first mesh.
+    """Return the positions of points of the first mesh on the mesh of a problem.
 
     Args:
         problem: the `Problem`.
         points: positions on the first mesh, shape (n, 2), length.
 
     Returns:
-        Positions, shape (n, 2), length.
+        Positions on the mesh of the problem, shape (n, 2), length.
     """
     if problem.scene.preformed is None:
         return points
@@ -95,7 +101,11 @@ def followed(problem: Any, points: np.ndarray) -> np.ndarray:
 
 
 class _Onto:
-    """Projection of points outside or near the outline of a mesh onto the outline."""
+    """Projection onto the outline of a mesh of points that lie outside or near it.
+
+    Args:
+        problem: the `Problem` on the mesh.
+    """
 
     def __init__(self, problem: Any):
         self._edges = Outline(problem.forms).rest
@@ -103,11 +113,12 @@ class _Onto:
 
     @cached_property
     def _tree(self) -> Any:
-        """Search tree of the outline points."""
+        """Search tree of points along the edges of the outline."""
         from scipy.spatial import cKDTree
         return cKDTree(along(self._edges, FINE_PIECES).reshape(-1, self._edges.shape[-1]))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
+        """Return positions x, shape (n, 2), length, with points outside or near the outline projected onto it."""
         edge, part = np.divmod(self._tree.query(x)[1], FINE_PIECES + 1)
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
         s = part[:, None] / FINE_PIECES
@@ -123,5 +134,5 @@ class _Onto:
 
 
 def _on(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return points of a parabolic edge at parameters s, shape (n, 2)."""
+    """Return points at parameters s (0 to 1) of parabolic edges from a to b through `middle`, shape (n, 2)."""
     return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

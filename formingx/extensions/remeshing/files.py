@@ -16,13 +16,15 @@ from .earlier_meshes import scene_on
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """Return the data of a problem on a mesh of the run, for `load`; on one rank, in the original order of the mesh.
+    """Return the data of a problem on a mesh that was made during the run, as plain data for `load`; on one rank.
+
+    Nodes and cells keep the order in which the mesh was made.
 
     Args:
         problem: the `Problem`.
 
     Returns:
-        The data.
+        Data of the mesh, the transferred deformation and the contacts.
     """
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
@@ -38,18 +40,18 @@ def save(problem: Any) -> dict[str, Any]:
 
 
 def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callable[..., Any]) -> Problem:
-    """Return the problem on the mesh of `save`, after the last state on the old mesh.
+    """Return the problem on a mesh that was made during a run, from its stored data.
 
     Args:
-        before: the problem and the last state on the old mesh.
-        data: the result of `save`.
-        preformed: function that makes the earlier deformation from its fields (`Preformed`).
+        before: the problem on the mesh before, and the last state on it.
+        data: result of `save`.
+        preformed: the class `Preformed`, called with the stored fields.
 
     Returns:
         The problem.
 
     Raises:
-        InputError: data that `save` did not write.
+        InputError: several ranks, or a mesh that gets another numbering than in the run.
     """
     scene = before[0].scene
     if scene.mesh.comm.size > 1:

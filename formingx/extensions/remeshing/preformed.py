@@ -1,4 +1,4 @@
-"""A body whose mesh is its deformed shape, F = grad x . F_old, and the transfer of a state to it.
+"""Transfer of a state to a new mesh whose reference configuration is the deformed body, F = grad x . F_old.
 
 The transferred quantity is b = F F^T/J: stress and energy of a neo-Hookean body are linear in it. In each new element
 it is the quadratic field nearest to b in the mean over the volume. So the stress does the same virtual work as before
@@ -28,11 +28,11 @@ _QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
 _POSITIONS = basix.ufl.enriched_element([_QUADRATIC, basix.ufl.element("Bubble", "triangle", 3)])
 """Element of positions: values at the corners, the midpoints and the centre."""
 
-_PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
-"""Corners, middles of the edges opposite to them, centre of a cell."""
+_LOCAL_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
+"""Local coordinates of the corners of a triangle, the midpoints of the edges opposite to them, and its centre."""
 
 _LATTICE = np.array([(i, j) for i in range(5) for j in range(5 - i)]) / 4
-"""Sampling points of a cell."""
+"""Local coordinates of the points of a triangle at which `_flattened` and the search of cells sample it."""
 
 _DEGREE = 12
 """Quadrature degree of means over new elements, which old edges cross."""
@@ -40,57 +40,57 @@ _DEGREE = 12
 _CANDIDATES = 8
 """Number of old elements in which a point is searched."""
 
-_LEAST = 0.3
-"""Smallest det b and hoop part, over the values of the mean: a field below it is flattened."""
+_FLATTENED_BELOW = 0.3
+"""Smallest det b and hoop entry of b in an element, over those of the mean; a field below is moved towards the mean."""
 
 
 class Preformed(NamedTuple):
-    """State of the old mesh with m cells, for transfer to a new mesh; on one rank.
+    """Deformed state of a body on its old mesh with m cells, to be transferred to a new mesh; on one rank.
 
     Attributes:
-        x: present positions of corners, midpoints and centres, shape (m, 7, 2), length.
-        rest: their reference positions, shape (m, 7, 2), length.
-        b: deformation at the start of that mesh, at corners and midpoints, shape (m, 6, 6). Entries are rr, rz, zz and
-            hoop entry of b, cos and sin of the rotation.
+        x: present positions of corners, midpoints and centres of the cells, shape (m, 7, 2), length.
+        reference: positions of these points in the reference configuration of the old mesh, shape (m, 7, 2), length.
+        b: deformation at the start of the old mesh, at corners and midpoints, shape (m, 6, 6). The six entries are rr,
+            rz, zz and hoop entry of b, and cosine and sine of the rotation in the section.
         pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
-        held: additional volume stiffness of each point (`Model.volume_stiffness`), dimensionless.
-        before: the problem of the old mesh, and its last state.
+        volume_stiffness: additional volume stiffness of the model (`Model.volume_stiffness`) over the unit of stress.
+        before: the problem on the old mesh and its last state.
     """
 
     x: np.ndarray
-    rest: np.ndarray
+    reference: np.ndarray
     b: np.ndarray
     pressures: np.ndarray
-    held: float = 0.0
+    volume_stiffness: float = 0.0
     before: Any = None
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
-        """Return the transfer data of the body of a state.
+        """Return the transfer data of the body in a state.
 
         Args:
-            problem: the `Problem`.
-            state: a `State` of the path.
+            problem: the `Problem` on the old mesh.
+            state: the last state on it.
 
         Returns:
             The data.
         """
         forms = problem.forms
         with problem.state_context(state):
-            both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _PLACES)
+            both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _LOCAL_NODES)
             fields = ufl.split(forms.w)[1:]
-            pressures = (in_own_cells(forms.domain, ufl.as_vector(fields), _PLACES[:3]) if fields else
+            pressures = (in_own_cells(forms.domain, ufl.as_vector(fields), _LOCAL_NODES[:3]) if fields else
                          np.zeros((len(both), 3, 0)))
-        x, rest = np.split(both, 2, axis=2)
+        x, reference = np.split(both, 2, axis=2)
         b = np.tile([1.0, 0.0, 1.0, 1.0, 1.0, 0.0], (len(x), 6, 1))
         if forms.scene.preformed is not None:
             b = forms.scene.preformed._carried(forms)[0]
         scene = forms.scene
-        held = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
-        return cls(x, rest, b, pressures, held, (problem, state))
+        stiffness = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
+        return cls(x, reference, b, pressures, stiffness, (problem, state))
 
     def followed(self, problem: Any, points: np.ndarray) -> np.ndarray:
-        """Return points of the first mesh as points of the new mesh.
+        """Return the positions of points of the first mesh on the new mesh.
 
         Args:
             problem: the `Problem` on the new mesh.
@@ -102,7 +102,7 @@ class Preformed(NamedTuple):
         return followed(problem, points)
 
     def probe(self, problem: Any, points: np.ndarray) -> FollowedProbe:
-        """Return a probe of the displacement at points of the first mesh.
+        """Return a probe of the displacement since the start of the run, at points of the first mesh.
 
         Args:
             problem: the `Problem` on the new mesh.
@@ -114,18 +114,18 @@ class Preformed(NamedTuple):
         return FollowedProbe(problem, points)
 
     def save(self, problem: Any) -> dict[str, Any]:
-        """Return the data of a checkpoint from which the problem on this mesh is made again.
+        """Return the data of a checkpoint from which the problem on the new mesh can be made again.
 
         Args:
             problem: the `Problem` on the new mesh.
 
         Returns:
-            The data.
+            Plain data.
         """
         return save(problem)
 
     def first_places(self, points: np.ndarray) -> np.ndarray:
-        """Return points of the new mesh as points of the first mesh.
+        """Return the positions of points of the new mesh on the first mesh.
 
         Args:
             points: positions on the new mesh, shape (n, 2), length.
@@ -136,13 +136,13 @@ class Preformed(NamedTuple):
         return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
-        """Return the transferred deformation gradient on the elements of a formulation.
+        """Return the transferred deformation gradient on the elements of the new mesh.
 
         Args:
-            forms: the `Formulation`.
+            forms: the `Formulation` on the new mesh.
 
         Returns:
-            F_old (UFL, shape (3, 3)) and det F_old (UFL scalar).
+            F_old (UFL, shape (3, 3)) and its determinant det F_old (UFL scalar).
         """
         space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
         field, values = fem.Function(space), self._carried(forms)[0]
@@ -154,13 +154,13 @@ class Preformed(NamedTuple):
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
-        """Return the unknowns of the present body: no displacement, its pressures.
+        """Return the initial unknowns on the new mesh: no displacement, and the transferred pressures.
 
         Args:
             problem: the `Problem` on the new mesh.
 
         Returns:
-            Locally owned entries.
+            Locally owned entries of `Problem.x`.
         """
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
@@ -170,7 +170,10 @@ class Preformed(NamedTuple):
         return x
 
     def _carried(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return `b` and `pressures` of the cells of a formulation on the present body, by cell-wise least squares."""
+        """Return the fields `b` and `pressures` on the cells of the new mesh, by least squares in each cell.
+
+        forms: the `Formulation` on the new mesh. Shapes of the results: (cells, 6, 6) and (cells, 3, fields).
+        """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _DEGREE)
         at, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
@@ -178,7 +181,7 @@ class Preformed(NamedTuple):
         cells, places = self._located(np.concatenate(sampled)[:, :-1])
         b, J = self._b(cells, places, forms.scene.kinematics.axisymmetric)
         pressures = np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])
-        pressures += self.held * (J - 1)[:, None]
+        pressures += self.volume_stiffness * (J - 1)[:, None]
         b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (b, pressures))
         weights = sampled[..., -1] * weights
 
@@ -191,10 +194,16 @@ class Preformed(NamedTuple):
                 nearest(pressures, np.column_stack([1 - at.sum(1), at])))
 
     def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the entries of `b` at points of cells, shape (n, 6), and J there, shape (n,)."""
-        x, rest, (shapes, *slopes) = self.x[cells], self.rest[cells], _tabulated(_POSITIONS, places, 1)
-        grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, rest))
-        r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, rest))
+        """Return the six entries of b at points of the deformed old mesh, shape (n, 6), and J there, shape (n,).
+
+        Args:
+            cells: old cell of each point, shape (n,).
+            places: local coordinates of the points in their cells, shape (n, 2).
+            axisymmetric: True for a body of revolution.
+        """
+        x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, places, 1)
+        grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))
+        r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, reference))
         stretch = r / R if axisymmetric else np.ones(len(r))
         rr, rz, zz, hoop, along, turned = np.einsum("na,nak->kn", _tabulated(_QUADRATIC, places)[0], self.b[cells])
         V, c, s, _ = _root(rr, rz, zz, along, turned, np.sqrt)
@@ -206,9 +215,10 @@ class Preformed(NamedTuple):
         return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
     def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the cells of points, shape (n, 2), and the local coordinates, shape (n, 2), by Newton's method.
+        """Return the old cells of points of the deformed body, shape (n,), and their local coordinates, shape (n, 2).
 
-        New edges cut corners of old ones: a point outside the body is placed on the edge of the nearest element.
+        Newton's method is used in the cells nearby. New edges cut corners of old ones: a point outside the body is
+        placed on the edge of the nearest element.
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
@@ -228,19 +238,29 @@ class Preformed(NamedTuple):
                 at = np.clip(at + step * np.minimum(1, 0.5 / np.maximum(np.abs(step).max(1), 1e-300))[:, None], -1, 2)
             within = np.where(np.linalg.norm(away, axis=1) < 1e-6 * size, np.minimum(at.min(1), 1 - at.sum(1)), -9.0)
             better = within > least[todo]
-            for kept, new in ((least, within), (cells, c), (found, at)):
-                kept[todo[better]] = new[better]
+            for stored, new in ((least, within), (cells, c), (found, at)):
+                stored[todo[better]] = new[better]
         area = np.maximum(np.column_stack([1 - found.sum(1), found]), 0)              # area coordinates
         return cells, area[:, 1:] / area.sum(1, keepdims=True)
 
 
 def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray:
-    """Return shape functions and their derivatives at n points, shape (1 or 3, n, functions)."""
+    """Return shape functions, or with `derivatives` = 1 also their slopes, at n points, shape (1 or 3, n, functions).
+    """
     return np.asarray(element.tabulate(derivatives, at)) if len(at) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 
 
 def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
-    """Return V with V^2 = b in the plane, cos and sin of a rotation, and det V, from entries of `Preformed.b`."""
+    """Return V with V^2 = b in the section, cosine and sine of the rotation, and det V.
+
+    Args:
+        rr: entry of b.
+        rz: entry of b.
+        zz: entry of b.
+        along: cosine of the rotation times a factor.
+        turned: sine of the rotation times the same factor.
+        sqrt: square root for numbers or for UFL.
+    """
     area = sqrt(rr * zz - rz * rz)
     trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
     shear = rz / trace
@@ -248,17 +268,21 @@ def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tupl
 
 
 def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Return quadratic fields of the entries of `Preformed.b` that are positive definite everywhere.
+    """Return quadratic fields of the six entries of `Preformed.b` that are positive definite everywhere in their cells.
 
     A rapid rotation within an element, as beside a corner, can make them indefinite. Such fields are moved towards
-    their means, shape (cells, 6), as far as needed. The result has shape (cells, 6, 6).
+    their means as far as needed.
+
+    Args:
+        b: coefficients of the fields, shape (cells, 6, 6).
+        mean: mean values of the six entries, shape (cells, 6).
     """
     mean = mean[:, None]
     deviation, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):
         rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ deviation, -1, 0)
-        bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _LEAST) | (hoop < _LEAST * mean[..., 3])
-               | (np.hypot(along, turned) < _LEAST)).any(1)
+        bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _FLATTENED_BELOW)
+               | (hoop < _FLATTENED_BELOW * mean[..., 3]) | (np.hypot(along, turned) < _FLATTENED_BELOW)).any(1)
         if not bad.any():
             break
         deviation[bad] *= 0.7 if k < 10 else 0.0

@@ -1,4 +1,4 @@
-"""Mesh of the interior of a closed curved outline, by gmsh: small elements at corners, boundary names kept."""
+"""Mesh of the interior of a closed curved outline, made by gmsh: small elements at corners, boundary names kept."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -15,7 +15,6 @@ _GROWTH = 0.3
 """Growth of the element size per distance from a corner."""
 
 
-
 def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
              layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
@@ -24,16 +23,16 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     Args:
         edges: edges of the outline in counter-clockwise order, each beginning at the end of the last: first end, second
             end, midpoint, shape (m, 3, 2), length.
-        names: names of the boundaries of each edge.
+        names: for each edge, the names of the boundaries it belongs to.
         corners: positions of small elements, shape (k, 2), length.
         size: element size away from the corners, length.
         corner: element size at the corners, length.
-        layer: name of the layer.
+        layer: name of the only layer.
         axisymmetric: True for a body of revolution.
         comm: MPI communicator.
-        volume: R is scaled to this volume of revolution (else area); default: the volume inside the outline.
-        outside: function of points, shape (n, 2), and names of their boundaries; it returns the points moved out of the
-            tools, length.
+        volume: volume of revolution (or area) of the new mesh, to which R is scaled; default: that inside the outline.
+        outside: function of new outline points, shape (n, 2), length, and the names of their boundaries; it returns the
+            points moved out of the tools.
 
     Returns:
         The mesh.
@@ -46,10 +45,10 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
         part = edges[np.arange(first, last) % len(edges)]
         points, between = _along(part, corners, size, corner)
-        boundaries_of = names[first % len(edges)]
-        ends += [outside(points[:1], boundaries_of | names[first - 1]), outside(points[1:-1], boundaries_of)]
-        middles.append(outside(between, boundaries_of))
-        named += [names[first % len(edges)]] * len(between)
+        boundary = names[first % len(edges)]
+        ends += [outside(points[:1], boundary | names[first - 1]), outside(points[1:-1], boundary)]
+        middles.append(outside(between, boundary))
+        named += [boundary] * len(between)
     ring, middle = np.concatenate(ends), np.concatenate(middles)
     n = len(ring)
     try:
@@ -76,7 +75,7 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     extra: list[np.ndarray] = []
 
     def between_nodes(i: int, j: int) -> int:
-        """Return the number of the node between two nodes, created at the first call."""
+        """Return the number of the node between nodes i and j, created at the first call."""
         key = (min(i, j), max(i, j))
         if key not in known:
             known[key] = len(points) + len(extra)
@@ -85,9 +84,9 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     six = np.array([[a, b, c, between_nodes(a, b), between_nodes(b, c), between_nodes(c, a)] for a, b, c in cells])
     nodes = np.concatenate([points, extra])
     boundaries: dict[str, Any] = {name: [] for name in sorted(frozenset().union(*named))}
-    for k, of in enumerate(named):
+    for k, edge_names in enumerate(named):
         i, j = int(on_ring[k]), int(on_ring[(k + 1) % n])
-        for name in of:
+        for name in edge_names:
             boundaries[name].append([i, j, between_nodes(i, j)])
     new = np.stack([nodes[on_ring], nodes[np.roll(on_ring, -1)],
                     nodes[[between_nodes(int(i), int(j)) for i, j in zip(on_ring, np.roll(on_ring, -1))]]], 1)
@@ -101,8 +100,9 @@ def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
     """Return the volume of revolution, or the area, inside a closed outline of parabolas; exact.
 
     Args:
-        edges: edges of the outline in counter-clockwise order, shape (m, 3, 2), length.
-        axisymmetric: True for the volume of revolution.
+        edges: edges of the outline in counter-clockwise order: first end, second end, midpoint, shape (m, 3, 2),
+            length.
+        axisymmetric: True for the volume of revolution, False for the area.
 
     Returns:
         Volume, length^3, or area, length^2.
@@ -116,7 +116,14 @@ def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
 
 
 def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return new ends, shape (n + 1, 2), and midpoints, shape (n, 2), on a line of edges, graded to corners."""
+    """Return nodes of new elements along a line of edges: ends, shape (n + 1, 2), and midpoints, shape (n, 2).
+
+    Args:
+        edges: edges of the line in order: first end, second end, midpoint, shape (m, 3, 2), length.
+        corners: positions of small elements, shape (k, 2), length.
+        size: element size away from the corners, length.
+        corner: element size at the corners, length.
+    """
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 
     def place(t: np.ndarray) -> np.ndarray:

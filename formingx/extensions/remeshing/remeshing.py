@@ -1,8 +1,8 @@
-"""Runs with remeshing: the deformed body becomes the reference configuration, F = grad x . F_old.
+"""Runs with remeshing: the deformed body becomes the reference configuration of a new mesh, F = grad x . F_old.
 
-For strongly compressed blocks. If the volume ratio J at a quadrature point leaves its range, the present outline is
-meshed again. The new mesh receives the deformation, the pressures, and the contact tractions. Its first state has the
-same travel and the kind "remesh".
+Remeshing serves strongly compressed blocks. If the volume ratio J at a quadrature point leaves its range, the interior
+of the present outline is meshed again. The new mesh receives the deformation, the pressures, and the contact tractions.
+The first state on it has the same control (such as a travel) and the kind "remesh".
 """
 
 from __future__ import annotations
@@ -41,42 +41,42 @@ _SHARES = (1.0, 0.9, 1.1, 0.8)
 """Element sizes to try, relative to the requested size."""
 
 _GOOD = 0.4
-"""A mesh is good if its J keeps this part of the distance from 1 to the limits."""
+"""Distance of J from its limits, over the distance of 1, above which a new mesh is good at once."""
 
 _FEWEST = 3
 """Number of states on a mesh from which its quality may be the cause of a failed step."""
 
 _CHANGED = 0.1
-"""Volume change of elements above which the mesh may be the cause."""
+"""Volume change |J - 1| above which the mesh may be the cause of a failed step."""
 
 _FAILED = 4
 """Maximum number of successive states without a new mesh."""
 
 _CRUSHED = 0.5
-"""Smallest J over the limit of a good mesh: below it the old mesh is not kept for another state."""
+"""Smallest J over its lower limit, below which the run ends if no new mesh is found."""
 
 _POCKET = 0.25
 """Depth over the element size up to which a gap between body and tool is closed."""
 
-_OWN = "step", "counts", "until", "column"
-"""Entries that `Record.complete_step` writes itself."""
+_OWN_ENTRIES = "step", "counts", "until", "column"
+"""Entries of `State.stepping` that `Record.complete_step` writes itself."""
 
-_POOR_MESH = "the mesh is worn"
+_POOR_MESH = "the mesh needs renewal"
 """Reason for the end of a run that needs a new mesh."""
 
 
 @dataclass(frozen=True)
 class Remesh(RunExtension):
-    """Remeshing criterion and element sizes, for `formingx.trace`.
+    """Criterion of remeshing and element sizes, for `formingx.trace(remesh=...)`.
 
     Args:
         size: edge length of the elements on the deformed body, length.
         corner: edge length where faces under tools meet and where contact ends, length; default a third of `size`.
-        volume_ratio: (smallest, largest) volume ratio J at the quadrature points of a good mesh, for an incompressible
-            material.
+        volume_ratio: (smallest, largest) allowed volume ratio J at the quadrature points, for an incompressible
+            material. Otherwise the body is remeshed.
 
     Raises:
-        InputError: a size that is not positive, or a range without 1.
+        InputError: a size that is not positive, `corner` above `size`, or a range without 1.
 
     >>> fx.Remesh(size=0.5, corner=0.1)
     Remesh(size=0.5, corner=0.1, volume_ratio=(0.6, 1.5))
@@ -100,75 +100,79 @@ class Remesh(RunExtension):
         """Raise an InputError if the scene or a target cannot be transferred to another mesh.
 
         Args:
-            caller: name of the caller, for messages.
+            caller: name of the calling function, for messages.
             scene: the `Scene`.
             targets: targets of the run.
+
+        Raises:
+            InputError: the scene has a part that is not transferred, or a target is not a travel, pressure or time.
         """
         _check(caller, scene, targets)
 
     def attach(self, path: Any) -> None:
-        """Set up the remeshing of a path (`formingx.run_hooks.RunExtension`).
+        """Let a run check its mesh at each state and continue on new meshes.
 
         Args:
-            path: the computed `Path`.
+            path: the `Path` that the run continues.
         """
-        path.record.hooks.renew = functools.partial(_follow, path, self, path.record.curve.newton.tolerances)
+        record = path.record
+        record.hooks.renew = functools.partial(_run_with_remeshing, path, self, record.curve.newton.tolerances)
 
 
 def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
-    """Raise an InputError if the scene or a target cannot be transferred to another mesh."""
-    why = ""
+    """Raise an InputError if the scene or a target of a run cannot be transferred to another mesh."""
+    reason = ""
     if scene.mesh.comm.size > 1:
-        why = "several ranks (gmsh makes a mesh on one): run without mpirun"
+        reason = "several ranks (gmsh makes a mesh on one): run without mpirun"
     elif not scene.model.solid:
-        why = "a membrane"
+        reason = "a membrane"
     elif scene.kinematics.components > 2:
-        why = "a sheet in space"
+        reason = "a sheet in space"
     elif len(scene.mesh.layers) > 1:
-        why = "several layers"
+        reason = "several layers"
     elif any(isinstance(constant, OfMesh) for material in scene.materials.values()
              for constant in material.constants().values()):
-        why = "a constant that is a Function on the mesh: give a function of (R, Z)"
+        reason = "a constant that is a Function on the mesh: give a function of (R, Z)"
     elif scene.expansion:
-        why = "thermal expansion"
+        reason = "thermal expansion"
     elif any(type(support).stored_energy is not Support.stored_energy or any(
             constraint.point is not None for constraint in support.all_constraints()) for support in scene.supports):
-        why = "a support at a node, or an elastic one"
+        reason = "a support at a node, or an elastic one"
     elif any(not contact.separates or contact.points != "nodes" for contact in scene.contacts):
-        why = "a contact with separates=False, or at Gauss points"
+        reason = "a contact with separates=False, or at Gauss points"
     elif any(type(contact).law is not Contact.law for contact in scene.contacts):
-        why = "a law of contact of one's own"
-    if why:
-        raise InputError(f"{caller}: remesh: is not available with {why}")
+        reason = "a law of contact of one's own"
+    if reason:
+        raise InputError(f"{caller}: remesh: is not available with {reason}")
     for target in targets:
         if not target.name.endswith(("travel", "pressure", "process_time")):
             raise InputError(f"{caller}: remesh: target {target}: must be a travel, a pressure or a process_time: other"
                              f" measures change a little at each remeshing, and may jump over their target")
 
 
-def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
+def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
             done: Callable[[], bool]) -> None:
-    """Continue a path with as many meshes as needed.
+    """Run to the end of a path on as many meshes as needed.
 
     Args:
         path: the path, extended in place.
         remesh: criterion and sizes.
         tolerances: tolerances of the states.
-        part: continues from the last state on its mesh, as after an interruption.
-        done: True if the path is complete.
+        part: function that continues the run from the last state on its mesh.
+        done: function that returns True if the path is complete.
 
     Raises:
         ConvergenceError: the end of the path was not reached.
     """
     record = path.record
-    record.hooks.on_state.append(lambda state: _look(record, state, remesh))
+    record.hooks.on_state.append(lambda state: _check_mesh(record, state, remesh))
     poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
     failed: list[State] = []
     while not (poor and done()):
         record.problem.limit.one_by_one()                    # check the mesh at each gap closure
         if poor:
             try:
-                _take_up(path, remesh, tolerances)
+                _start_new_mesh(path, remesh, tolerances)
                 failed = []
             except ConvergenceError as error:                # a mesh may succeed at the next state
                 crushed = _ratios(record, record.last)[0] < _CRUSHED * remesh.volume_ratio[0]
@@ -191,12 +195,13 @@ def _follow(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[]
     record.ended = ""
 
 
-def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
-    """Remesh and add the first state on the new mesh; a part then continues with the earlier step lengths."""
+def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
+    """Remesh the last body of a path, and add the first state on the new mesh with the earlier step length."""
     record, last = path.record, path.last
-    kept = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
-    first = record.segments[-1].states[0].stepping.get("step", kept["step"])
-    segment, start = _best(path, remesh, tolerances)
+    stepping = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
+    step = stepping["step"]
+    first = record.segments[-1].states[0].stepping.get("step", step)
+    segment, start = _best_mesh(path, remesh, tolerances)
     record.segments.append(segment)
     try:
         path._view(segment)
@@ -208,23 +213,26 @@ def _take_up(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
     if segment.problem.has_kinks:
         segment.curve.look_ahead(start)
     record.counts.iterations += segment.curve.spent()
-    name, value = kept["until"]
-    record.complete_step(StepControl(**kept["step"] | {"length": min(kept["step"]["length"], 4 * first["length"])}),
-                         Target(name, value, None), **{k: v for k, v in kept.items() if k not in _OWN})
+    name, value = stepping["until"]
+    record.complete_step(StepControl(**step | {"length": min(step["length"], 4 * first["length"])}),
+                         Target(name, value, None), **{k: v for k, v in stepping.items() if k not in _OWN_ENTRIES})
 
 
-def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
-    """Return a new mesh and its first state.
+def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
+    """Return the segment on a new mesh of the last body, and the first state on it.
 
-    The first mesh with good J is taken, of several sizes near the requested one; else the best.
+    Several sizes near the requested one are tried. The first mesh with good J is taken, or else the best of all.
+
+    Raises:
+        ConvergenceError: no mesh has an equilibrium.
     """
     low, high = remesh.volume_ratio
-    found, why = [], ""
+    found, reason = [], ""
     for share in _SHARES:
         try:
-            segment, start = _again(path, remesh, tolerances, share)
+            segment, start = _new_mesh(path, remesh, tolerances, share)
         except (ConvergenceError, Failure, InputError) as error:
-            why = why or str(getattr(error, "reason", error))
+            reason = reason or str(getattr(error, "reason", error))
             continue
         segment.problem.x.array_w[:] = start.x
         segment.problem.look_at(start.x, start.control)
@@ -234,51 +242,58 @@ def _best(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, S
             break
     if not found:
         raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh ({len(_SHARES)} sizes were tried):"
-                               f" {why}")
+                               f" {reason}")
     _, segment, start = max(found, key=lambda entry: entry[0])
     return segment, start
 
 
 def _ratios(record: Record, state: State) -> tuple[float, float]:
-    """Return the extreme volume ratios in a state."""
+    """Return the smallest and the largest volume ratio J at the quadrature points in a state."""
     with record.problem.state_context(state) as problem:
         return problem.admissible.volume_ratios()
 
 
-def _look(record: Record, state: State, remesh: Remesh) -> None:
-    """End the run if its mesh needs renewal; record the changes of a remeshed state."""
+def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
+    """End the run if J leaves its range in a new state; store jumps of force and energy in a state of kind "remesh"."""
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
         force = next((name for name in before if name.endswith("force")), None)
-        for what, name in (("force", force), ("energy", "strain_energy")):
+        for quantity, name in (("force", force), ("energy", "strain_energy")):
             if name and before.get(name):
-                state.jump[what] = state.measures[name] / before[name] - 1
+                state.jump[quantity] = state.measures[name] / before[name] - 1
         log.info("a new mesh: %s", state.jump)
     elif _needs_remeshing(record, state, remesh):
         record.ended = _POOR_MESH
 
 
 def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
-    """Return True if the mesh of a state needs renewal."""
+    """Return True if J leaves its range in a state that is not the first on its mesh."""
     if state.kind in ("start", "remesh"):
         return False
     low, high = _ratios(record, state)
     return not (remesh.volume_ratio[0] <= low and high <= remesh.volume_ratio[1])
 
 
-def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
-    """Return a new mesh of the last body, with elements of `share` times the size, and the equilibrium on it."""
+def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
+    """Return the segment on a new mesh of the last body, and the equilibrium on it.
+
+    Args:
+        path: the path.
+        remesh: criterion and sizes.
+        tolerances: tolerances of the states.
+        share: element size over the requested size.
+    """
     record, old, state = path.record, path.problem, path.last
     scene = old.scene
     outline = Outline(old.forms)
     with old.state_context(state):
         edges = outline.edges()
-        of = {name: outline.mask(name) for name in scene.mesh.boundaries}
+        masks = {name: outline.mask(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
         contacts = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
-    touched = [(c.contact.on, w.position[w.touches] + travel) for c, w, travel in contacts]
+    touched = [(c.contact.on, before.position[before.touches] + travel) for c, before, travel in contacts]
     order = outline.ordered("remesh")
-    names = [frozenset(name for name, on_boundary in of.items() if on_boundary[k]) for k in order]
+    names = [frozenset(name for name, mask in masks.items() if mask[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
     on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
@@ -287,12 +302,12 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
     layer, = scene.mesh.layers
     mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
                     lambda x, names: _outside(x, names, contacts))
-    made = scene_on(mesh, Preformed.of(old, state))
-    problem = Problem(made)
+    new_scene = scene_on(mesh, Preformed.of(old, state))
+    problem = Problem(new_scene)
     problem.limit.one_by_one()
     setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
     curve = Curve(problem, tolerances)
-    x = made.preformed.unknowns(problem)
+    x = new_scene.preformed.unknowns(problem)
     problem.enter(setting, x, control)
     if not setting.rate[-1]:
         problem.clock = state.time
@@ -310,22 +325,28 @@ def _again(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> t
 
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
-    """Return the equilibrium at the same control, by Newton's method or by fading the unbalanced forces."""
+    """Return the unknowns in equilibrium at a control, from the transferred unknowns x on a new mesh.
+
+    Newton's method is tried first. If it fails, the unbalanced forces are faded out along a path.
+
+    Raises:
+        ConvergenceError: no equilibrium was found.
+    """
     first = problem.setting
     problem.x.array_w[:] = x
     try:
         curve.newton.correct(problem.x, control, fixed(control))
         if not problem.folded(problem.x, control):
             return problem.x.array_r.copy()
-        why = "an element turned inside out"
+        reason = "an element turned inside out"
     except Failure as failure:
-        why = failure.reason
-    log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", why)
+        reason = failure.reason
+    log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", reason)
     time = problem.time_at(control)
-    still = replace(first, base=[*first.amplitudes(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
+    constant = replace(first, base=[*first.amplitudes(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
     record, target = Record(problem, curve), Target("change", 1.0, None)
     try:
-        problem.enter(still, x, 0.0)
+        problem.enter(constant, x, 0.0)
         Run(record, [(target, Amplitude(problem, None))]).follow(200, False, curve.resume(x, 0.0))
     except (ConvergenceError, Failure) as error:
         raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh: {error}; give Remesh another size, or"
@@ -336,10 +357,15 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
 
 
 def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
-    """Return the outline, shape (m, 3, 2), with shallow pockets closed.
+    """Return the edges of the outline, shape (m, 3, 2), with shallow pockets between body and tool closed.
 
-    A node between two contact nodes is moved onto their line if it is within `depth` of it. A side that rolls onto a
-    plate may leave such a node in a crease.
+    Nodes between two contact nodes are moved onto the line of these two if all are within `depth` of it. A side that
+    rolls onto a plate may leave such a node in a crease.
+
+    Args:
+        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
+        touched: positions of the contact nodes, shape (k, 2), length.
+        depth: largest depth of a pocket, length.
     """
     nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
     close = 1e-6 * np.ptp(nodes, axis=0).max()
@@ -353,9 +379,14 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
 
 
 def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
-    """Return outline points, shape (n, 2), moved out of tools to the depth of neighbouring contacts.
+    """Return new outline points moved out of the tools, to the depth of neighbouring contact points.
 
     New edges cut corners of the old outline, so points on them may lie in a tool.
+
+    Args:
+        x: points, shape (n, 2), length.
+        names: names of their boundaries.
+        contacts: (contact on the old mesh, contact state, travel of the tool, shape (2,), length) of each contact.
     """
     for contact, before, travel in contacts:
         if contact.contact.on in names:
@@ -365,16 +396,24 @@ def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, Con
 
 
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Return the corners between two faces under tools, and the ends of the contact areas, shape (k, 2)."""
+    """Return the points of the outline that get small elements, shape (k, 2), length.
+
+    These are the corners between two faces under tools, and the ends of contact areas.
+
+    Args:
+        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
+        names: names of the boundaries of each edge.
+        touched: (boundary, positions of its nodes in contact, shape (n, 2), length) of each contact.
+    """
     faces = {on for on, _ in touched}
     found = []
-    press = np.zeros(len(edges), dtype=bool)
+    pressed, close = np.zeros(len(edges), dtype=bool), 1e-6 * np.ptp(edges[:, 0], axis=0).max()
     for on, points in touched:
         if len(points):
-            near = np.linalg.norm(edges[:, 2][:, None] - points[None], axis=2).min(1)
-            press |= np.array([on in of for of in names]) & (near < 1e-6 * np.ptp(edges[:, 0], axis=0).max())
+            distance = np.linalg.norm(edges[:, 2][:, None] - points[None], axis=2).min(1)
+            pressed |= np.array([on in boundaries for boundaries in names]) & (distance < close)
     for k in range(len(edges)):
         a, b = names[k - 1] & faces, names[k] & faces
-        if (a and b and a != b) or ((a or b) and press[k] != press[k - 1] and a and b):
+        if a and b and (a != b or pressed[k] != pressed[k - 1]):
             found.append(edges[k, 0])
     return np.array(found).reshape(-1, 2)
