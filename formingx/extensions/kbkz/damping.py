@@ -1,4 +1,4 @@
-"""Damping of the stress of a past state, h(I1, I2), for `KBKZ`."""
+"""Damping functions h(I1, I2) of the stress that a past state contributes, for `KBKZ`."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -13,17 +13,18 @@ _NEAR = 1e-4
 
 
 class Damping:
-    """Damping function h(I1, I2) of the Finger tensor since a past state, with h = 1 where I1 = I2 = 3.
+    """Damping function h(I1, I2) of the Finger tensor B of the deformation since a past state, for `KBKZ`.
 
-    With a term in I2 the stress h B has no potential: only functions of I1 alone have one.
+    It is 1 where I1 = tr B and I2 = tr B^-1 are both 3. With a term in I2 the stress h B has no potential: only
+    functions of I1 alone have one.
     """
 
     def __call__(self, I1: Any, I2: Any) -> Any:
-        """Return h at invariants of any shape."""
+        """Return h at invariants I1 and I2 of equal shape."""
         return self.derivatives(I1, I2)[0]
 
     def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-        """Return h and its derivatives.
+        """Return h and its derivatives by the invariants of the Finger tensor.
 
         Args:
             I1: first invariant, any shape.
@@ -39,7 +40,7 @@ class Damping:
 
     @property
     def of_I1_alone(self) -> bool:
-        """True if the stress has a potential, and the tangent is symmetric."""
+        """True if h depends on I1 alone, so that the stress has a potential and the tangent is symmetric."""
         return not np.any(self.derivatives(np.array(5.0), np.array(5.0))[2])
 
     def __str__(self) -> str:
@@ -54,8 +55,11 @@ class PSM(Damping):
     .. math:: h = \frac{\alpha}{(\alpha - 3) + \beta I_1 + (1 - \beta) I_2}
 
     Args:
-        alpha: above 0; the larger, the less is damped.
-        beta: from 0 to 1; the smaller, the less is damped in uniaxial, and the more in equibiaxial extension.
+        alpha: constant, above 0; damping decreases with it.
+        beta: share of I1, from 0 to 1; damping increases with it in uniaxial, and decreases in equibiaxial extension.
+
+    Raises:
+        InputError: a constant that is not allowed.
 
     >>> melt = fx.KBKZ([(0.1, 1.0), (0.02, 10.0)], damping=fx.PSM(alpha=10.0, beta=0.5))         # (modulus, time)
     """
@@ -76,8 +80,11 @@ class Wagner(Damping):
     .. math:: h = \exp\left(-\beta \sqrt{\alpha I_1 + (1 - \alpha) I_2 - 3}\right)
 
     Args:
-        alpha: from 0 to 1, the share of I1.
-        beta: above 0; the larger, the more is damped.
+        alpha: share of I1, from 0 to 1.
+        beta: exponent, above 0; damping increases with it.
+
+    Raises:
+        InputError: a constant that is not allowed.
 
     >>> fx.Wagner(alpha=0.1, beta=0.2)
     Wagner(alpha=0.1, beta=0.2)
@@ -102,7 +109,10 @@ def LuoTanner(n: float, beta: float) -> Wagner:  # noqa: N802  a card's name for
         beta: share of I1, from 0 to 1.
 
     Returns:
-        The damping.
+        The damping function.
+
+    Raises:
+        InputError: a constant that is not allowed.
 
     >>> fx.LuoTanner(n=0.2, beta=0.1)
     Wagner(alpha=0.1, beta=0.2)
@@ -118,7 +128,11 @@ class DoubleWagner(Damping):
     Args:
         alpha: share of I1, from 0 to 1.
         f: share of the first exponential, from 0 to 1.
-        n1, n2: above 0.
+        n1: exponent of the first exponential, above 0.
+        n2: exponent of the second exponential, above 0.
+
+    Raises:
+        InputError: a constant that is not allowed.
 
     >>> fx.DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
     DoubleWagner(alpha=0.05, f=0.57, n1=0.31, n2=0.106)
@@ -139,13 +153,13 @@ class SoskeyWinter(Damping):
 
     .. math:: h = 1/(1 + a J^{b/2}), \quad J = \alpha I_1 + (1 - \alpha) I_2 - 3
 
-    In shear J is the square of the shear strain, so h = 1/(1 + a shear^b), for any alpha. With b = 2 it is `PSM`
-    with 1/a in place of alpha and alpha in place of beta.
+    In shear J is the square of the shear strain, so h = 1/(1 + a shear^b), for any alpha. With b = 2 it is `PSM` with
+    1/a in place of alpha and alpha in place of beta.
 
     Args:
         alpha: share of I1, from 0 to 1.
-        a: above 0; the larger, the more is damped.
-        b: above 0; the power of the strain, 2 in `PSM`.
+        a: factor, above 0; damping increases with it.
+        b: power of the strain, above 0; 2 in `PSM`.
 
     Raises:
         InputError: a constant that is not allowed.
@@ -169,7 +183,10 @@ class SoskeyWinter(Damping):
 
 
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-    """Return the sum h of f exp(-n s), with s of I1 and I2, and its derivatives dh/dI1 and dh/dI2."""
+    """Return the sum h of f exp(-n s), s^2 = alpha I1 + (1 - alpha) I2 - 3, and its derivatives dh/dI1 and dh/dI2.
+
+    terms: (f, n) of each exponential.
+    """
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]
     slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _NEAR))
@@ -177,7 +194,7 @@ def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: An
 
 
 def _share(name: str, value: Any) -> float:
-    """Return a share; raise an InputError unless it lies between 0 and 1."""
+    """Return a number that must lie between 0 and 1; raise an InputError with its name otherwise."""
     if not 0 <= (number := finite(name, value)) <= 1:
         raise InputError(f"{name} = {value!r}: must be from 0 to 1")
     return number

@@ -1,4 +1,4 @@
-r"""Stress of a fading memory of all past states at points: `KBKZ` in a scene.
+r"""Stress of a material as an integral over all its past states, at points: `KBKZ` in a scene.
 
 With Cbar = J^(-2/3) C and the past states C_k at reduced ages, the second Piola-Kirchhoff stress is, up to a pressure,
 
@@ -6,10 +6,10 @@ With Cbar = J^(-2/3) C and the past states C_k at reduced ages, the second Piola
     S = \sum_k W_k \, h(I_1, I_2) \, C_k^{-1}, \qquad I_1 = \bar C : C_k^{-1}, \quad I_2 = \bar C^{-1} : C_k, \quad
     W_k = \sum_j G_j w_{kj}
 
-with the weights w_kj of mode j. They are exact if h C_k^-1 is linear in the age between states. The first state,
-undeformed, represents all earlier time; the last one contributes only a pressure. In a form S is linear in Cbar and in
-the time step, exact where it is refreshed, with the consistent tangent. A symmetric tensor is stored as its entries
-(11, 22, 12, 33); arrays have shape (4, n).
+with the weights w_kj of relaxation mode j. They are exact if h C_k^-1 is linear in the age between states. The first
+state, undeformed, represents all earlier time; the last one contributes only a pressure. In a form S is linear in Cbar
+and in the time step, exact where it is refreshed, with the consistent tangent. A symmetric tensor is stored as its
+entries (11, 22, 12, 33); arrays have shape (4, n).
 """
 
 from typing import Any
@@ -20,45 +20,49 @@ from ...materials.tensors import cofactor, entries
 from .past_states import PastStates
 
 _COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
-"""Number of times that an entry occurs in the tensor."""
+"""Number of times that each entry (11, 22, 12, 33) occurs in the tensor."""
 
 
 class Integral:
-    """Weights and stress of past states.
+    """Stress as a sum over the past states of a material with relaxation modes (G, tau).
+
+    Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar is the isochoric part of C.
 
     Args:
         spectrum: list of (G, tau), stress and time.
         damping: a `Damping`, or None.
-        irreversible: see `KBKZ`.
+        irreversible: True if h of a past state is the smallest value that it has had since then.
         shifted: True if the reduced time of the material depends on the temperature.
     """
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
                     "past_T": (0.0,) * 4}
-    """Initial values of the coefficients of a form: S - T dt, Cbar, dS/dCbar and T = dS/dt where it was refreshed. The
-    entries of S are multiplied by their number in the tensor."""
+    """Initial values of the coefficients of a form: S - T dt, Cbar, dS/dCbar and T = dS/dt at the last refresh.
+
+    The entries of S and T are multiplied by their number in the tensor.
+    """
 
     def __init__(self, spectrum: list[tuple[float, float]], damping: Any, irreversible: bool, shifted: bool):
         self.modulus, self.tau = np.array(spectrum).T
         self.damping, self.irreversible, self.shifted = damping, irreversible, shifted
 
     def history(self, forms: Any, terms: Any) -> PastStates:
-        """Return the history of a material with this stress.
+        """Return the history variables (past states) of a material with this stress.
 
         Args:
             forms: the `Formulation`.
             terms: the `MaterialTerms` of the material.
 
         Returns:
-            The history.
+            The past states.
         """
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights of K states in each mode.
+        """Return the weights of K past states in each relaxation mode.
 
         Args:
-            ages: reduced ages, descending, the last 0, shape (K,) or (K, n), time.
+            ages: ages of the states in reduced time, descending, the last 0, shape (K,) or (K, n), time.
 
         Returns:
             Weights w, shape (K, modes) or (K, modes, n).
@@ -79,32 +83,32 @@ class Integral:
         return w
 
     def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
-              near: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the weights of the states after a step in reduced time.
+              close: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the weights of K past states in the stress at the end of a step in reduced time.
 
         The step is exact if h C_k^-1 is a parabola through the last states. So it is of second order even for steps far
         longer than tau (`TransientNetwork`).
 
         Args:
-            weights: result of `weights` for the states.
-            step: step in reduced time.
+            weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
+            step: length of the step in reduced time, a number or shape (n,).
             before: reduced time between the last two states; 0: not known.
-            near: 1, or 0 where these two are far apart, shape (n,).
+            close: 1, or 0 where these two states differ much, shape (n,).
 
         Returns:
-            W and dW/dstep, shape (K, n or 1) each.
+            Weights W and dW/dstep, shape (K, n or 1) each, stress and stress/time.
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
         decay, G = np.exp(-y), self.modulus[:, None]
-        kept = decay * (weights if each else weights[:, :, None])
-        W, slope = np.sum(G * kept, axis=1), -np.sum(G / self.tau[:, None] * kept, axis=1)
+        decayed = decay * (weights if each else weights[:, :, None])
+        W, slope = np.sum(G * decayed, axis=1), -np.sum(G / self.tau[:, None] * decayed, axis=1)
         mean = _mean_decay(y)
         W[-1] += np.sum(G * (mean - decay), axis=0)
         slope[-1] += np.sum(G / self.tau[:, None] * (_mean_decay_slope(y) + decay), axis=0)
         if len(W) > 1 and np.any(before):
             known = np.asarray(before) > 0
-            rate = np.where(known, near / np.where(known, before, 1), 0)
+            rate = np.where(known, close / np.where(known, before, 1), 0)
             shape = len(W), max(W.shape[1], np.size(rate))
             W, slope = np.broadcast_to(W, shape).copy(), np.broadcast_to(slope, shape).copy()
             bulge, by_step = np.sum(G * _bulge(y), axis=0), np.sum(G / self.tau[:, None] * _bulge_slope(y), axis=0)
@@ -114,16 +118,16 @@ class Integral:
                 slope[k] += by_step * c + bulge * by_s * rate
         return W, slope
 
-    def damped(self, C: np.ndarray, past: np.ndarray, least: np.ndarray | None = None) -> tuple[Any, ...]:
-        """Return inverse tensors and damping of past states.
+    def damped(self, C: np.ndarray, past: np.ndarray, smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
+        """Return inverse tensors and damping of K past states.
 
         Args:
-            C: entries of Cbar, shape (4, n).
-            past: entries of the past states, shape (K, 4, n).
-            least: smallest h of each state so far, shape (K, n), or None.
+            C: entries of the present Cbar, shape (4, n).
+            past: entries of Cbar in the past states, shape (K, 4, n).
+            smallest_h: smallest h of each state so far, shape (K, n), or None.
 
         Returns:
-            C_k^-1, shape (K, 4, n); h, dh/dI1 and dh/dI2, shape (K, n) each.
+            Inverse tensors of the past states, shape (K, 4, n); h, dh/dI1 and dh/dI2, shape (K, n) each.
         """
         inverse = _inverse(past)
         if self.damping is None:
@@ -132,26 +136,26 @@ class Integral:
         I1 = np.sum(_COUNT * inverse * C, axis=1)
         I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
         h, h1, h2 = self.damping.derivatives(I1, I2)
-        if least is not None:
-            known = h > least
-            h, h1, h2 = np.where(known, least, h), np.where(known, 0, h1), np.where(known, 0, h2)
+        if smallest_h is not None:
+            limited = h > smallest_h
+            h, h1, h2 = np.where(limited, smallest_h, h), np.where(limited, 0, h1), np.where(limited, 0, h2)
         return inverse, h, h1, h2
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
-               least: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the stress of past states and its derivatives.
+               smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the second Piola-Kirchhoff stress from K past states, without pressure, and its derivatives.
 
         Args:
-            C: entries of Cbar, shape (4, n).
-            past: entries of the past states, shape (K, 4, n).
-            W: weights of the states, shape (K, n).
-            slope: dW/dstep, shape (K, n).
-            least: smallest h of each state so far, shape (K, n), or None.
+            C: entries of the present Cbar, shape (4, n).
+            past: entries of Cbar in the past states, shape (K, 4, n).
+            W: weights of the states, shape (K, n), stress.
+            slope: derivatives of the weights by the reduced time of the step, shape (K, n).
+            smallest_h: smallest h of each state so far, shape (K, n), or None.
 
         Returns:
-            S, dS/dC and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
+            S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
         """
-        inverse, h, h1, h2 = self.damped(C, past, least)
+        inverse, h, h1, h2 = self.damped(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
             return S, np.zeros((4, *S.shape)), T
@@ -161,48 +165,49 @@ class Integral:
         slopes = (W * h1)[:, None] * _COUNT * inverse + (W * h2)[:, None] * by_I2
         return S, np.einsum("kin,kjn->ijn", inverse, slopes), T
 
-    def potential(self, C: Any, held: dict[str, Any], time_step: Any) -> Any:
-        """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dC.
+    def potential(self, C: Any, coefficients: dict[str, Any], time_step: Any) -> Any:
+        """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dCbar.
 
         Args:
             C: entries of Cbar (UFL).
-            held: {name: coefficient}, see `coefficients`.
+            coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
             time_step: length of the step (UFL scalar, time).
 
         Returns:
             The potential (UFL, stress).
         """
-        S, D, T, change = held["past_S"], held["past_D"], held["past_T"], _change(C, held)
+        S, D, T = (coefficients[name] for name in ("past_S", "past_D", "past_T"))
+        change = _change(C, coefficients)
         linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
-    def unsymmetric_work(self, C: Any, dC: Any, held: dict[str, Any]) -> Any:
-        """Return the virtual work of the unsymmetric part of dS/dC, which `potential` lacks.
+    def unsymmetric_work(self, C: Any, dC: Any, coefficients: dict[str, Any]) -> Any:
+        """Return the virtual work of the unsymmetric part of dS/dCbar, which `potential` lacks.
 
         Args:
             C: entries of Cbar (UFL).
-            dC: their virtual changes (UFL).
-            held: {name: coefficient}, see `coefficients`.
+            dC: virtual changes of these entries (UFL).
+            coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
 
         Returns:
-            Virtual work (UFL, stress); 0 where the coefficients are exact.
+            Virtual work per volume (UFL, stress); 0 where the coefficients are exact.
         """
-        D, change = held["past_D"], _change(C, held)
+        D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
 
 def _inverse(C: np.ndarray) -> np.ndarray:
-    """Return the inverse of tensors of determinant 1, shape (..., 4, n)."""
+    """Return the entries of the inverse of tensors of determinant 1, shape (..., 4, n)."""
     return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
 
 
-def _change(C: Any, held: dict[str, Any]) -> list[Any]:
-    """Return the change of Cbar since the coefficients were refreshed."""
-    return [C[i] - held["past_C"][i] for i in range(4)]
+def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
+    """Return the change of the entries of Cbar (UFL) since the coefficients were refreshed."""
+    return [C[i] - coefficients["past_C"][i] for i in range(4)]
 
 
 def _mean_decay(x: np.ndarray) -> np.ndarray:
-    """Return (1 - e^-x)/x."""
+    """Return (1 - e^-x)/x, the mean of e^-x over a step."""
     return np.where(x < 1e-12, 1.0, -np.expm1(-x) / np.where(x < 1e-12, 1.0, x))
 
 
@@ -232,7 +237,7 @@ def _parabola_slopes(s: Any) -> tuple[Any, Any]:
 
 
 def _bulge(x: np.ndarray) -> np.ndarray:
-    """Return [x - 2 + (x + 2) e^-x]/x^2."""
+    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of the quadratic part of a parabola over a step."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

@@ -1,12 +1,12 @@
-r"""Factorised K-BKZ equation: a fading memory of all past states, with damping.
+r"""Factorised K-BKZ equation: the stress is an integral over all past states, with damping.
 
 .. math:: \tau(t) = \int_{-\infty}^{t} m(t - t') \, h(I_1, I_2) \, B(t, t') \, dt', \qquad
           m(s) = \sum_k \frac{G_k}{\tau_k} e^{-s/\tau_k},
 
 tau is the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t. I1 = tr B and
-I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner
-(1976) and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
-In a scene its stress is computed at each quadrature point from the past states there (`past_states`).
+I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner (1976)
+and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`. In a
+scene its stress is computed at each quadrature point from the past states there (`past_states`).
 """
 
 from __future__ import annotations
@@ -29,24 +29,29 @@ from .integral import Integral
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANELS = 1.5
-"""Ratio of the ages between which one rule is used; below half the shortest relaxation time there is one panel."""
+"""Ratio of the ages at the ends of a panel of the memory integral; up to half the shortest relaxation time is one."""
 _STRAIN = 0.25
-"""Longest logarithmic strain in a panel."""
+"""Largest change of logarithmic strain in a panel of the memory integral."""
 
 
 class KBKZ(Relaxing):
-    """The factorised K-BKZ equation, for a body that is undeformed before the run.
+    r"""Factorised K-BKZ material, for a melt that is undeformed before the run.
 
-    In small strains G(t) = G_equilibrium + sum G_k exp(-t/tau_k). After a step of strain, time and strain separate: the
-    stress is G(t) h times the stress of a neo-Hookean body of unit modulus. The state alone does not
-    determine the stored energy of a damped material, so runs with it have no columns of energies.
+    .. math:: \tau = \int_{-\infty}^{t} \sum_k \frac{G_k}{\tau_k} e^{-(t - t')/\tau_k} \, h(I_1, I_2) \, B(t, t') \, dt'
+
+    tau is the Kirchhoff stress up to a pressure, B the Finger tensor of the deformation since the time t', with I1 = tr
+    B and I2 = tr B^-1. In small strains the relaxation modulus is G(t) = G_equilibrium + sum G_k exp(-t/tau_k). The
+    state alone does not determine the stored energy of a damped material, so runs with it have no columns of energies.
 
     Args:
         spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.
-        damping: `PSM`, `Wagner`, ... or None: h = 1.
-        equilibrium: a material that does not relax, beside it, or None.
-        shift: how relaxation times depend on the temperature of the scene, see `Viscoelastic`.
-        irreversible: h of a past state is the smallest that it has been since then.
+        damping: damping function h, such as `PSM` or `Wagner`; None: h = 1.
+        equilibrium: a material without relaxation whose stress is added, or None.
+        shift: temperature dependence of the relaxation times, see `Viscoelastic`; None: constant times.
+        irreversible: True if h of a past state is the smallest value that it has had since then.
+
+    Raises:
+        InputError: an argument that is not allowed.
 
     >>> melt = fx.KBKZ([(0.1, 0.5), (0.02, 10.0)], damping=fx.PSM(alpha=14.4, beta=0.05))
     >>> round(melt.shear_modulus, 12)
@@ -77,14 +82,14 @@ class KBKZ(Relaxing):
 
     @classmethod
     def of_viscosities(cls, spectrum: Sequence[tuple[float, float]], *args: Any, **others: Any) -> KBKZ:
-        r"""Return a material from viscosities and relaxation times.
+        r"""Return a material from viscosities and relaxation times, with moduli
 
         .. math:: G_k = \eta_k / \tau_k
 
         Args:
             spectrum: list of (viscosity, relaxation time), stress times time and time.
-            args: further arguments of the class.
-            others: further keyword arguments of the class.
+            args: further arguments of `KBKZ`, after `spectrum`.
+            others: further keyword arguments of `KBKZ`.
 
         Returns:
             The material.
@@ -98,19 +103,19 @@ class KBKZ(Relaxing):
         return self.damping is None or self.damping.of_I1_alone
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
-        """Return the shear modulus, equal at all points of a sample.
+        """Return the instantaneous shear modulus at the points of a sample.
 
         Args:
-            sample: the sample.
+            sample: the `Sample` with n points, at which constants of the equilibrium are evaluated.
 
         Returns:
-            Moduli, shape (n,), stress.
+            Moduli, shape (n,) or (1,), stress.
         """
         rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
 
     def strain_energy(self, F, **constants):
-        """Return the instantaneous energy of the undamped network, for moduli and stresses at F = I.
+        """Return the energy of the instantaneous response without damping, for moduli and stresses at F = I.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -126,8 +131,8 @@ class KBKZ(Relaxing):
         """Return a potential whose derivative by F is the stress at the end of a step; it is no energy.
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: coefficients of the integral.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: coefficient of the form}, with the names of `Integral.coefficients`.
             time_step: length of the step (UFL scalar, time).
             constants: values of the constants by name.
 
@@ -137,11 +142,11 @@ class KBKZ(Relaxing):
         return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
-        """Return `step_energy` for no step: its derivative is the stress; its value has no meaning.
+        """Return `step_energy` for a step of length 0: its derivative by F is the stress; its value has no meaning.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
-            internal: coefficients of the integral.
+            internal: {name: coefficient of the form}, with the names of `Integral.coefficients`.
             constants: values of the constants by name.
 
         Returns:
@@ -150,11 +155,12 @@ class KBKZ(Relaxing):
         return self.step_energy(F, internal, 0.0, **constants)
 
     def _modulus(self, times):
+        """Return the relaxation modulus of the spectrum at times, without the equilibrium, stress."""
         return sum(G * np.exp(-np.asarray(times, float) / tau) for G, tau in self.spectrum)
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
-        """Return the nominal stress of a test, force over reference area.
+        """Return the nominal stress (force over reference area) of a homogeneous test.
 
         Its relative error is below 1e-8.
 
@@ -184,15 +190,16 @@ class KBKZ(Relaxing):
         return (found + self._relaxed_stress(mode, l)) * (l if true else 1.0)
 
     def shear(self, rate: float, times: ArrayLike) -> np.ndarray:
-        r"""Return the shear stress after a simple shear at a constant rate has begun, shape (n,), stress.
+        r"""Return the shear stress in a simple shear that starts at time 0 with a constant rate.
 
-        .. math:: \sigma_{12} = G(t)\, h(\gamma)\, \gamma + \int_0^t m(s)\, h(\dot\gamma s)\, \dot\gamma s\, ds
+        .. math:: \sigma_{12} = G(t)\, h(\gamma)\, \gamma + \int_0^t m(s)\, h(\dot\gamma s)\, \dot\gamma s\, ds, \qquad
+                  \gamma = \dot\gamma t, \quad m = -\frac{dG}{dt}
 
-        The equilibrium beside it, if any, is left out.
+        G(t) is the relaxation modulus of the spectrum, h the damping. The stress of `equilibrium` is left out.
 
         Args:
             rate: shear rate, 1/time, positive.
-            times: times since the start of the shear, shape (n,), positive.
+            times: times t since the start of the shear, shape (n,), positive.
 
         Returns:
             Shear stress, shape (n,), stress.
@@ -218,7 +225,7 @@ class KBKZ(Relaxing):
         return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses of a step to (l1, l2), shape (2, ...)."""
+        """Return the two nominal stresses after a sudden stretch (l1, l2), shape (2, ...)."""
         if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
         squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
@@ -226,7 +233,7 @@ class KBKZ(Relaxing):
         return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the sudden stretch with the largest stress h (B_11 - B_33).
+        """Return the sudden stretch with the largest true stress.
 
         A larger sudden stretch carries no more stress: a damped melt that is stretched faster than it relaxes thins
         without end.
@@ -244,19 +251,27 @@ class KBKZ(Relaxing):
         return float(l[falls[0]]) if len(falls) else np.inf
 
     def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
-        """Return tau_1 - tau_3 at the last of the times."""
+        """Return the true stress difference tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            times: times of the stretches, shape (n,).
+            stretches: stretches, shape (n,).
+            between: quantity with a constant rate between two times, "stretch" or "strain".
+        """
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
-        rested = self._modulus(now - times[0]) * self._strained(mode, last)
+        initial = self._modulus(now - times[0]) * self._strained(mode, last)
         ends = self._ages(times, stretches)
         half = np.diff(ends)[:, None] / 2
-        age = (ends[:-1, None] + half * (1 + _NODES))
+        age = ends[:-1, None] + half * (1 + _NODES)
         memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
-        relative = last / _between(now - age, times, stretches, between)
-        return float(rested + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
+        relative = last / _interpolated(now - age, times, stretches, between)
+        return float(initial + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
 
     def _ages(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return ascending elapsed times t - t', from 0, between which the memory integral's integrand is smooth."""
+        """Return ends of the panels of the memory integral of a test, as ages before its last time, ascending from 0.
+        """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANELS)) + 1)
         ages = [np.array([0, whole]), shortest / 2 * _PANELS ** np.arange(count), times[-1] - times]
@@ -268,7 +283,7 @@ class KBKZ(Relaxing):
         return found[found <= whole]
 
     def _strained(self, mode: str, stretch: np.ndarray) -> np.ndarray:
-        """Return h (B_11 - B_33) of a stretch."""
+        """Return h (B_11 - B_33) after a sudden stretch in a mode, of the shape of `stretch`."""
         square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
         difference = square[..., 0] - square[..., 2]
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
@@ -282,8 +297,8 @@ class KBKZ(Relaxing):
     __repr__ = __str__
 
 
-def _between(at: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
-    """Return the stretches of a history at these times."""
+def _interpolated(t: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
+    """Return the stretches of a test at times t; "stretch" or "strain" (`between`) is linear between its times."""
     if between == "stretch":
-        return np.interp(at, times, stretches)
-    return np.exp(np.interp(at, times, np.log(stretches)))
+        return np.interp(t, times, stretches)
+    return np.exp(np.interp(t, times, np.log(stretches)))

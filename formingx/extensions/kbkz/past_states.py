@@ -1,4 +1,4 @@
-"""The past states of a material whose stress is an integral over them, at the quadrature points of the energy."""
+"""Past states of a material whose stress is an integral over them (`KBKZ`), at the quadrature points of the energy."""
 
 from __future__ import annotations
 
@@ -18,41 +18,43 @@ from ...forms.history import Start
 from ...materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from ...ranks import gathered
 
-_NOTHING = 3e-7
-"""Relative error of the present stress up to which interpolation between its neighbours replaces a past state.
+_NEGLIGIBLE = 3e-7
+"""Relative error of the present stress up to which a past state is dropped and interpolated from its neighbours.
 
 In a fine run of a thousand states the errors add up to 3e-4 of the stress (with 3e-6 to 4e-3).
 """
 
 
 class Past(NamedTuple):
-    """A past state at n points of the cells of this rank.
+    """Past state of a material at n quadrature points of the cells of this rank.
 
     Attributes:
-        felt: reduced time of the material until then, a number or shape (n,).
-        C: entries of Cbar, shape (4, n).
+        reduced_time: reduced time of the material at that state, a number or shape (n,).
+        C: entries 11, 22, 12, 33 of Cbar = J^(-2/3) C at that state, shape (4, n).
     """
 
-    felt: Any
+    reduced_time: Any
     C: np.ndarray
 
 
 class StoredStates(NamedTuple):
-    """History variables of a material with past states.
+    """History variables of a material with an integral over K past states at n points.
 
     Attributes:
         time: process time of the last accepted state.
-        states: the states up to it.
-        least: smallest h of each state since then, shape (K, n), or None.
+        states: the past states, up to the last accepted one.
+        smallest_h: smallest damping h that each past state has had since then, shape (K, n), or None.
     """
 
     time: float
     states: tuple[Past, ...]
-    least: np.ndarray | None
+    smallest_h: np.ndarray | None
 
 
 class PastStates:
-    """History variables of a material with past states; `refresh` updates its coefficients in the forms.
+    """Past states of one material in a run, as a `formingx.forms.history.History`.
+
+    `refresh` updates the coefficients of the stress in the forms.
 
     Args:
         forms: the `Formulation`.
@@ -72,23 +74,23 @@ class PastStates:
         self._C = at_points(ufl.as_vector(isochoric(forms.elastic_F)))
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
         rows = {name: f.function_space.dofmap.list[self._own].ravel() for name, f in terms.past_integrals.items()}
-        self._held = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name])
+        self._coefficients = [(f.x.array.reshape(-1, int(np.prod(f.ufl_shape))), rows[name])
                       for name, f in terms.past_integrals.items()]
-        self._seen: tuple[Any, Any] | None = None
+        self._refreshed: tuple[Any, Any] | None = None
         self.start()
 
     def start(self) -> None:
-        """Store the undeformed state as the only past state."""
+        """Store the undeformed state at time 0 as the only past state."""
         rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
         self.put(StoredStates(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """Reset the motion of the last step, so it predicts nothing of the next one."""
+        """Forget the last step, so that the next one is integrated without a parabola through it."""
         self._before = 0.0
-        self._seen = None
+        self._refreshed = None
 
     def get(self) -> StoredStates:
-        """Return the past states.
+        """Return the past states up to the last accepted state.
 
         Returns:
             The history variables.
@@ -99,62 +101,66 @@ class PastStates:
         """Set the past states.
 
         Args:
-            memory: the history variables.
+            memory: result of `get`.
         """
         self._memory, self._terms.start.value = memory, memory.time
-        felt = np.array([state.felt for state in memory.states])
+        times = np.array([state.reduced_time for state in memory.states])
         self._past = np.array([state.C for state in memory.states])
-        self._weights = self._law.weights(felt[-1] - felt)
-        self._before = felt[-1] - felt[-2] if len(felt) > 1 else 0.0       # with C, how the body moves
-        self._near = 1.0 if len(felt) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
-        self._seen = None
+        self._weights = self._law.weights(times[-1] - times)
+        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # with C, how the body moves
+        self._close = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
+        self._refreshed = None
 
     @np.errstate(over="ignore", invalid="ignore")                   # of a guess far back in time: no state
     def refresh(self) -> None:
-        """Update the coefficients of the forms to their present fields and time."""
+        """Update the coefficients of the stress in the forms to the present fields and time."""
         C, step, rate = self._now()
-        if self._seen and np.array_equal(self._seen[0], C) and np.array_equal(self._seen[1], step):
+        if self._refreshed and np.array_equal(self._refreshed[0], C) and np.array_equal(self._refreshed[1], step):
             return
-        W, slope = self._law.after(self._weights, step, self._before, self._near)
-        S, D, T = self._law.stress(C, self._past, W, slope, self._memory.least)
+        W, slope = self._law.after(self._weights, step, self._before, self._close)
+        S, D, T = self._law.stress(C, self._past, W, slope, self._memory.smallest_h)
         count = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
         T = T * rate
         S = count * (S - T * (self._forms.time_now - self._memory.time))
-        for (array, rows), values in zip(self._held, (S, C, (count[:, None] * D).reshape(16, -1), count * T),
+        for (array, rows), values in zip(self._coefficients, (S, C, (count[:, None] * D).reshape(16, -1), count * T),
                                          strict=True):
             array[rows] = values.T
-        self._seen = C, step
+        self._refreshed = C, step
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Add the state of the forms to the past states, and drop the states that are no longer needed.
+        """Add the present state of the forms to the past states, and drop states without effect on the stress.
 
         Args:
             x: unknowns of the state, locally owned entries.
             control: control of the state.
-            start: state at the beginning of the step, or None.
+            start: state at the start of the step, or None.
         """
         (C, step, _), memory = self._now(), self._memory
-        states, least = [*memory.states, Past(memory.states[-1].felt + step, C)], memory.least
-        if least is not None:
-            h = self._law.damped(C, self._past, least)[1]
-            least = np.concatenate([h, np.ones((1, self._n))])
+        states = [*memory.states, Past(memory.states[-1].reduced_time + step, C)]
+        smallest_h = memory.smallest_h
+        if smallest_h is not None:
+            h = self._law.damped(C, self._past, smallest_h)[1]
+            smallest_h = np.concatenate([h, np.ones((1, self._n))])
         time = self._forms.time_at(control)
-        if time == memory.time and len(states) > 2 and np.array_equal(states[-2].felt, states[-3].felt):
+        if time == memory.time and len(states) > 2 and np.array_equal(states[-2].reduced_time,
+                                                                      states[-3].reduced_time):
             chosen = [*range(len(states) - 2), len(states) - 1]             # between two jumps at one instant
         else:
-            chosen = self._needed(states, C, least)
-        self.put(StoredStates(time, tuple(states[k] for k in chosen), least if least is None else least[chosen]))
+            chosen = self._needed(states, C, smallest_h)
+        self.put(StoredStates(time, tuple(states[k] for k in chosen),
+                              None if smallest_h is None else smallest_h[chosen]))
 
     def carry(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
-        """Interpolate the past states on another mesh; collective.
+        """Interpolate the past states of a run on another mesh to this mesh; collective.
 
         Args:
-            source: history on the other mesh.
-            memory: its history variables.
+            source: past states on the other mesh.
+            memory: history variables there.
             x: unknowns of this problem, locally owned entries.
             control: control of the state.
-            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
+            mapping: function from reference points of the other mesh, shape (n, coordinates), to reference points of
+                this mesh.
 
         Returns:
             The history variables on this mesh.
@@ -164,37 +170,43 @@ class PastStates:
 
         def fitted(values: np.ndarray) -> np.ndarray:
             return carrier.fitted(values.T).T
-        states = tuple(Past(fitted(s.felt) if self._aT else s.felt, fitted_shapes(carrier, s.C.T, *F).T)
-                       for s in memory.states)
-        return StoredStates(memory.time, states, None if memory.least is None else fitted(memory.least))
+        states = tuple(Past(fitted(s.reduced_time) if self._aT else s.reduced_time,
+                            fitted_shapes(carrier, s.C.T, *F).T) for s in memory.states)
+        return StoredStates(memory.time, states, None if memory.smallest_h is None else fitted(memory.smallest_h))
 
     @cached_property
     def points(self) -> np.ndarray:
-        """Reference positions of the owned quadrature points, shape (n, coordinates), length."""
+        """Reference positions of the locally owned quadrature points, shape (n, coordinates), length."""
         X = self._forms.X
         where = _compat.compile_expression(X, self._terms.places)
         found = where.eval(self._forms.domain, self._own) if len(self._own) else np.zeros(0)
         return found.reshape(-1, X.ufl_shape[0])
 
-    def _needed(self, states: list[Past], C: np.ndarray, least: np.ndarray | None) -> list[int]:
-        """Return the numbers of the states without which the stress at C would change; collective."""
+    def _needed(self, states: list[Past], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
+        """Return the numbers of the past states to keep, without those that neighbours interpolate well; collective.
+
+        Args:
+            states: K past states, the last of them the present one.
+            C: entries of the present Cbar, shape (4, n).
+            smallest_h: smallest damping of each state so far, shape (K, n), or None.
+        """
         if len(states) < 5:
             return list(range(len(states)))
-        felt, past = np.array([s.felt for s in states]), np.array([s.C for s in states])
-        inverse, h, _, _ = self._law.damped(C, past, least)
-        W = self._law.after(self._law.weights(felt[-1] - felt), 0.0)[0]
+        times, past = np.array([s.reduced_time for s in states]), np.array([s.C for s in states])
+        inverse, h, _, _ = self._law.damped(C, past, smallest_h)
+        W = self._law.after(self._law.weights(times[-1] - times), 0.0)[0]
         g = h[:, None] * inverse                                            # of the stress of a state, (K, 4, n)
-        felt = felt.reshape(len(states), -1)
-        length = felt[2:] - felt[:-2]
-        share = np.where(length > 0, (felt[1:-1] - felt[:-2]) / np.where(length > 0, length, 1), 0.0)[:, None]
+        times = times.reshape(len(states), -1)
+        length = times[2:] - times[:-2]
+        share = np.where(length > 0, (times[1:-1] - times[:-2]) / np.where(length > 0, length, 1), 0.0)[:, None]
         deviation = W[1:-1, None] * (g[1:-1] - (1 - share) * g[:-2] - share * g[2:])
         deviation, total = (deviator_squared(entries(C), entries(np.moveaxis(S, -2, 0)))
                       for S in (deviation, np.sum(W[:, None] * g, axis=0)))
         comm = self._forms.comm
         squares = comm.allreduce(np.array([*np.sum(deviation, axis=1), np.sum(total)]), MPI.SUM)
-        jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(felt, axis=0) <= 0, axis=1)]).astype(int),
+        jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(times, axis=0) <= 0, axis=1)]).astype(int),
                               MPI.SUM)                                      # a state that begins or ends one is needed
-        small = squares[:-1] < _NOTHING**2 * squares[-1]
+        small = squares[:-1] < _NEGLIGIBLE**2 * squares[-1]
         chosen, left_out = [0], False
         for k in range(1, len(states) - 1):
             left_out = bool(k < len(states) - 2 and small[k - 1] and not left_out and not jump[k] and not jump[k + 1])
@@ -203,7 +215,8 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _now(self) -> tuple[np.ndarray, Any, Any]:
-        """Return (Cbar, reduced time since the last state, reduced time per time)."""
+        """Return entries of Cbar, shape (4, n), reduced time since the last state, and reduced time per process time.
+        """
         step: Any = self._forms.time_now - self._memory.time
         rate: Any = 1.0
         if not len(self._own):
@@ -215,31 +228,31 @@ class PastStates:
 
     @property
     def material(self) -> Any:
-        """The `Material`."""
+        """Material with these past states."""
         return self._terms.material
 
     def thinnest(self) -> tuple[float, np.ndarray]:
-        """Return the smallest stretch of the current fields; collective.
+        """Return the smallest principal stretch of the present fields; collective.
 
         Returns:
-            The stretch and its reference position, length.
+            The stretch; reference position of its point, shape (coordinates,), length.
         """
         C = self._now()[0]
         half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
-        least = np.minimum(half - apart, C[3])
-        k = int(np.argmin(least)) if len(least) else 0
-        mine = (float(least[k]), self.points[k].tolist()) if len(least) else (np.inf, [0.0, 0.0])
-        square, point = min(self._forms.comm.allgather(mine))
+        squares = np.minimum(half - apart, C[3])
+        k = int(np.argmin(squares)) if len(squares) else 0
+        local = (float(squares[k]), self.points[k].tolist()) if len(squares) else (np.inf, [0.0, 0.0])
+        square, point = min(self._forms.comm.allgather(local))
         return float(np.sqrt(square)), np.array(point)
 
     def save(self, memory: StoredStates) -> dict[str, Any]:
-        """Return past states as plain data, the same on all ranks; collective.
+        """Return the past states as plain data, the same on all ranks; collective.
 
         Args:
-            memory: the history variables.
+            memory: result of `get`.
 
         Returns:
-            The data.
+            Data for `load`.
         """
         numbers = gathered(self._forms.comm, self._numbers)
         order = np.argsort(numbers)
@@ -247,18 +260,19 @@ class PastStates:
         def of_all(values: np.ndarray) -> np.ndarray:
             each = values.reshape(-1, len(self._own), len(self._terms.places)).transpose(1, 0, 2)
             return gathered(self._forms.comm, each)[order]
-        states = [{"felt": of_all(s.felt) if self._aT else s.felt, "C": of_all(s.C)} for s in memory.states]
+        states = [{"felt": of_all(s.reduced_time) if self._aT else s.reduced_time, "C": of_all(s.C)}
+                  for s in memory.states]
         return {"time": memory.time, "cells": numbers[order], "states": states,
-                **({} if memory.least is None else {"least": of_all(memory.least)})}
+                **({} if memory.smallest_h is None else {"least": of_all(memory.smallest_h)})}
 
     def load(self, data: dict[str, Any]) -> StoredStates:
-        """Return the past states of this rank from the result of `save`.
+        """Return the past states of this rank from stored data.
 
         Args:
             data: result of `save`.
 
         Returns:
-            The history variables.
+            History variables for `put`.
 
         Raises:
             InputError: the data belong to another mesh or another material.
@@ -268,14 +282,14 @@ class PastStates:
         found = [(np.array(s["felt"], float), np.array(s["C"], float)) for s in data.get("states", [])]
         shape = len(numbers), 4, len(self._terms.places)
         if not np.array_equal(numbers[rows], self._numbers) or not found or any(
-                C.shape != shape or (felt.ndim > 0) != bool(self._aT) for felt, C in found) \
+                C.shape != shape or (time.ndim > 0) != bool(self._aT) for time, C in found) \
                 or ("least" in data) != self._law.irreversible:
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
 
         def own(values: np.ndarray) -> np.ndarray:
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)
-        states = tuple(Past(own(felt)[0] if self._aT else float(felt), own(C)) for felt, C in found)
-        least = own(np.array(data["least"], float)) if "least" in data else None
-        return StoredStates(float(data["time"]), states, least)
+        states = tuple(Past(own(time)[0] if self._aT else float(time), own(C)) for time, C in found)
+        smallest_h = own(np.array(data["least"], float)) if "least" in data else None
+        return StoredStates(float(data["time"]), states, smallest_h)
 
 

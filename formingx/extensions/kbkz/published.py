@@ -9,7 +9,7 @@ _LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), 
 
 @register_published
 def melts() -> dict[str, Published]:
-    """Return published constants of melts, in Pa and s.
+    """Return melts with published K-BKZ constants, in Pa and s.
 
     Returns:
         {name: `Published`}.

@@ -1,4 +1,4 @@
-"""Check of damped melts: draw of a part against the stretch with the largest stress."""
+"""Checks of damped melts, which thin without end beyond the stretch with the largest stress."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,21 +14,21 @@ from .past_states import PastStates
 
 @register("scene")
 def ruptures(body: Any) -> Iterator[Finding]:
-    """Find draws beyond the equibiaxial `rupture_stretch` of a material.
+    """Find draws of a sheet beyond the equibiaxial `rupture_stretch` of a material.
 
     Args:
-        body: the examined body.
+        body: the examined `formingx.checks.sizes.Body`.
 
     Yields:
-        A finding for each such material.
+        A warning for each such material and each cause of the stretch.
     """
     for name, material in body.scene.materials.items():
-        most = material.base.rupture_stretch("equibiaxial")
-        for about, stretch in expected_stretches(body) if np.isfinite(most) else ():
-            if stretch > most:
+        limit = material.base.rupture_stretch("equibiaxial")
+        for about, stretch in expected_stretches(body) if np.isfinite(limit) else ():
+            if stretch > limit:
                 yield Finding("warning", f"materials[{name!r}]",
                               f"{about} stretches it about {stretch:.3g}-fold in all directions, but stretched suddenly"
-                              f" it carries its largest stress at {most:.3g}: drawn faster than it relaxes, it thins"
+                              f" it carries its largest stress at {limit:.3g}: drawn faster than it relaxes, it thins"
                               f" without end at its thinnest place. Draw less deep, slower or hotter, or check the"
                               f" damping: one fitted to shear or uniaxial data is often too strong in equibiaxial"
                               f" extension")
@@ -36,28 +36,28 @@ def ruptures(body: Any) -> Iterator[Finding]:
 
 @register("failure")
 def thins(failure: Any) -> Iterator[Finding]:
-    """Find a damped melt that thins without end in the last good state; collective.
+    """Find a damped melt that thins without end in the last state of a failed run; collective.
 
     Args:
-        failure: the failed run.
+        failure: the failed run, with its `problem` and its `last` state.
 
     Yields:
-        A finding for each such material.
+        A finding for the place of largest equibiaxial stretch beyond `rupture_stretch`.
     """
     if failure.last is None:
         return
     problem, drawn = failure.problem, None
     with problem.state_context(failure.last):
         for past in (history for history in problem.materials if isinstance(history, PastStates)):
-            most = past.material.base.rupture_stretch("equibiaxial")
-            least, point = past.thinnest()
-            if (stretch := least**-0.5) > max(most, drawn[0] if drawn else 0.0):
-                drawn = stretch, most, place(problem.scene.mesh, point[:COORDINATES])
+            limit = past.material.base.rupture_stretch("equibiaxial")
+            smallest, point = past.thinnest()
+            if (stretch := smallest**-0.5) > max(limit, drawn[0] if drawn else 0.0):
+                drawn = stretch, limit, place(problem.scene.mesh, point[:COORDINATES])
     if drawn is not None:
-        stretch, most, where = drawn
+        stretch, limit, where = drawn
         yield Finding("serious", "rupture",
                       f"the sheet thins without end at {where}: it is as thin there as at an equibiaxial stretch of"
-                      f" {stretch:.3g}, and stretched suddenly this material carries its largest stress at {most:.3g};"
+                      f" {stretch:.3g}, and stretched suddenly this material carries its largest stress at {limit:.3g};"
                       f" beyond there is no equilibrium",
                       "a shallower draw, a slower or hotter process, or another damping function: one fitted to shear"
                       " or uniaxial data is often too strong in equibiaxial extension")
