@@ -20,6 +20,7 @@ MATERIALS = {"gent": fx.Gent(mu=0.2, Jm=25.0), "neo_hooke": fx.NeoHookean(c10=0.
              "mooney": fx.MooneyRivlin(c10=0.09, c01=0.01)}
 MOULD = fx.tools.bottle(radius=BODY, height=45.0, neck=14.0, shoulder=24.0, neck_height=44.0, base=-28.0, fillet=12.0,
                         shoulder_fillet=12.0)
+TITLES = {"gent": "Gent", "neo_hooke": "neo-Hookean", "mooney": "Mooney-Rivlin"}
 FILLED = (0.2, 0.5, 0.8)                                     # of the volume in the end, to draw
 
 
@@ -52,7 +53,7 @@ def main():
                          "evenness": part.uniformity, "content_ml": part.capacity / 1000, **cost(path)}
         say(f"{name}: blown {summary[name]['blow_ratio']:.2f} to 1, minimum wall {part.min_wall:.3f} mm, evenness"
             f" {part.uniformity:.3f}, limit pressures {summary[name]['limit_pressure_MPa']}, {len(path)} states")
-        label = name.replace("_", "-")
+        label = TITLES[name]
         if name == "gent":
             full = path["enclosed_volume"][-1]
             for part_full in FILLED:
@@ -66,7 +67,7 @@ def main():
         wall = path.wall()
         walls.plot(wall.height, wall.wall, color=f"C{k}", label=label)
         pressures.plot(path["enclosed_volume"] / 1000, path["pressure"], color=f"C{k}", label=label)
-    sections.set(xlabel="r, mm", ylabel="z, mm", aspect="equal", title="blown: Gent", ylim=(-32, 62))
+    sections.set(xlabel="r, mm", ylabel="z, mm", aspect="equal", title="Gent", ylim=(-32, 62))
     walls.set(xlabel="height, mm", ylabel="wall, mm", ylim=(0, None))
     pressures.set(xlabel="volume blown, ml", ylabel="pressure, MPa", ylim=(0, 0.12))
     walls.legend(frameon=False)

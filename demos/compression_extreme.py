@@ -15,7 +15,7 @@ and 0.85 to 1.18 "stuck" gives 374 and 381 kN). A new mesh takes away what the o
 """
 
 import numpy as np
-from common import parser, save, say, summarise
+from common import parser, plain_ticks, save, say, summarise
 from compression_homogeneous import I1_CONSTANT, exact_force
 from plates import HALF_HEIGHT, NEWTON, block, force, press
 
@@ -99,6 +99,7 @@ def draw(paths):
         axes.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"][1:]), NEWTON * path["tool_force"][1:], mark,
                   fillstyle="none", markersize=4, linewidth=1, label=label)
     axes.set(xlabel="compression ratio H / h", ylabel="force on one plate, N", xscale="log", yscale="log")
+    plain_ticks(axes.xaxis, (1, 2, 5, 10, 20))
     axes.legend(frameon=False)
     return figure
 

@@ -58,7 +58,7 @@ def main():
     say("stick over Lindley: " + "  ".join(f"{d}: {v:.4f}" for d, v in summary["stick_over_lindley"].items()))
     figure, axes = plots.figure(width=6.2)
     for name, path in curves.items():
-        axes.plot(2 * path["travel"], NEWTON * path["tool_force"], ".-", label=name)
+        axes.plot(2 * path["travel"], NEWTON * path["tool_force"], ".-", label=name.replace("mu_", "$\\mu$ = "))
     fine = np.linspace(0, DEFLECTIONS[-1], 100)
     axes.plot(fine, lindley(fine), "k--", label="Lindley (7.9)")
     axes.plot(fine, tanner(fine), "k:", label="Tanner (7.11)")

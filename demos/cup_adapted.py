@@ -85,8 +85,8 @@ def draw(runs, walls, truth, last):
     left.set(xlabel="columns of elements", ylabel="minimum wall / original",
              title=f"wall beside the corner, {last} psi",
              xscale="log")
-    right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="finest meshes",
-              yscale="log")
+    right.set(xlabel="reference radius R, cm", title="finest meshes", yscale="log",
+              ylabel="length of a column in the reference configuration, cm")
     plain_ticks(left.xaxis, (*UNIFORM, REFERENCE))
     plain_ticks(right.yaxis, (0.05, 0.1, 0.2, 0.5))
     for axes in (left, right):

@@ -74,11 +74,11 @@ def main():
                 label = f"stretch of the pole {case:g}" if of == "h0" else f"wall {case:g} h0"
                 axes[int(part == "constant")].plot(R, found[name]["0"] * relative(answer.values["profile"], R), style,
                                               color=f"C{k}", label=label if model == "solid" else None)
-    axes[0].set_ylabel("thickness at rest over that of the even wall")
-    axes[1].set_ylabel("constant over that at the pole")
+    axes[0].set_ylabel("thickness of the sheet / even wall")
+    axes[1].set_ylabel("constant C / C at the pole")
     for one in axes:
-        one.set_xlabel("R / R0")
-        one.legend(title="solid (lines), membrane (dashed)")
+        one.set_xlabel("reference radius R / R$_0$")
+        one.legend(title="solid (membrane: dashed)")
     save(drawing, args.out / "even_disc.png")
     summarise(args.out, summary)
 

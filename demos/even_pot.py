@@ -73,11 +73,11 @@ def main():
         f" {'after ' + str(reached) + ' runs' if reached else 'was not reached'}")
     drawing, axes = figure(2)
     answer.plot_wall(axes[0])
-    axes[0].set(xlabel="R", ylabel="wall")
+    axes[0].set(xlabel="reference radius R, cm", ylabel="wall, cm")
     axes[1].plot(range(1, len(answer.runs) + 1), [one.wall[answer.inside].std() / one.wall[answer.inside].mean()
                                                   for one in answer.runs], "C0o-", label="with derivatives")
     axes[1].plot(range(1, len(found) + 1), np.minimum.accumulate(found), "0.5", label="Nelder and Mead")
-    axes[1].set(xlabel="runs", ylabel="cv of the wall", ylim=(0, None))
+    axes[1].set(xlabel="runs", ylabel="standard deviation / mean of the wall", ylim=(0, None))
     axes[1].legend()
     save(drawing, args.out / "even_pot.png")
     values = {name: value.values.tolist() if name == "heat" else value for name, value in answer.values.items()}

@@ -87,9 +87,10 @@ def main():
         axes[k].plot(R, np.exp(profile(R) - (of == "C") * profile(1.0)) * (SHEET / mean if of == "h0" else 1), "C0")
         for name, at in wall.items():
             axes[k].axvline(at, color="0.8", linewidth=0.8)
-            axes[k].text(at, 0.02, f" {name}", rotation=90, fontsize=7, transform=axes[k].get_xaxis_transform(),
-                         ha="right")
-        axes[k].set(xlabel="R", ylabel="h0 / h" if of == "h0" else "C over that at the rim", ylim=(0, None))
+            axes[k].text(at, 0.02, f" {name.replace('_', ' ')}", rotation=90, fontsize=9, ha="right",
+                         transform=axes[k].get_xaxis_transform())
+        axes[k].set(xlabel="reference position R / half width", ylim=(0, None),
+                    ylabel="thickness h$_0$ / even wall h" if of == "h0" else "constant C / C at the rim")
     save(drawing, args.out / "even_trough.png")
     summarise(args.out, {**summary, "elements_along": elements[0], "versions": files.versions()})
 

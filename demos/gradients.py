@@ -84,7 +84,7 @@ def draw(exact, whole, step):
     axes.plot(RADII, list(exact.values()), "C0.-", label="derivative of one run")
     axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")
     axes.axhline(0, color="0.6", linewidth=0.8)
-    axes.set(xlabel="reference radius R / R0", ylabel="d(wall / thickness at rest) / db",
+    axes.set(xlabel="reference radius R / R0", ylabel="d(wall / reference thickness) / db",
              title="wall of a stuck cup, C = 0.5 (1 + b (R² - 0.5))")
     axes.legend()
     return drawing

@@ -23,6 +23,8 @@ PULLED = {"uniaxial": ("top", "z"), "equibiaxial": ("rim", "r")}
 SHEET = [(0.10, 0.01), (0.06, 0.1), (0.03, 1.0), (0.012, 10.0), (0.004, 100.0)]
 DAMPINGS = {"psm_10_0.05": fx.PSM(alpha=10.0, beta=0.05), "wagner_0.1_0.15": fx.Wagner(alpha=0.1, beta=0.15),
             "wagner_0.1_0.3": fx.Wagner(alpha=0.1, beta=0.3)}
+TITLES = {"lodge": "Lodge, no damping", "wagner": "Wagner", "psm": "PSM", "psm_10_0.05": "PSM, 10, 0.05",
+          "wagner_0.1_0.15": "Wagner, 0.1, 0.15", "wagner_0.1_0.3": "Wagner, 0.1, 0.3"}
 MET, R_OVER_H, VOLUME = (0.5, 1.0, 3.0), 100.0, 2.0                               # s; R0/h0; of R0^3
 
 
@@ -86,8 +88,8 @@ def main():
                 ax.plot(fine, law.constant_rate(mode, rate, fine) * fine / 1e3, color=f"C{k}", lw=1,
                         ls="-" if rate == RATES[-1] else "--")
                 ax.plot(STRETCHES, np.array(list(found.values())) / 1e3, "o", color=f"C{k}", ms=4,
-                        label=melt if rate == RATES[-1] else None)
-            ax.set(xlabel="stretch", ylabel="$\\sigma_1-\\sigma_3$, kPa", title=f"{mode}: 1/s, dashed 0.1/s")
+                        label=TITLES[melt] if rate == RATES[-1] else None)
+            ax.set(xlabel="stretch", ylabel="$\\sigma_1-\\sigma_3$, kPa", title=f"{mode} (rate 1/s; dashed 0.1/s)")
         summary["largest_error_of_blocks"][melt] = max(off)
         say(f"{melt}: blocks within {100 * max(off):.3f} % of the integrals")
     for damping in DAMPINGS:
@@ -96,9 +98,9 @@ def main():
         say(f"disc, {damping}: p R0/h0 " + ", ".join(f"{v:.5f}" for v in found["p_R0_over_h0"].values())
             + " MPa, pole " + ", ".join(f"{v:.4f}" for v in found["pole_thickness_ratio"].values())
             + f" at {', '.join(found['p_R0_over_h0'])} s; {path.counts.steps} steps")
-        axes[2].plot(path["process_time"], R_OVER_H * path["pressure"], label=damping)
+        axes[2].plot(path["process_time"], R_OVER_H * path["pressure"], label=TITLES[damping])
     axes[0].legend(frameon=False)
-    axes[2].set(xlabel="time, s", ylabel="p R0/h0, MPa", title="discs", ylim=(0, None))
+    axes[2].set(xlabel="time, s", ylabel="p R$_0$/h$_0$, MPa", title="inflated discs", ylim=(0, None))
     axes[2].legend(frameon=False)
     save(figure, args.out / "kbkz.png")
     summarise(args.out, summary | {"accuracy": accuracy, "versions": files.versions()})

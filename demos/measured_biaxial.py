@@ -99,10 +99,12 @@ def picture(out, best, law):
             for material, style in zip(best[rubber, law], ("--", "-")):
                 for p in material.stress("biaxial", np.stack([fine, np.full(50, held)])):
                     ax.plot(fine, p, style, color=f"C{k}", lw=1)
-        ax.set(xlabel="stretch 1", ylabel="nominal stress, MPa",
-               title=f"{rubber}: {law} from the uniaxial test (dashed), fitted")
-        ax.set_ylim(0, 1.2 * np.nanmax(np.append(P1, P2)))
-        ax.title.set_fontsize("small")
+        ax.set(xlabel="stretch 1, a colour for each stretch 2", ylabel="nominal stress, MPa", title=rubber,
+               ylim=(0, 1.2 * np.nanmax(np.append(P1, P2))))
+    for style, label in (("o", "stress 1, measured"), ("s", "stress 2, measured"),
+                         ("--", f"{law}, fitted to the uniaxial test"), ("-", f"{law}, fitted to the biaxial test")):
+        axes[0].plot([], [], style, color="0.3", ms=3, lw=1, mfc="none" if style == "s" else None, label=label)
+    axes[0].legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0.0, 1.0))
     save(figure, out / "measured_biaxial.png")
 
 

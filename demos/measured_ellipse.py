@@ -29,6 +29,8 @@ def softening(n):
 
 LAWS = {"neo_hookean": fx.NeoHookean(c10=1.0), "mooney_0.3": fx.MooneyRivlin(c10=0.7, c01=0.3),
         "hencky": fx.Ogden(mu=[40.0], alpha=[0.05]), "power_0.8": softening(0.8), "power_0.6": softening(0.6)}
+TITLES = {"neo_hookean": "neo-Hookean", "mooney_0.3": "Mooney-Rivlin, 0.3", "hencky": "Hencky",
+          "power_0.8": "power 0.8", "power_0.6": "power 0.6"}
 
 
 def film(size):
@@ -97,10 +99,11 @@ def draw(path, rows, file):
     figure.colorbar(lines, ax=axes[0])
     for k, (law, places) in enumerate(rows.items()):
         for name, mark in (("e1", "o"), ("e2", "^")):
-            axes[1].plot(list(places), [p[name] for p in places.values()], mark, color=f"C{k}", fillstyle="none",
-                         label=f"{law.replace('_', ' ')}" if name == "e1" else None)
+            axes[1].plot([place.replace("_", ", ") for place in places], [p[name] for p in places.values()], mark,
+                         color=f"C{k}", fillstyle="none",
+                         label=TITLES[law] if name == "e1" else None)
     axes[1].tick_params(axis="x", rotation=60)
-    axes[1].set(xlabel="place x_y, mm", ylabel="Hencky strain across (circles) and along", ylim=(0, None))
+    axes[1].set(xlabel="point x, y, mm", ylabel="Hencky strain across (circles), along (triangles)", ylim=(0, None))
     axes[1].legend(frameon=False, loc="center left")
     save(figure, file)
 

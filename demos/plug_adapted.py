@@ -115,7 +115,8 @@ def draw(ran):
         right.stairs(np.diff(ends), ends, baseline=None, color=f"C{k}", label=f"{label}: {len(ends) - 1} columns")
     left.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force (dashed: membrane)", xlim=(0, None),
              ylim=(0, None))
-    right.set(xlabel="reference radius R, cm", ylabel="length of a column at rest, cm", title="meshes", yscale="log")
+    right.set(xlabel="reference radius R, cm", title="meshes", yscale="log",
+              ylabel="length of a column in the reference configuration, cm")
     right.axvline(PLUG, color="0.7", linewidth=1)
     for axes in (left, right):
         axes.grid(alpha=0.3)

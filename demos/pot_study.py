@@ -68,7 +68,10 @@ def main():
     workers = args.workers or os.cpu_count()
     say(str(found), f"in {seconds:.1f} s by {workers} at a time, {spent:.1f} s of processors")
     design = found.best
-    found.plot_effects("evenness").savefig(args.out / "effects.png", dpi=150)
+    effects = found.plot_effects("evenness")
+    for axes, label in zip(effects.axes, ("travel of the plug, mm", "radius of the plug, mm", "friction of the plug")):
+        axes.set_xlabel(label)
+    save(effects, args.out / "effects.png")
     save(found.plot_pareto("evenness", "plug_force"), args.out / "pareto.png")
     if not args.quick:
         found.refine(evaluations=args.search)

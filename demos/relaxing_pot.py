@@ -93,7 +93,7 @@ def draw(paths, found):
     for name, path in paths.items():
         if "vacuum" in {s.stage for s in path.states}:
             profile = path.profile(end_of(path, "vacuum"))
-            walls.plot(profile.reference_radius, profile.wall_ratio, label=name)
+            walls.plot(profile.reference_radius, profile.wall_ratio, label=f"{name} s" if "hold" in name else name)
     walls.set(xlabel="reference radius R, cm", ylabel="wall / original", ylim=(0, 1.02))
     walls.legend(frameon=False, fontsize="small")
     for k, (speed, holds) in enumerate(found.items()):
@@ -101,7 +101,7 @@ def draw(paths, found):
         for key, style in (("base", "o-"), ("corner", "s--")):
             bases.plot(np.maximum(at, 0.02), [n.get(key, np.nan) for n in holds.values()], style, color=f"C{k}",
                        label=f"{key}, {speed.removeprefix('speed_')} cm/s")
-    bases.set(xlabel="hold time, tau (0 at 0.02)", ylabel="thickness / original", xscale="log", ylim=(0, None))
+    bases.set(xlabel="hold time, s (0 is drawn at 0.02 s)", ylabel="thickness / original", xscale="log", ylim=(0, None))
     bases.legend(frameon=False, fontsize="small")
     return figure
 

@@ -60,9 +60,11 @@ def main():
                                                      "steps": path.counts.steps}
             say(f"{mode}, G = {modulus}: {found['stretch']:.6f}, exact {found['exact']:.6f},"
                 f" {found['steps']} steps")
-            axes.plot(modulus, found["stretch"], "o", color=line.get_color())
+            axes.plot(modulus, found["stretch"], "o", color=line.get_color(),
+                      label=f"{mode}, computed" if modulus == MODULI[0] else None)
     axes.axhline(DRAWN, color="0.6", lw=0.8)
-    axes.set(xlabel="G of what has set, MPa (the rubber: 2)", ylabel="stretch that is left of 1.5", xscale="log")
+    axes.set(xlabel="shear modulus of the glass, MPa (rubber: 2 MPa)", xscale="log",
+             ylabel="stretch after the release (drawn to 1.5)")
     axes.legend(frameon=False)
     save(figure, args.out / "set_block.png")
     summarise(args.out, summary | {"versions": files.versions()})

@@ -7,6 +7,8 @@ import formingx as fx
 from formingx.exact.heat import Slab
 from formingx.figures import figure
 
+TITLES = {"convection": "air, 200 °C", "two_sides": "air, 220 and 80 °C", "radiation_400_400": "heaters, 400 °C",
+          "radiation_450_350": "heaters, 350 and 450 °C", "absorbed": "absorbed in the depth"}
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # W/(m K), kg/m3, J/(kg K)
 
 
@@ -53,13 +55,21 @@ def draw(runs, file, columns, between):
     drawing, axes = figure(columns, width=4.4, height=4.0, rows=-(-(len(runs) + 1) // columns))
     for a, (title, run) in zip(axes, runs.items()):
         run.plot_through(scale=1e3, axes=a)
-        a.set(title=title, xlabel="above the bottom face, mm")
+        a.set(title=_in_words(title), xlabel="above the bottom face, mm")
+        for line in a.lines:
+            line.set_label(line.get_label().removeprefix("t = "))
         between(a, title, run)
-        a.legend(frameon=False, fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+        a.legend(frameon=False, fontsize=9, ncols=6, loc="upper center", bbox_to_anchor=(0.5, -0.14), title="time, s",
+                 title_fontsize=9, handlelength=1.0, columnspacing=1.0)
     for k, (title, run) in enumerate(runs.items()):
         extremes = [[run.coldest(t).temperature for t in run.times], [run.hottest(t).temperature for t in run.times]]
-        axes[-1].plot(run.times, extremes[0], color=f"C{k}", label=title)
+        axes[-1].plot(run.times, extremes[0], color=f"C{k}", label=_in_words(title))
         axes[-1].plot(run.times, extremes[1], color=f"C{k}", linestyle="--")
-    axes[-1].set(title="coldest and hottest (dashed) place", xlabel="time, s", ylabel="temperature, °C")
-    axes[-1].legend(frameon=False, fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
+    axes[-1].set(title="coldest and hottest (dashed) point", xlabel="time, s", ylabel="temperature, °C")
+    axes[-1].legend(frameon=False, fontsize=9, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.14))
     save(drawing, file)
+
+
+def _in_words(title):
+    """Return the name of a run as the title of a plot."""
+    return TITLES.get(title, title)

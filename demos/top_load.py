@@ -58,13 +58,15 @@ def main():
             if f"n_{n}" in summary[name]:
                 there = summary[name][f"n_{n}"]
                 axes.plot(there["travel_cm"], there["force_N"], "o" if name == "plain" else "s", color=f"C{n}",
-                          label=f"n = {n}" if name == "plain" else None)
+                          label=f"buckles in {n} waves" if name == "plain" else None)
     summary = summary.pop("plain") | summary
     if "grooved" in summary:
         loads = [one[f"n_{one['first_n']}"]["force_N"] for one in (summary, summary["grooved"])]
         summary["groove_gains"] = loads[1] / loads[0] - 1
         say(f"the groove changes the first buckling load by {100 * summary['groove_gains']:.1f} %")
-    axes.set(xlabel="travel (cm)", ylabel="force (N)", ylim=(0, None))
+    axes.set(xlabel="travel, cm", ylabel="force, N", ylim=(0, None))
+    if "grooved" in found:
+        axes.set_title("circles: plain bottle, squares: grooved", fontsize="medium")
     axes.legend(frameon=False, fontsize=8)
     save(drawing, options.out / "top_load.png")
     if not options.quick:

@@ -64,10 +64,12 @@ def main():
             inside = np.mean((values > band.low) & (values < band.high))
             summary["walls_inside_the_95_percent_band"] = float(inside)
             figure, axes = plots.figure(1, width=7)
-            for one in runs:
-                axes.plot(run.profile.reference_length, one.wall, color="0.8", lw=0.6)
+            for k, one in enumerate(runs):
+                axes.plot(run.profile.reference_length, one.wall, color="0.8", lw=0.6,
+                          label=None if k else f"{SAMPLES} samples")
             band.plot(axes, color="C0", label="wall of the run")
-            axes.set(ylim=(0, None))
+            axes.set(xlabel="reference length / radius of the cup", ylabel="wall / radius of the cup", ylim=(0, None))
+            axes.legend()
             save(figure, args.out / "uncertain_wall.png")
     run.report(args.out / "report.html", "A cup of uncertain constants", deviations=given)
     summarise(args.out, summary | {"versions": files.versions()})

@@ -75,9 +75,10 @@ def draw(paths):
             after = [s for s in path.states if s.stage == "recovery"]
             axes[1].plot([s.time - end for s in after], [INNER + s.measures["moved"] for s in after], style,
                          color=f"C{k}")
-    axes[0].set(xlabel="inner radius", ylabel="pressure, MPa", ylim=(0, None))
-    axes[0].legend(frameon=False, fontsize="small")
-    axes[1].set(xlabel="time after the release, s", ylabel="inner radius", xlim=(0, 20), ylim=(1, None))
+    axes[0].set(xlabel="inner radius / its first value", ylabel="pressure, MPa", ylim=(0, 1.25 * axes[0].get_ylim()[1]))
+    axes[0].legend(frameon=False, fontsize="small", ncols=2)
+    axes[1].set(xlabel="time after the release, s", ylabel="inner radius / its first value", xlim=(0, 20),
+                ylim=(1, None))
     return figure
 
 
