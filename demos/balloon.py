@@ -1,9 +1,9 @@
-"""A balloon that relaxes: blown up at a given air flow, or by a pressure that is held until it snaps.
+"""Inflate a balloon that relaxes: at a given flow of air, or under a constant pressure until it snaps.
 
-A thin solid sphere, R0/H0 = 100 (R0 to the middle of the wall), c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s.
-Flow: the air drives the volume from V0 to 27 V0, V0 = 4/3 pi R0^3, at q V0 per second, and holds it there. Pressure:
-put on at once and held, the balloon creeps until no state follows: the time has its maximum along the path, and the run
-ends there. Pressures as p R0/H0; stretches are those of the middle of the wall.
+A thin hollow sphere, R0/H0 = 100 (R0 to the middle of the wall), c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s.
+Flow: the volume grows from V0 = 4/3 pi R0^3 to 27 V0 at a rate of q V0 per second; then it is constant. Pressure: it is
+applied at once and stays constant, and the balloon creeps until no state follows. There the time has a maximum along
+the path, and the run ends. Pressures are given as p R0/H0; stretches are those of the middle of the wall.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""A bottle of more than three times the parison's radius: a material that stiffens beside two that hardly do.
+"""Blow a bottle of three times the parison's radius, of a material that stiffens and of two that hardly do.
 
-A closed parison (inner radius 10 mm, wall 3 mm, 60 mm long) is blown into a bottle of radius 33 mm, to 0.3 MPa; what
-touches the mould sticks. All have a shear modulus of 0.2 MPa: "gent" (Jm = 25: no state above I1 = 28), "neo_hooke" and
-"mooney" (c10 = 0.09, c01 = 0.01 MPa). Under the pressure the neo-Hookean tube has a maximum, past which it would bulge
-at one place without the mould. mm, MPa.
+A closed parison (inner radius 10 mm, wall 3 mm, 60 mm long) is blown into a bottle of radius 33 mm, to 0.3 MPa. The
+parison sticks to the mould. All materials have a shear modulus of 0.2 MPa: "gent" (Jm = 25: I1 stays below 28),
+"neo_hooke" and "mooney" (c10 = 0.09, c01 = 0.01 MPa). The pressure of the neo-Hookean tube has a maximum; beyond it the
+tube would bulge at one place if there were no mould. Lengths in mm, stresses in MPa.
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
-"""A flat sheet of 1 mm at 150 C laid on a cold tool that conducts: aluminium, syntactic foam, steel.
+"""Chill a hot sheet on a cold tool that conducts heat: aluminium, syntactic foam, steel.
 
-The tool is 20 mm thick, its back held at 30 C, the contact's conductance 1000 W/(m2 K); air at 25 C above. Each
-temperature is held against a Laplace transform of both bodies (formingx/exact/heat.py). SI units, C.
+The sheet is 1 mm thick and at 150 C. The tool is 20 mm thick, its back is kept at 30 C, and the contact has a
+conductance of 1000 W/(m2 K); above is air at 25 C. Each temperature is compared with a Laplace transform of sheet and
+tool (formingx/exact/heat.py). SI units, temperatures in C.
 """
 
 import numpy as np

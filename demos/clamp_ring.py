@@ -1,8 +1,9 @@
-"""Treloar's sheet gripped between two rings with rounded edges, clamped, and simply supported: what has a limit.
+"""Grip Treloar's sheet between two rings with rounded edges, and compare with a clamped and a supported rim.
 
-Neo-Hookean, c10 = 2.0 kg/cm2; opening of radius 1.25 cm, h0 = 0.082 cm; the rings' edges have a radius of h0 and no
-friction, and the sheet ends 2 h0 behind them, where its rim is held in the mean. Each on meshes of 30 n x 2 n elements,
-small at the rim; lengths in cm, stresses in kg/cm2. The peak is that of the largest principal stress.
+The question is for which rim the stress converges. Neo-Hookean, c10 = 2.0 kg/cm2; opening of radius 1.25 cm,
+h0 = 0.082 cm. The edges of the rings have the radius h0 and no friction. The sheet ends 2 h0 behind them, where the
+mean displacement of its rim is constrained. Each case is run on meshes of 30 n x 2 n elements, small at the rim. The
+peak is the largest principal stress at the rim. Lengths in cm, stresses in kg/cm2.
 """
 
 import logging

@@ -1,16 +1,17 @@
-"""A plug-assisted pot, its plug cold: which of relaxation, chill and friction makes the thick base?
+"""Form a pot with a cold plug: does relaxation, chill or friction make its base thick?
 
-A sheet of 1.2 mm at 150 C, clamped at 45 mm, is pushed to 80 % of the depth by a plug with a round nose (a ball of
-20 mm) in 1 s, then sucked into the mould in 0.3 s (mouth radius 40 mm, base 25, depth 70, fillets 4 and 2; what touches
-the mould sticks; the mould takes no heat). The sheet relaxes, an equilibrium modulus of 0.04 MPa and a branch of
-0.16 MPa and 0.5 s, all at 150 C: colder it is stiffer, by a table, and relaxes more slowly, by Arrhenius' law. Friction
-of the plug is 0.6 at 150 C, 0.3 at 100, 0.15 at 20 (a table). The numbers are of the size that polystyrene has, not of
-one grade.
+A sheet of 1.2 mm at 150 C is clamped at a radius of 45 mm. A plug with a round nose (a ball of 20 mm) pushes it to 80 %
+of the depth in 1 s; then vacuum draws it into the mould in 0.3 s. The mould has a mouth radius of 40 mm, a base of 25
+mm, a depth of 70 mm and fillets of 4 and 2 mm. The sheet sticks to the mould, which takes no heat. At 150 C the sheet
+has an equilibrium modulus of 0.04 MPa and a branch of 0.16 MPa and 0.5 s. On cooling it stiffens, by a table, and
+relaxes more slowly, by Arrhenius' law. The friction of the plug is 0.6 at 150 C, 0.3 at 100 and 0.15 at 20 (a table).
+The numbers have the size of those of polystyrene, but are of no particular grade.
 
-Plugs at 30, 100 and 150 C that take heat through a contact of 0, 200 and 1000 W/(m2 K), where and while they touch;
-then, for a plug at 30 C, with and without relaxation (an elastic sheet of the same instantaneous modulus), chill and
-friction: eight runs. Beside them straight vacuum. Base, corner and minimum wall are over the thickness of the sheet. In
-parallel processes, or with mpirun over the ranks. Lengths in mm, stresses in MPa, W, s, degrees Celsius.
+Plugs at 30, 100 and 150 C take heat through a contact of 0, 200 and 1000 W/(m2 K), where and while they touch. Then
+eight runs, for a plug at 30 C, have each of relaxation, chill and friction or not; a sheet without relaxation is
+elastic and has the same instantaneous modulus. Straight vacuum is run for comparison. Base, corner and minimum wall are
+given over the thickness of the sheet. The runs are made in parallel processes, or with mpirun over the ranks. Lengths
+in mm, stresses in MPa, heat in W, times in s, temperatures in C.
 """
 
 import numpy as np

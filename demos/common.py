@@ -1,4 +1,4 @@
-"""What every demo needs: its options, its folder, rank-0 output."""
+"""Options, output folder and messages that all demos share."""
 
 import argparse
 import os

@@ -1,17 +1,20 @@
-"""Blocks pressed 20 times flatter without friction, and some 7 times flatter stuck (Song 1993, chapter 7).
+"""Press blocks 20 times flatter without friction, and 8 times flatter stuck (Song 1993, chapter 7).
 
 Without friction: the neo-Hookean block of `compression_homogeneous`, whose exact force is eq. (7.6). At H/h = 20 the
-wall is a 20th and the area 20 times what they were, so the plate is held by present area and wall
-(`Contact(present_area=True)`); by the penalty of the block at rest it would sink in by 2 % of the wall and more.
+area is 20 times, and the height a 20th, of the first values. The plate therefore has a penalty by present area and
+height (`Contact(present_area=True)`); with a penalty by the reference values the block would penetrate it by 2 % of its
+height and more.
 
-Stuck: the block of `compression_roll_over`, whose elements at the corner that rolls in are crushed from H/h = 4 on:
-where the volume ratio at a quadrature point leaves 0.8 to 1.2, the deformed body becomes the reference of a new mesh
-(`trace(remesh=)`). "stuck": elements of 0.025 cm, "stuck_coarse": twice as large. The pressure, up to 60 times the
-shear modulus, changes within an element by more than that modulus: each point's volume is held besides
-(`MixedPressure(volume_stiffness=10)`). Beside 64 x 32 elements that are never remeshed (95,557 N at 5.23, 190,689 N at
-6.5), "stuck" is 0.2 and 0.6 % too stiff, "stuck_coarse" 0.6 and 1.1 %; at 8 they give 379 and 388 kN (with 0.8 to 1.25
-and 0.85 to 1.18 "stuck" gives 374 and 381 kN). A new mesh takes away what the old one was too stiff by (`jumps`): up to
-0.27 % of the force on the fine one, 0.76 % on the coarse one.
+Stuck: the block of `compression_roll_over`. From H/h = 4 on, its elements at the corner that rolls in are crushed.
+Where the volume ratio at a quadrature point leaves 0.8 to 1.2, the deformed body becomes the reference of a new mesh
+(`trace(remesh=)`). "stuck" has elements of 0.025 cm, "stuck_coarse" twice as large ones. The pressure, up to 60 times
+the shear modulus, changes within an element by more than that modulus. Each point therefore has a volume stiffness,
+too (`MixedPressure(volume_stiffness=10)`).
+
+On 64 x 32 elements without remeshing the force is 95,557 N at 5.23 and 190,689 N at 6.5. "stuck" is 0.2 and 0.6 % above
+these, "stuck_coarse" 0.6 and 1.1 %. At 8 they give 379 and 388 kN; with ranges of 0.8 to 1.25 and 0.85 to 1.18 "stuck"
+gives 374 and 381 kN. A new mesh lowers the force, because the old one was too stiff (`jumps`): by up to 0.27 % on the
+fine mesh and 0.76 % on the coarse one.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""A block between plates without friction: the exact solution (Song 1993, section 7.3.1, table 7.1).
+"""Press a block between plates without friction, and compare with the exact solution (Song 1993, section 7.3.1).
 
-Neo-Hookean, I1 constant 0.10 MPa; R0 = 1.32 cm, H = 1.25 cm, pressed to h = 0.3288 cm. Eqs. (7.6), (7.7).
+Neo-Hookean, I1 constant 0.10 MPa; R0 = 1.32 cm, H = 1.25 cm, pressed to h = 0.3288 cm. Eqs. (7.6), (7.7), table 7.1.
 """
 
 import numpy as np

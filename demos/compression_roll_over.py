@@ -1,4 +1,4 @@
-"""A stuck block whose side rolls onto the plates (Song 1993, section 7.3.3, figs. 7.4 to 7.10).
+"""Press a stuck block whose side rolls onto the plates (Song 1993, section 7.3.3, figs. 7.4 to 7.10).
 
 I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the thesis' 64 triangles and finer grids.
 """

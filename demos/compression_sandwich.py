@@ -1,7 +1,8 @@
-"""A stuck sandwich block: a strip ten times as stiff in its middle (Song 1993, section 7.4, figs. 7.12 and 7.13).
+"""Press a stuck block with a strip ten times as stiff in its middle (Song 1993, section 7.4, figs. 7.12, 7.13).
 
-I1 and I2 constants 1.0, 0.1 MPa outside and 10.0, 1.0 MPa inside. The strip's height is not printed: 0.3125 cm of the
-half height here. Beside it the block of one material, with roll-over and with a side that the plates do not touch.
+The I1 and I2 constants are 1.0 and 0.1 MPa outside, 10.0 and 1.0 MPa inside. The height of the strip is not printed: it
+is 0.3125 cm of the half height here. The block of one material is run for comparison, with and without plates that its
+side may touch.
 """
 
 from common import parser, save, say, summarise

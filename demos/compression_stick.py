@@ -1,7 +1,7 @@
-"""A block between plates with stick and friction, against Lindley and Tanner (Song 1993, section 7.3.2, fig. 7.3).
+"""Press a block with stick and friction, against formulas of Lindley and Tanner (Song 1993, section 7.3.2).
 
-I1 constant 1.0 MPa, I2 constant 0.1 MPa (chapter 7 reads C01 as the I1 constant), and the other reading. Total
-deflection is 2 (H - h). Stuck, with roll-over the side may lie down on the plates.
+I1 constant 1.0 MPa, I2 constant 0.1 MPa (chapter 7 takes C01 as the I1 constant), and the other way round. The total
+deflection is 2 (H - h). If stuck, the side of the block may roll onto the plates (fig. 7.3).
 """
 
 import numpy as np

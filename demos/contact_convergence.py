@@ -1,4 +1,4 @@
-"""Newton's method just before and just after a touch (Song 1993, section 5.3, fig. 5.7), in the cup of demos/cup.py."""
+"""Show Newton's method just before and just after first contact, in the cup of demos/cup.py (Song 1993, fig. 5.7)."""
 
 import cup
 from common import parser, save, say, summarise

@@ -1,4 +1,4 @@
-"""Pressure forming of a sheet into a shallow cup, with three friction laws (Song 1993, section 5.3, figs. 5.2 to 5.4).
+"""Form a sheet into a shallow cup by pressure, with three laws of friction (Song 1993, section 5.3, figs. 5.2 to 5.4).
 
 Mooney, I1 constant 50 psi, I2 constant 15 psi (chapter 5 prints C01 = 50, C10 = 15: its C01 is the I1 constant);
 r0 = 10 cm, h0 = 0.3 cm, clamped; cup radius 10 cm, depth 5 cm, bottom fillet 1 cm. Lengths in cm, stresses in psi.

@@ -1,10 +1,10 @@
-"""The wall in the corner of a stuck cup: columns of one size, and columns as a pilot run asks for.
+"""Compute the wall in the corner of a stuck cup on columns of one size, and on columns adapted to a first run.
 
-The sheet and the cup of `cup` with a corner of an eighth of the thickness (0.0375 cm), stuck where it touches, to 160
-psi: the wall is least where the sheet comes last, beside the corner. A sticking point keeps its wall. The minimum
-wall therefore varies with the place of the nodes, by percents on columns of one size. `mesh.adapted` takes a run on 20
-columns and lets none turn by more than `share` radians as the sheet bends (or over a fillet that it lies on); each mesh
-is made by the run before. Lengths in cm, stresses in psi.
+The sheet and the cup of `cup`, but with a corner of an eighth of the thickness (0.0375 cm). The sheet sticks to the
+mould, to 160 psi. The wall is thinnest beside the corner, where contact comes last. A sticking point keeps its wall, so
+the minimum wall varies with the positions of the nodes, by percents on columns of one size. `mesh.adapted` takes a run
+on 20 columns. It chooses columns that turn by at most `share` radians as the sheet bends, or over a fillet on which it
+lies. Each mesh is made from the run on the one before. Lengths in cm, stresses in psi.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
-"""Vacuum forming of a deep cup: contact starts at the rim (Song 1993, section 5.3, figs. 5.5 and 5.6).
+"""Form a deep cup by vacuum; contact starts at the rim (Song 1993, section 5.3, figs. 5.5 and 5.6).
 
 Material and sheet as in demos/cup.py (Mooney, I1 constant 50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm,
-clamped); the thesis does not print the mould's size: depth 10 cm, draft 5 degrees, fillet 2 cm here. Lengths in cm,
-stresses in psi.
+clamped). The thesis does not print the size of the mould: depth 10 cm, draft 5 degrees, fillet 2 cm here. Lengths in
+cm, stresses in psi.
 """
 
 import numpy as np

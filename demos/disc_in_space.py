@@ -1,8 +1,8 @@
-"""Treloar's disc as a membrane in space, against the membrane of revolution (Adkins and Rivlin 1952).
+"""Inflate Treloar's disc as a three-dimensional membrane, against the membrane of revolution (Adkins, Rivlin 1952).
 
-Neo-Hookean, radius 1, a quarter of the disc in P1 triangles: states with the pole as high as the exact membrane has it
-at a pole stretch. Triangles that are flat are too stiff by the square of their size, so two sizes tell of what is
-left: extrapolated from 0.1 and 0.05, whose pressures are 1.2 and 0.3 % off at stretch 3, that is off by 1e-4.
+Neo-Hookean, radius 1, a quarter of the disc in linear triangles. Each state has the pole height of the exact membrane
+at a pole stretch. Flat triangles are too stiff, in proportion to the square of their size. So the pressures of two
+sizes are extrapolated: those of 0.1 and 0.05 are 1.2 and 0.3 % off at stretch 3, the extrapolated one 1e-4.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""Which wall a parison must have so that the bottle blown of it is even.
+"""Find the wall of a parison from which an even bottle is blown.
 
-Parison, mould, material and pressure of demos/parison.py; what touches sticks. The wall of the parison is a programme
-of 14 knots, equidistant on its inner meridian, linear between them, added to its outside. Wanted is the least standard
-deviation over mean (cv) of the bottle's wall, without the last 7 % at the neck, with no more material than at first.
-Lengths in cm, stresses in psi.
+Parison, mould, material and pressure are those of demos/parison.py; the parison sticks to the mould. Its wall is a
+programme of 14 knots, equidistant on the inner meridian, linear between them, added to the outside. The goal is the
+smallest standard deviation over mean (cv) of the bottle's wall, without the last 7 % at the neck, with no more material
+than at first. Lengths in cm, stresses in psi.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""What a sheet must be so that its wall, blown up, is even; and how soft, so that a uniform sheet is.
+"""Find the thickness, or the stiffness, over the radius of a sheet whose wall is even after inflation.
 
-A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, as a membrane and as a solid. (a) Its
-thickness h0(R) for an even wall h at a stretch of the pole l. (b) Its constant C(R) (`c10`) for an even wall t h0 where
-h0 is uniform. The logarithms of the profiles are cubic splines, found by Gauss and Newton's method with exact
-derivatives; thickness and C are over those of the pole, which have no effect on the shape.
+A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, as a membrane and as a solid. (a) The
+thickness h0(R) for an even wall h at a pole stretch l. (b) The constant C(R) (`c10`) for an even wall t h0, with a
+uniform h0. The logarithms of the profiles are cubic splines, found by the Gauss-Newton method with exact derivatives.
+Thickness and C are over their values at the pole, which do not change the shape.
 """
 
 import numpy as np

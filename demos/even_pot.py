@@ -1,9 +1,10 @@
-"""The most even pot by plug and heat: travel, nose and friction of the plug, and the temperature of the sheet over R.
+"""Find the plug and the heat for the most even pot: travel, nose and friction, and the temperature over R.
 
-A clamped sheet of radius 3 and thickness 0.1 that relaxes and is softer where it is hotter; a plug pushes it into a
-mould 2.6 deep in half a second, air lays it on the mould, where it sticks, in another half. Wanted is the least
-standard deviation over mean (cv) of the wall up to R = 2.7. Seven numbers by exact derivatives (`fx.Design`), and by
-the search of Nelder and Mead from the same start (`Study.refine`).
+A clamped sheet of radius 3 cm and thickness 0.1 cm relaxes, and is softer where it is hotter. A plug pushes it into a
+mould 2.6 cm deep in half a second; air presses it onto the mould, to which it sticks, in another half. The goal is the
+smallest standard deviation over mean (cv) of the wall up to R = 2.7 cm. Seven numbers are found by exact derivatives
+(`fx.Design`), and by the search of Nelder and Mead from the same start (`Study.refine`). Lengths in cm, stresses in
+MPa, times in s, temperatures in C.
 """
 
 from concurrent.futures import ThreadPoolExecutor

@@ -1,13 +1,14 @@
-"""What a sheet must be so that a trough blown of it is even: its thickness, or its constant.
+"""Find the thickness, or the stiffness, over the width of a sheet from which an even trough is blown.
 
-Plane strain: a neo-Hookean sheet of half width 1 and mean thickness 0.01, hinged at its rims, is blown into a trough
-with vertical walls, 1.5 deep, with sharp corners, on which it sticks, until the free arc in the corner has a radius
-below 0.05. Wanted is an even wall h: by the thickness at rest h0(R), or by the constant C(R) = c10 with a uniform h0.
-The logarithm of the profile is a table over the sheet; 3 % at the rim, where the hinge shears the wall, do not count.
+Plane strain: a neo-Hookean sheet of half width 1 and mean thickness 0.01 is hinged at its rims. It is blown into a
+trough with vertical walls, 1.5 deep, with sharp corners, and sticks to it. The run ends when the free arc in the corner
+has a radius below 0.05. The goal is an even wall h: by the reference thickness h0(R), or by the constant C(R) = c10
+with a uniform h0. The logarithm of the profile is a table over the sheet. The 3 % at the rim, where the hinge shears
+the wall, do not count.
 
-Places of the sheet are named by where they end: rim, half_wall and mouth at 0, 0.25 and 0.5 below the rim on the wall
-(where the arc first meets the floor its ends are at "mouth"); corner_0.5 and corner_0.1 so far from the corner on the
-wall, and on the floor.
+Material points are named by their places in the trough. "rim", "half_wall" and "mouth" are 0, 0.25 and 0.5 below the
+rim on the wall; the ends of the free arc are at "mouth" when it first touches the floor. "corner_0.5" and "corner_0.1"
+are at these distances from the corner, on the wall and on the floor.
 """
 
 import numpy as np

@@ -1,9 +1,8 @@
-"""Constants of every material from Treloar's (1944) tests of vulcanised rubber, and how well each fits.
+"""Fit the constants of every material to Treloar's (1944) tests of vulcanised rubber.
 
-Uniaxial, pure-shear and equibiaxial tension, fitted together: least squares of the nominal stress (MPa), every point
-with the same weight (`measured_treloar.py` compares that with relative misfits). The points were digitised from
-Treloar's published curves.
-With --quick, Ogden gets one term instead of three.
+Uniaxial, pure-shear and equibiaxial tension are fitted together, by least squares of the nominal stress (MPa), every
+point with the same weight (`measured_treloar.py` compares this with relative misfits). The points were digitised from
+Treloar's published curves. With --quick, Ogden's law has one term instead of three.
 """
 
 import numpy as np

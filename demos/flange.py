@@ -1,7 +1,7 @@
-"""Wrinkles in the flange of a disc that a ball draws down: hoops in compression are not yet a buckle.
+"""Draw discs down by a ball, and find which of their compressed flanges wrinkle.
 
-The rim slides in freely and is held in z; the ball is frictionless (Mooney-Rivlin, c10 = 50, c01 = 15, radius 10).
-At every thickness the flange is compressed round the axis; only the thin ones wrinkle.
+The rim may slide inward and is constrained in z; the ball is frictionless. Mooney-Rivlin, c10 = 50, c01 = 15, radius
+10. At every thickness the hoops of the flange are compressed; only the thin flanges wrinkle.
 """
 
 import numpy as np

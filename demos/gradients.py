@@ -1,16 +1,17 @@
-"""Derivatives of runs: exact ones of an inflated sheet, and of a cup beside differences of whole runs.
+"""Compute exact derivatives of whole runs, beside differences of runs.
 
-A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, blown to a given height of its pole, as a
-membrane and as a solid: derivatives by b of its constant C = c10 = 0.5 (1 + b R^2) or (1 + b R^4) and of its thickness
-(1 + b R^2)/100, at b = 0, of the pressure p R0/(C(0) h0(0)) and of the wall over that at rest at R = 0 and 0.5.
+Inflated sheet: radius 1, thickness 1/100, hinged at its rim, neo-Hookean, blown to a given pole height, as a membrane
+and as a solid. The derivatives are by b at b = 0, of its constant C = c10 = 0.5 (1 + b R^2) or (1 + b R^4), or of its
+thickness (1 + b R^2)/100. They are those of the pressure p R0/(C(0) h0(0)), and of the wall over its reference value at
+R = 0 and 0.5.
 
-The cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, on which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). When
-a node touches moves with b: so the derivative of a run is not that of its steps as they were. Differences of whole runs
-scatter by some 0.001, as steps change with b.
+Cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, to which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). The
+moment at which a node touches depends on b. So the derivative of a run is not the derivative of its steps as they were.
+Differences of whole runs scatter by some 0.001, because the steps change with b.
 
-The pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould on which it sticks, and air at a low
-pressure follows; an elastic sheet and one that relaxes. Derivatives of the wall by friction, travel and nose radius of
-the plug, and by the constant of the sheet; of the cup by its fillet.
+Pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould to which it sticks; air at a low pressure
+follows. One sheet is elastic, one relaxes. The derivatives of the wall are by friction, travel and nose radius of the
+plug, and by the constant of the sheet; those of the cup also by its fillet.
 """
 
 import numpy as np

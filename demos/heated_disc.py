@@ -1,8 +1,8 @@
-"""A hinged disc that is hotter in one place than in another: c10 = C(R), as a membrane and as a solid, r0/h0 = 100.
+"""Inflate hinged discs whose stiffness varies with the radius, c10 = C(R), against membrane theory.
 
-Cool rim: C/C0 = 1 + 3 R^2; step: 1 + 2 (1 + tanh((R - 0.7)/0.1)); hot rim: 1 - 0.5 R^2, R over r0. At given pole
-stretches the pressure p r0/(C0 h0), the pole height w/r0 and thickness ratios, held against membrane theory
-(formingx.exact.inflation.membrane_inflation: an ordinary differential equation).
+Cool rim: C/C0 = 1 + 3 R^2; step: 1 + 2 (1 + tanh((R - 0.7)/0.1)); hot rim: 1 - 0.5 R^2, R over r0; r0/h0 = 100, as a
+membrane and as a solid. At given pole stretches the pressure p r0/(C0 h0), the pole height w/r0 and thickness ratios
+are compared with membrane theory (formingx.exact.inflation.membrane_inflation: an ordinary differential equation).
 """
 
 import numpy as np

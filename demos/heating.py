@@ -1,7 +1,8 @@
-"""A flat sheet of 3 mm heated through: by hot air, between radiant heaters, and by radiation absorbed in the depth.
+"""Heat a sheet by hot air, between radiant heaters, and by radiation that is absorbed in its depth.
 
-Each temperature is held against a solution without finite elements (formingx/exact/heat.py): series, or for the
-faces that radiate finite volumes. SI units, temperatures in C. From 25 C; x counts from the bottom face.
+The sheet is 3 mm thick and at 25 C at first. Each temperature is compared with a solution without finite elements
+(formingx/exact/heat.py): a series, or finite volumes if the faces radiate. SI units, temperatures in C; x counts from
+the bottom face.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""K-BKZ in scenes: blocks of an LDPE melt at constant Hencky rates, and discs inflated by a flow of air.
+"""Run scenes of K-BKZ type: blocks of an LDPE melt at constant Hencky rates, and discs inflated by a flow of air.
 
-Blocks: the melt of Laun, Rheol. Acta 17 (1978) 1 (LDPE at 150 C; Pa, s), without damping (Lodge), with that of Wagner
-in the letters of Luo and Tanner, and with that of Papanastasiou, Scriven and Macosko. Each stress is held against
-the integral of a homogeneous test. Discs: membranes of R0/h0 = 100, hinged, of the illustrative melt of docs/kbkz.md
-(MPa, s); the enclosed volume grows to 2 R0^3 in 1 s and is held for 2 s.
+Blocks: the melt of Laun, Rheol. Acta 17 (1978) 1 (LDPE at 150 C; Pa, s). It has no damping (Lodge), the damping of
+Wagner in the letters of Luo and Tanner, or that of Papanastasiou, Scriven and Macosko (PSM). Each stress is compared
+with the integral of a homogeneous test. Discs: membranes of R0/h0 = 100, hinged, of the illustrative melt of
+docs/kbkz.md (MPa, s). The enclosed volume grows to 2 R0^3 in 1 s and is constant for 2 s.
 """
 
 import numpy as np

@@ -1,16 +1,17 @@
-"""Effects of material constants and of aspect ratio on free inflation (Song 1993, section 4.4, figs. 4.9 to 4.13).
+"""Vary material constants and aspect ratio of free inflation (Song 1993, section 4.4, figs. 4.9 to 4.13).
 
-Mooney sheets, simply supported; inches and psi. Table 4.2 gives C10 as the I1 constant and C01 as the I2 constant; the
-plates A and B of the same section read the other way round: their C01 is the I1 constant (only so is A the softer one).
-Below c10 always belongs to I1. Pole height: of the mid-thickness point; K = 6 (c10 + c01).
+Mooney sheets, simply supported; inches and psi. Table 4.2 gives C10 as the I1 constant and C01 as the I2 constant. For
+the plates A and B of the same section it is the other way round: their C01 is the I1 constant, otherwise A would not be
+the softer one. Below, c10 always belongs to I1. The pole height is that of the mid-thickness point; K = 6 (c10 + c01).
 
-Plate A cannot carry the 26 psi at which the thesis has 9 in: its maximum is 25.065 psi on any mesh from 10 x 1 to
+Plate A cannot carry the 26 psi at which the thesis has 9 in. Its maximum is 25.065 psi on any mesh from 10 x 1 to
 80 x 4, and 25.05 to 25.07 psi on 10 x 1 with the thesis' penalty (eps 2e-2 to 8e-2). Only a clamped rim on 10 x 1
 elements carries 26 psi (26.3 at most; 25.8 on finer meshes).
 
 Case 2 is Lai and Holt's sheet of PMMA at 163 C. Their law is stress = K t^-0.05 strain, K = 240 psi (t in s), and their
-forming took 6 s on average; the thesis leaves the relaxation out. Here the sheet is blown both ways: what it changes is
-a number. Their measured curve is in figure 4.11 alone, no numbers of it are in the text: agreement is undecided.
+forming took 6 s on average; the thesis leaves the relaxation out. Here the sheet is inflated with and without it, and
+its effect is a number of the summary. Their measured curve is in figure 4.11 alone, without numbers in the text, so
+agreement is undecided.
 """
 
 from math import gamma

@@ -1,9 +1,9 @@
-"""Biaxial tests of two rubbers, predicted from uniaxial and equibiaxial ones, and fitted directly.
+"""Predict biaxial tests of two rubbers from uniaxial and equibiaxial ones, and fit them directly.
 
-Tests of James et al. (1975) and of Kawamura et al. (2001), sources in demos/data: stretch 2 is constant,
-1.1 to 3.5, stretch 1 is varied. Laws are fitted to the uniaxial test alone, to the uniaxial and the equibiaxial points,
-and to the biaxial tests themselves. Deviations are root mean squares of the misfit over the stress, along stretch 2
-(the larger one) and across it, of stresses above 5 % of the largest. With --quick, two laws.
+Tests of James et al. (1975) and of Kawamura et al. (2001), sources in demos/data: stretch 2 is constant, 1.1 to 3.5,
+and stretch 1 is varied. The laws are fitted to the uniaxial test alone, to the uniaxial and the equibiaxial points, and
+to the biaxial tests themselves. Deviations are root mean squares of the misfit over the stress, along stretch 2 (the
+larger one) and across it, for stresses above 5 % of the largest. With --quick, two laws.
 """
 
 from pathlib import Path

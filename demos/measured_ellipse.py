@@ -1,12 +1,12 @@
-"""A film blown over an elliptical hole: shape and strains from the rise of its middle, predicted.
+"""Predict shape and strains of a film blown over an elliptical hole, from the rise of its middle.
 
 The experiment is that of F. Bosi's repository StressesEllipticBulging (GitHub, fbosi): a film 0.1 mm thick over an
 elliptical hole with the semi-axes 30 mm (x) and 60 mm (y), blown by 0.9175 psi, measured by image correlation. The
 source takes the film as incompressible and states no elastic constants. The rise of the middle, 11.231 mm, is given;
-the rest is a prediction. The measured values at the ten places are no part of this script.
+all else is a prediction. The measured values at the ten points are no part of this script.
 
-A rise prescribes the deformation, so the modulus cancels: only the shape of the law matters. The law here is
-neo-Hookean, the limit of every isotropic incompressible elastic law at small strains; four others show the
+A given rise prescribes the deformation, so the modulus cancels: only the form of the law matters. The law here is
+neo-Hookean, the limit of every isotropic incompressible elastic law at small strains. Four other laws show the
 sensitivity. The pressure gives the modulus that the film would have.
 """
 

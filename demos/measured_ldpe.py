@@ -1,9 +1,9 @@
-"""A melt of low-density polyethylene in extension: measured at one rate, predicted at two others.
+"""Predict the extension of a low-density polyethylene melt at two rates from a test at a third.
 
 The relaxation spectrum comes from the moduli of small oscillations, the damping from the start-up of uniaxial extension
 at 0.1/s (LDPE Dow 150R at 160 C; sources in demos/data). Predicted are extension at 0.03 and 0.3/s, homogeneous and in
-a scene of one element, and the start-up of shear. All stresses are true stresses; in extension the tensile stress
-minus the lateral one, over Hencky strain.
+a scene of one element, and the start-up of shear. All stresses are true stresses; in extension the tensile stress minus
+the lateral one, over the Hencky strain.
 """
 
 from pathlib import Path

@@ -1,10 +1,10 @@
-"""Treloar's rubber: the pressure of his inflated sheet, predicted from his tests by every law, fitted in two ways.
+"""Predict the pressure of Treloar's inflated sheet from his tests of rubber, by every law, fitted in two ways.
 
 Each law is fitted to the uniaxial, pure-shear and equibiaxial tests of 1944 together (`fx.treloar1944`), by misfits
 relative to the stress (the default) and by absolute ones. The limit pressure of his sheet, simply supported, is
-compared with the pressure that the equibiaxial test gives: p = 2 h0 P/(R lambda), the first maximum over the measured
-points, R the radius of the hole. That is the pressure in a hemispherical cap; the other value in the summary belongs
-to a cap of one stretch. With --quick, Mooney-Rivlin and Ogden alone.
+compared with the pressure that follows from the equibiaxial test: p = 2 h0 P/(R lambda), its first maximum over the
+measured points, with R the radius of the hole. This is the pressure in a hemispherical cap; the other value in the
+summary belongs to a cap of one stretch. With --quick, Mooney-Rivlin and Ogden alone.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What the demos of forming into and over moulds share: key numbers and pictures."""
+"""Key numbers and pictures that the demos of forming with moulds share."""
 
 import numpy as np
 from common import COMM, save, say

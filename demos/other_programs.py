@@ -1,6 +1,6 @@
-"""Problems of other programs' verification manuals, as formingx solves them: theirs, ours and the deviation.
+"""Solve problems of other programs' verification manuals: their results, ours and the deviation.
 
-Each case holds what its source states; the definitions are those of the input files that the programs publish:
+Each case is as its source states it; the definitions are those of the input files that the programs publish:
 
 * Ansys, `src/ansys/mapdl/core/examples/verif/vm56.dat`, `vm201.dat` and `vm218.dat` of github.com/ansys/pymapdl;
 * code_aster, `astest/ssnv187a.comm` and the page v6.04.187 of its manual;

@@ -1,10 +1,11 @@
-"""A sheet sags in the oven, then it is formed: heated from both sides by radiation while it creeps under its weight.
+"""Let sheets of three thicknesses sag in an oven, then form them.
 
-Sheets of 1, 2 and 4 mm, 0.3 m across, hinged at the rim, between heaters of 400 C; heat goes through by conduction.
-The polymer is illustrative: a glass of 300 MPa, a melt of 0.15 MPa and a rubber of 2 kPa (shear moduli); at 160 C the
-melt relaxes with 1 s, the glass with 1e-6 s, by Arrhenius' law with 180 kJ/mol. A sheet leaves the oven when it has
-sagged 30 mm, and is blown upward to a dome 60 mm high in 0.5 s; beside it one without weight, as long in the oven. kg,
-m, s, Pa, C; `sag_mm/{thickness in mm}/{time in s}`, walls over that of the sheet.
+Sheets of 1, 2 and 4 mm, 0.3 m across, hinged at the rim, are heated from both sides between heaters of 400 C, while
+they creep under their weight; heat is conducted through the thickness. The polymer is illustrative: a glass of 300 MPa,
+a melt of 0.15 MPa and a rubber of 2 kPa (shear moduli). At 160 C the melt relaxes with 1 s, the glass with 1e-6 s, by
+Arrhenius' law with 180 kJ/mol. A sheet leaves the oven when it has sagged by 30 mm, and is blown upward to a dome 60 mm
+high in 0.5 s. A sheet without weight, for the same time in the oven, is run for comparison. Units kg, m, s, Pa, C; keys
+`sag_mm/{thickness in mm}/{time in s}`; walls are over that of the sheet.
 """
 
 from common import parser, save, say, summarise

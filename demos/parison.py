@@ -1,8 +1,9 @@
-"""Blow moulding of a closed parison into a bottle-like mould (Song 1993, section 5.3.2, names it as an application).
+"""Blow a closed parison into a bottle (Song 1993, section 5.3.2, names it as an application).
 
-The thesis computes none: all sizes are ours. A tube of inner radius 1.1 cm and wall 0.3 cm, 10.6 cm long, with a
-round bottom, held at the neck, in a mould whose body has radius 3 cm and height 10 cm; material as in demos/cup.py
-(Mooney, I1 constant 50 psi, I2 constant 15 psi); pressure inside to 200 psi. Lengths in cm, stresses in psi.
+The thesis computes none: all sizes are ours. A tube of inner radius 1.1 cm and wall 0.3 cm, 10.6 cm long, has a round
+bottom and is fixed at the neck. The body of the mould has a radius of 3 cm and a height of 10 cm. The material is that
+of demos/cup.py (Mooney, I1 constant 50 psi, I2 constant 15 psi); the pressure inside grows to 200 psi. Lengths in cm,
+stresses in psi.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""What the demos of compression share: a block between two plates, its force, its material lines.
+"""A block between two plates, its force and its material lines, for the demos of compression.
 
 Thesis chapter 7: radius R0 = 1.32 cm, half height H = 1.25 cm; a quarter of the section is meshed, the middle at Z = 0.
-Forces are of the whole block on one plate. Chapter 7 reads C01 as the I1 constant: c10 = C01 and c01 = C10 here.
+Forces are those of the whole block on one plate. Chapter 7 takes C01 as the I1 constant: c10 = C01 and c01 = C10 here.
 """
 
 import numpy as np

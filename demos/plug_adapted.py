@@ -1,13 +1,16 @@
-"""Williams' plug on meshes that pilot runs make (Song 1993, recommendation 2): force at 8 to 20 cm under friction.
+"""Push Williams' plug on meshes that first runs adapt, under four coefficients of friction (Song 1993, 6.3).
 
-The sheet and the plug of `plug_friction`, but no formula for the elements: a run on 30 columns of one size to 8 cm
-says how long columns are where they lie on the plug's edge (`fx.mesh.adapted`); for little friction a run on those to
-12 cm says it again, and the next one is the result. Beside it a membrane that slides over the same edge (it knows
-neither bending nor shear), and at mu = 0.3 uniform columns, twice as many, to 8 cm. At 8 and 12 cm forces are those of
-the membrane to 4 %. Beyond, the face goes through itself (`first_verdict`): runs go on with
-`allow_inadmissible=True`, forces go up and down as points leave the edge, and at 20 cm they are 5 to 23 % off the
-membrane's. Then, to 10 cm, an edge of an eighth of the thickness, after two pilots (118 columns): 1112 N at 8 cm,
-1258 N at 10, where a membrane takes 991 and 1162 N. Lengths in cm, forces in N.
+The sheet and the plug are those of `plug_friction`, but no formula gives the elements. A run on 30 columns of one size
+to 8 cm gives the lengths of the columns that lie on the plug's edge (`fx.mesh.adapted`). For little friction a run on
+these columns to 12 cm adapts them once more; the next run is the result. For comparison there is a membrane that slides
+over the same edge (it has neither bending nor shear stiffness), and at mu = 0.3 a run to 8 cm on uniform columns, twice
+as many.
+
+At 8 and 12 cm the forces are within 4 % of those of the membrane. Beyond, the face penetrates itself
+(`first_verdict`). The runs continue with `allow_inadmissible=True`; the forces rise and fall as points leave the edge,
+and at 20 cm they are 5 to 23 % off those of the membrane. Last, to 10 cm, the edge has a radius of an eighth of the
+thickness, after two first runs (118 columns): 1112 N at 8 cm and 1258 N at 10 cm, where a membrane takes 991 and
+1162 N. Lengths in cm, forces in N. (The thesis recommends such meshes: recommendation 2.)
 """
 
 import numpy as np

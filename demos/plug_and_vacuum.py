@@ -1,16 +1,16 @@
-"""Plug, then vacuum, into a deep cup, beside straight vacuum forming (Song 1993, section 6.5, figs. 6.16 and 6.17).
+"""Form a deep cup by plug and vacuum, beside straight vacuum forming (Song 1993, section 6.5, figs. 6.16, 6.17).
 
 Sheet and mould as in demos/deep_cup.py (Mooney, I1 constant 50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm,
-clamped; cup 10 cm deep). The plug travels to 60 % of the depth; its size is not in the thesis: radius 5 cm, edge 1.5 cm
-here. An elastic sheet remembers a plug only through what sticks, so how the plug lets go decides:
+clamped; cup 10 cm deep). The plug travels to 60 % of the depth. Its size is not in the thesis: radius 5 cm, edge 1.5 cm
+here. An elastic sheet keeps the effect of the plug only where it sticks, so the way in which it separates decides:
 
-lifts     The sheet lifts off the plug (friction 0.3) as soon as vacuum is drawn.
-holds     What touches plug or mould stays on it, as on a cold tool: 20 psi lay the wall on the mould, the pressure goes
-          back to 6 psi, the plug lets go, 60 psi fill the corner.
-carries   The same, but before it lets go the plug carries the base to the bottom.
+lifts     The sheet separates from the plug (friction 0.3) as soon as vacuum is drawn.
+holds     Points stay on plug and mould once they touch, as on a cold tool: 20 psi lay the wall on the mould, the
+          pressure falls to 6 psi, the plug is removed, 60 psi fill the corner.
+carries   The same, but before its removal the plug carries the base to the bottom.
 
-Then a map over plug radius and travel, for plugs that hold and plugs that carry: base, corner, thinnest place; in
-parallel processes, or with mpirun over the ranks. Lengths in cm, stresses in psi.
+Then a map over plug radius and travel, for "holds" and "carries", of base, corner and minimum wall; in parallel
+processes, or with mpirun over the ranks. Lengths in cm, stresses in psi.
 """
 
 import numpy as np

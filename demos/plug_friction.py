@@ -1,13 +1,15 @@
-"""Friction of a plug, from little to rough: force, wall, and where the sheet snaps (Williams' plug, Song 1993, 6.3).
+"""Push Williams' plug under five coefficients of friction: force, wall and snaps (Song 1993, section 6.3).
 
-The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0.6985 cm; plug radius 1.905 cm, its
-edge rounded) pushed 20 cm under five coefficients of friction, beside a membrane that slides over the same edge. Where
-points of the sheet leave the edge of the plug there may be no state nearby to go on to: the sheet snaps to the next
-one (`Path.jumps`), marked in the curves. The less friction, the more of the face slides over the edge, and the thinner
-it is drawn (a membrane under mu = 0.1 is stretched 130 times both ways at 20 cm): elements are in proportion to their
-distance from the axis, so that whatever comes to the edge has as many of them around it, and their pressures are
-continuous, for they are slim. Much friction shears the sheet: there the elements at the plug are the thinnest. Forces
-and walls of the first 8 cm are of smaller elements made for them. Lengths in cm, forces in N.
+The sheet of `williams_plug` (neo-Hookean, c10 = 0.448 MPa; r0 = 8.89 cm, h0 = 0.6985 cm; plug radius 1.905 cm, its edge
+rounded) is pushed by 20 cm, beside a membrane that slides over the same edge. Where points of the sheet leave the edge
+of the plug there may be no state nearby. Then the sheet snaps to its next equilibrium (`Path.jumps`), marked in the
+curves.
+
+The less friction, the more of the face slides over the edge, and the thinner it becomes: a membrane under mu = 0.1 is
+stretched 130 times in both directions at 20 cm. The size of the elements is therefore in proportion to their distance
+from the axis, so that the same number lies around the edge at any travel. Their pressures are continuous, because the
+elements are slim. Much friction shears the sheet; there the elements at the plug are the thinnest. Forces and walls of
+the first 8 cm come from a run with smaller elements. Lengths in cm, forces in N.
 """
 
 from typing import NamedTuple

@@ -1,9 +1,9 @@
-"""Where a plugged sheet is strained and stressed most, with and without slip (Song 1993, section 6.4, figs. 6.11-6.15).
+"""Find where a sheet under a plug has its largest stress and strain, with and without slip (Song 1993, section 6.4).
 
-Sheet and plug as in demos/williams_plug.py, at two travels (the thesis prints none; with slip, the stretch at the pole
-is its 1.25 near 4.8 cm). Principal values in the manner of the thesis: 1 the larger and 2 the smaller in the (r, z)
-plane, 3 around the axis. Euler strain eps = (1 - 1/l^2) / 2. Each mesh is refined once, to see what has converged.
-Lengths in cm, stresses in MPa.
+Sheet and plug as in demos/williams_plug.py, at two travels. The thesis prints none; with slip, the stretch at the pole
+is its 1.25 near 4.8 cm. Principal values as in the thesis (figs. 6.11 to 6.15): 1 is the larger and 2 the smaller one
+in the (r, z) plane, 3 the one around the axis. Euler strain eps = (1 - 1/l^2) / 2. Each mesh is refined once, to see
+which values have converged. Lengths in cm, stresses in MPa.
 """
 
 import numpy as np

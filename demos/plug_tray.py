@@ -1,11 +1,10 @@
-"""A tray formed by a plug with friction and a vacuum, from a heated sheet that relaxes, with two planes of symmetry.
+"""Form a tray by a plug with friction and a vacuum, from a heated sheet that relaxes.
 
 The sheet is hotter in its middle; its stiffness is a table of the temperature. The plug, a box with rounded edges,
-slides on the sheet (Coulomb's law), waits, and is left out as the vacuum draws the sheet into the mould, where it
-sticks, as on a cold mould (no heat is conducted). A quarter is solved, and a half for comparison, on the mesh of the
-quarter and its mirror image. (On a mesh of its own, walls of the half differ by the error of a mesh of this size.)
-All numbers are those of the whole part.
-Lengths in mm, stresses in MPa, times in s, temperatures in degrees Celsius.
+slides on the sheet (Coulomb's law) and waits. It is inactive while the vacuum draws the sheet into the mould, to which
+the sheet sticks as on a cold mould (no heat is conducted). A quarter is solved. A half is solved for comparison, on the
+mesh of the quarter and its mirror image, because on a mesh of its own its walls would differ by the error of the mesh.
+All numbers are those of the whole part. Lengths in mm, stresses in MPa, times in s, temperatures in C.
 """
 
 import numpy as np

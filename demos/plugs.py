@@ -1,4 +1,4 @@
-"""What the demos of plug-assist share: a sheet with a plug above it, how the plug holds it, force and shape."""
+"""A sheet under a plug, its friction, forces and shapes, for the demos of plug-assist."""
 
 import numpy as np
 from common import COMM, say

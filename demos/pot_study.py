@@ -1,11 +1,11 @@
-"""The most even yoghurt pot: travel, radius and friction of the plug in 60 runs side by side, and a search on top.
+"""Find the most even yoghurt pot: travel, radius and friction of the plug in 60 runs in parallel, then a search.
 
-A sheet of 40 mm radius and 1.2 mm (Mooney, 0.35 and 0.05 MPa: a soft sheet, as an example) is clamped; a plug stretches
-it into a cup mould 60 mm deep, vacuum lifts it off the plug and lays it on the mould, where it stays. An elastic sheet
-remembers the plug only through what the friction of the plug held back and what the mould holds. Evenness is
-`Part.uniformity`: minimum over mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa. The 60 runs
-take 120 s of processor time, shared by the cores. (The design stops at a friction of 0.45: with 0.6 five of the eight
-runs at travels of 48 and 54 ended as the vacuum began, where contact did not settle.)
+A sheet of radius 40 mm and thickness 1.2 mm (Mooney, 0.35 and 0.05 MPa: a soft sheet, as an example) is clamped. A plug
+stretches it into a mould 60 mm deep; vacuum takes it off the plug and presses it onto the mould, to which it sticks. An
+elastic sheet keeps the effect of the plug only through friction and through the mould. Evenness is `Part.uniformity`:
+minimum over mean wall of the part, trimmed at 38 mm. Lengths in mm, stresses in MPa. The 60 runs take 120 s of
+processor time, shared by the cores. (Friction is at most 0.45: with 0.6 five of the eight runs at travels of 48 and
+54 mm ended as the vacuum began, because contact did not settle.)
 """
 
 import os

@@ -1,7 +1,7 @@
-"""Pressure forming of a long rectangular part, in plane strain (Song 1993, section 5.3.2, figs. 5.8 and 5.9).
+"""Form a long rectangular part by pressure, in plane strain (Song 1993, section 5.3.2, figs. 5.8 and 5.9).
 
-The thesis prints no dimensions: half width, thickness, depth, fillet, material and pressures are those of
-demos/cup.py. A stuck sheet is compared with the membrane law of a trough, in which only geometry counts. Lengths in cm,
+The thesis prints no dimensions: half width, thickness, depth, fillet, material and pressures are those of demos/cup.py.
+A stuck sheet is compared with the membrane law of a trough, which depends on the geometry alone. Lengths in cm,
 stresses in psi.
 """
 

@@ -1,10 +1,10 @@
-"""A block that relaxes: held after a stretch, pulled at a constant rate, creep under a dead force and recovery.
+"""Stretch a block that relaxes: constant stretch, constant rate, creep under a dead force and recovery.
 
 One element in uniaxial and in equibiaxial extension, solved as a scene; MPa, s, and true stress sigma1 - sigma3. The
-material P0 (c10 = 0.05, a branch of 0.5 and 1 s) is stretched at once and held; P1 (c10 = 0.05, branches of 0.3 and
-0.5 s, 0.4 and 5 s) is pulled at constant Hencky rates, and under a dead force of 0.2 MPa times its original area.
-Beside the stresses stand those of the material's homogeneous tests (`relaxation`, `constant_rate`), which integrate the
-same law by another method.
+material P0 (c10 = 0.05, a branch of 0.5 and 1 s) is stretched at once; then its stretch is constant. P1 (c10 = 0.05,
+branches of 0.3 and 0.5 s, 0.4 and 5 s) is pulled at constant Hencky rates, and by a dead force of 0.2 MPa times its
+reference area. The stresses are compared with those of the material's homogeneous tests (`relaxation`,
+`constant_rate`), which integrate the same law by another method.
 """
 
 import numpy as np

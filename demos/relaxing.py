@@ -1,4 +1,4 @@
-"""What the demos of materials that relax share: the materials, in MPa and s, and states by their time."""
+"""Materials that relax, in MPa and s, and states by their time, for several demos."""
 
 import formingx as fx
 

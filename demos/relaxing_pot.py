@@ -1,11 +1,12 @@
-"""Plug, hold, vacuum and release of a sheet that relaxes, in the deep cup of demos/plug_and_vacuum.py.
+"""Form a pot of a sheet that relaxes: plug, hold, vacuum and release.
 
-An elastic sheet that lifts off its plug forgets it: the base comes out as thin as without a plug. Here the same sheet
-relaxes: its instantaneous modulus is that of the elastic one (130 psi), and 90 % of it relaxes with tau = 1 s. The plug
-(radius 5 cm, edge 1.5 cm, friction 0.3) travels 60 % of the depth at 0.6, 6 or 60 cm/s, in 10, 1 or 0.1 tau, and waits
-0, 0.1, 1 or 10 tau; vacuum comes at once, faster than the sheet relaxes; the part stays 5 tau in the mould; pressure
-and mould are taken away together, and the part, held by its rim, recovers for 10 tau. Beside it straight vacuum, and
-the elastic sheet. Lengths in cm, stresses in psi, times in tau = 1 s.
+The deep cup is that of demos/plug_and_vacuum.py. An elastic sheet that separates from its plug recovers: the base is as
+thin as without a plug. Here the sheet relaxes. Its instantaneous modulus is that of the elastic one (130 psi), and 90 %
+of it relax with tau = 1 s. The plug (radius 5 cm, edge 1.5 cm, friction 0.3) travels 60 % of the depth at 0.6, 6 or
+60 cm/s, in 10, 1 or 0.1 tau, and waits for 0, 0.1, 1 or 10 tau. Vacuum comes at once, faster than the sheet relaxes.
+The part stays in the mould for 5 tau. Pressure and mould are removed together, and the part, fixed at its rim, recovers
+for 10 tau. Straight vacuum and the elastic sheet are run for comparison. Lengths in cm, stresses in psi, times in
+tau = 1 s.
 """
 
 import numpy as np

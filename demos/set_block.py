@@ -1,9 +1,9 @@
-"""A block drawn hot to 1.5, chilled in its grip, and let go: what has set keeps its shape, against the exact balance.
+"""Draw a hot block to a stretch of 1.5, chill it in its grip and release it, against the exact balance.
 
-A neo-Hookean block (c10 = 1, shear modulus mu = 2) is drawn along one or two directions, chilled from 150 C to 20 C,
-and let go. Between 85 and 75 C it sets (`Solidification`): the glass, of shear modulus G, is free of stress at the
-stretch L at which it was held, the rubber at 1. Where both balance, mu (l^2 - l^-k) + G ((l/L)^2 - (l/L)^-k) = 0,
-with k = 1 in uniaxial and 4 in equibiaxial extension. mm, s, MPa, C; heat in SI.
+A neo-Hookean block (c10 = 1, shear modulus mu = 2) is drawn in one or two directions, chilled from 150 C to 20 C, and
+released. Between 85 and 75 C it solidifies (`Solidification`). The glass, of shear modulus G, is free of stress at the
+drawn stretch L, the rubber at 1. Where both balance, mu (l^2 - l^-k) + G ((l/L)^2 - (l/L)^-k) = 0, with k = 1 in
+uniaxial and 4 in equibiaxial extension. Units mm, s, MPa, C; heat in SI.
 """
 
 import numpy as np

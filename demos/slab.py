@@ -1,4 +1,4 @@
-"""What the demos of heat share: a flat sheet that conducts through its thickness only, and its table of errors."""
+"""A flat sheet that conducts heat through its thickness, and its table of errors, for the demos of heat."""
 
 import numpy as np
 from common import save, say

@@ -1,4 +1,4 @@
-"""Bifurcations of neo-Hookean cylinders, tubes, blocks, a plate and a sheet, against the exact equations.
+"""Find bifurcations of neo-Hookean cylinders, tubes, blocks, a plate and a sheet, against the exact equations.
 
 c10 = 1/2, so mu = 1. Modes are told apart by their half waves along the body: U on its face, projected on
 cos(m pi z/L).

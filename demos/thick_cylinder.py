@@ -1,8 +1,8 @@
-"""Thick cylinder and thick sphere under internal pressure, against exact solutions (Song 1993, section 3.6).
+"""Inflate a thick cylinder and a thick sphere, against exact solutions (Song 1993, section 3.6).
 
 Cylinder: plane strain, Mooney, inner radius 7 in, outer radius 18.625 in, constants 60 and 10 psi (60 taken as the I1
-constant; the pressure knows only their sum). Sphere: the same wall, neo-Hookean with the same modulus, which has a
-pressure maximum. The mesh is in inches and psi; the tables are in cm and MPa.
+constant; the pressure depends on their sum alone). Sphere: the same wall, neo-Hookean with the same modulus, which has
+a pressure maximum. The mesh is in inches and psi; the tables are in cm and MPa.
 """
 
 from pathlib import Path

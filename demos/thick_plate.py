@@ -1,4 +1,4 @@
-"""A thick plate inflated, against linear plate theory and Timoshenko's formula (Song 1993, section 4.2.2, fig. 4.3).
+"""Inflate a thick plate, against linear plate theory and Timoshenko's formula (Song 1993, section 4.2.2, fig. 4.3).
 
 Case 6 of table 4.2: r0 = 7.5 in, h0 = 0.5 in, Mooney, I1 constant 80 psi, I2 constant 20 psi (the table's C10 and C01),
 to 40.1 psi; clamped as in the figure, and simply supported. Lengths in inches, stresses in psi.

@@ -1,15 +1,17 @@
-"""A plug pushed into thin and thick rubber sheets (Song 1993, section 6.4, figs. 6.6 to 6.10; tests of Throne 1989).
+"""Push a plug into thin and thick rubber sheets (Song 1993, section 6.4; tests of Throne 1989).
 
 Mooney rubber, C10 the I1 constant; r0 = 7.62 cm. Thin: h0 = 0.0254 cm (r0/h0 = 300), plug radius 1.05 cm, with Throne's
-constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa); thick: h0 = 0.076 cm (100), plug radius 2.30 cm
-(0.1731, 0.004006 MPa). "held": what touches the plug never lets go (no slip), to 10 cm; "frictionless", to a pole
-stretch of 3; each with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
-(`formingx.exact.plug`; it ends where it would touch the plug's side); and with mu = 0.3, to 10 cm. The plug's edge
-is rounded here (--fillet); with smaller fillets the force comes to that of the membrane. Lengths in cm, forces in N.
+constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa). Thick: h0 = 0.076 cm (100), plug radius 2.30 cm
+(0.1731, 0.004006 MPa). "held": points that touch the plug stay on it (no slip), to 10 cm. "frictionless": to a pole
+stretch of 3. Both are run with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
+(`formingx.exact.plug`, up to the travel at which it would touch the plug's side). With mu = 0.3: to 10 cm. The edge of
+the plug is rounded here (--fillet); with smaller fillets the force tends to that of the membrane. Lengths in cm, forces
+in N.
 
-The thesis' text has no forces, only this: for the thick sheet its curve seems better than Throne's own; for the thin
-one Throne's constants give much softer curves than measured, Treloar's compare well; outside the plug the strain is
-plane only in part, which is why Throne's plane-strain analysis is worse; the rim matters little to the force.
+The text of the thesis has no forces (figs. 6.6 to 6.10 show them). It says this: for the thick sheet its curve seems
+better than Throne's own. For the thin one Throne's constants give much softer curves than measured; Treloar's compare
+well. Outside the plug the strain is plane only in part, so Throne's plane-strain analysis is worse. The rim matters
+little to the force.
 """
 
 from functools import cache

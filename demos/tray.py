@@ -1,9 +1,9 @@
-"""A tray: a quarter of a rounded box, filled by a sheet that sticks, from an exact tool and from an STL file; a trough.
+"""Fill a rounded tray with a sheet that sticks, from an exact tool and from an STL file; beside it a trough.
 
-Half widths 1 and 1.5, depth 1, corners 0.3 in plan, fillet 0.2 at the floor; neo-Hookean sheet of the same outline,
-thickness 0.02, rim fixed, to p a/(c10 h) = 60. The trough is a strip of a long one, deep as its half width: its law is
-h/h0 = (2/pi) r^(4/pi - 1), r from the sharp corner along floor or wall (`rectangular_part` solves it as a solid). Last,
-the same tray without friction.
+A quarter of the tray is solved: half widths 1 and 1.5, depth 1, corners 0.3 in plan, fillet 0.2 at the floor. The sheet
+is neo-Hookean, of the same outline and of thickness 0.02, fixed at its rim, to p a/(c10 h) = 60. The trough is a strip
+of a long one, as deep as its half width. Its law is h/h0 = (2/pi) r^(4/pi - 1), r from the sharp corner along floor or
+wall (`rectangular_part` solves it as a solid). Last, the same tray without friction.
 """
 
 import numpy as np

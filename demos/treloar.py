@@ -1,4 +1,4 @@
-"""Free inflation of Treloar's rubber sheet through its pressure maximum (Song 1993, section 4.3.2, figs. 4.6 to 4.8).
+"""Inflate Treloar's rubber sheet through its pressure maximum (Song 1993, section 4.3.2, figs. 4.6 to 4.8).
 
 Neo-Hookean, c10 (the I1 constant) = 2.0 kg/cm2; r0 = 1.25 cm, h0 = 0.082 cm; lengths in cm, stresses in kg/cm2.
 """

@@ -1,4 +1,4 @@
-"""Free inflation of a sheet of two bonded layers (Song 1993, section 4.5, table 4.3, figs. 4.14 to 4.16).
+"""Inflate a sheet of two bonded layers (Song 1993, section 4.5, table 4.3, figs. 4.14 to 4.16).
 
 Mooney layers, each r0 = 19.1 cm and h0 = 0.635 cm, simply supported; c10 (the table's C10) belongs to I1. The bottom
 layer is material 1; the top layer is the same (case 1), softer (case 2) or stiffer (case 3). Lengths in cm, stresses in

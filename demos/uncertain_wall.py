@@ -1,9 +1,9 @@
-"""Uncertain constants carried to the wall, the weight and the force of a cup, beside 40 samples of whole runs.
+"""Compute the uncertainty of wall, pressure, force and volume of a cup from uncertain constants, beside 40 samples.
 
-Gent's constants come from Treloar's tests (`fx.fit`), with their covariance; the thickness of the sheet scatters by 2 %
-besides. The sheet is blown into a cup, on which it sticks, to a volume of air.
-The band of one run, by its derivatives, is compared with samples of the constants, each with a run of its own. (Lengths
-over the radius of the cup, stresses in MPa.) With --quick, a coarser mesh.
+Gent's constants are fitted to Treloar's tests (`fx.fit`), with their covariance; the thickness of the sheet has a
+standard deviation of 2 %, too. The sheet is blown into a cup, to which it sticks, to a volume of air. The band of one
+run, by its derivatives, is compared with samples of the constants, each with a run of its own. Lengths over the radius
+of the cup, stresses in MPa. With --quick, a coarser mesh.
 """
 
 import numpy as np

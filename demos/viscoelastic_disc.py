@@ -1,8 +1,9 @@
-"""Treloar's sheet of a material that relaxes, blown up at a given air flow and held: as a membrane and as a solid.
+"""Inflate Treloar's sheet, of a material that relaxes, at a given flow of air: as a membrane and as a solid.
 
-r0/h0 = 100, hinged; c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s. The swept volume goes from 0 to V1 r0^3 in
-the time T, evenly: (T, V1) = (0.4 s, 4), (4, 2), (40, 2), and is held for 5, 2 and 2 s. Pressures as p r0/h0. Membrane
-and solid stand beside each other, and beside runs of the membrane with half the elements and with half the steps.
+r0/h0 = 100, hinged; c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s. The swept volume grows evenly from 0 to
+V1 r0^3 in the time T: (T, V1) = (0.4 s, 4), (4, 2), (40, 2). Then it is constant for 5, 2 and 2 s. Pressures are given
+as p r0/h0. Membrane and solid are compared with each other, and with runs of the membrane with half the elements and
+with half the steps.
 """
 
 from common import parser, save, say, summarise

@@ -1,8 +1,9 @@
-"""A thick tube and a thick sphere that relax: inflated at a speed of the inner radius, held, let go.
+"""Inflate a thick tube and a thick sphere that relax at a given speed, hold and release them.
 
 Inner radius 1, outer radius 2; plane strain along the tube. c10 = 0.05, branches (0.3, 0.5 s), (0.4, 5 s); MPa, s. The
-pressure is what makes the inner radius go from 1 to 2 at speed 0.1, 1, 10 and stay there for 2 s; then it is taken off
-at once, and the body recovers for 50 s. Beside the numbers stand their changes with half the elements.
+inner radius grows from 1 to 2 at a speed of 0.1, 1 or 10 and is constant for 2 s; the run finds the pressure. Then the
+pressure is removed at once, and the body recovers for 50 s. Beside the numbers stand their changes with half the
+elements.
 """
 
 import numpy as np

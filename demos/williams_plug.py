@@ -1,11 +1,11 @@
-"""A plug pushed into a clamped PMMA sheet at 160 C (Song 1993, section 6.3, figs. 6.1 to 6.5; test of Williams 1970).
+"""Push a plug into a clamped PMMA sheet at 160 C (Song 1993, section 6.3, figs. 6.1 to 6.5; test of Williams 1970).
 
-Neo-Hookean, c10 = 0.448 MPa (chapter 6 reads C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
-1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). Four ways in which the plug holds the sheet:
-"held", what touches never lets go (the thesis' no slip); "stick", rough, but the sheet may lift off; Coulomb friction;
-"frictionless" (the thesis' slip). And "driven_nodes", the thesis' own scheme for no slip: nodes within the plug's
-radius go with it, as under a sharp edge; 20 cm are reached on a coarse mesh only (--refine 2: 8 cm), for the corner is
-singular. Lengths in cm, forces in N.
+Neo-Hookean, c10 = 0.448 MPa (chapter 6 takes C10 as the I1 constant); r0 = 8.89 cm, h0 = 0.6985 cm, plug radius
+1.905 cm. The thesis' plug has a sharp edge; here it is rounded (--fillet). There are four contacts of plug and sheet:
+"held", points that touch stay where they touched (the thesis' no slip); "stick", rough, but the sheet may separate;
+Coulomb friction; "frictionless" (the thesis' slip). "driven_nodes" is the thesis' own scheme for no slip: nodes within
+the plug's radius move with it, as under a sharp edge. It reaches 20 cm on a coarse mesh only (--refine 2: 8 cm),
+because the corner is singular. Lengths in cm, forces in N.
 """
 
 import numpy as np
