@@ -22,14 +22,14 @@ LONG = 1000.0                                                # s: 200 times the 
 
 
 def balloon(n):
-    """Half a sphere, n elements along the meridian."""
+    """Return the scene of half a sphere, with n elements along the meridian."""
     return fx.Scene(mesh=fx.mesh.sphere(inner_radius=R0 - H0 / 2, thickness=H0, elements=(n, 1)), materials=P1,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")],
                     loads=[fx.Pressure("inner", name="air")])
 
 
 def blow(q, n, accuracy):
-    """The path of a flow, and its numbers."""
+    """Return the path of a flow of q V0 per second, and its numbers."""
     full = STRETCHES[-1] ** 3 - 1
     at = [(stretch**3 - 1) / q for stretch in STRETCHES]     # volume grows with the middle of the wall
     end = at[-1]
@@ -45,7 +45,7 @@ def blow(q, n, accuracy):
 
 
 def creep(p, n, accuracy):
-    """The path under a held pressure, and its numbers."""
+    """Return the path under a constant pressure p R0/H0 (MPa), and its numbers."""
     through = [fx.pole_stretch(s) for s in CREPT]
     stages = [fx.Stage("put on", control="air", until=fx.pressure(p * H0 / R0), intermediate=through),
               fx.Stage("creep", duration=LONG, intermediate=through, at_limit_point="stop")]
@@ -61,7 +61,7 @@ def creep(p, n, accuracy):
 
 
 def draw(flows, creeps):
-    """Pressure over stretch, pressure held, stretch over time."""
+    """Return a figure: pressure over stretch, pressure over time after the flow, stretch over time."""
     figure, (blown, held, crept) = plots.figure(3, width=3.9)
     for k, (q, path) in enumerate(flows.items()):
         end = (STRETCHES[-1] ** 3 - 1) / q

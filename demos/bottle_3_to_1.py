@@ -33,7 +33,7 @@ def blow(material, elements):
 
 
 def section(axes, profile, side, colour):
-    """One side of a section, filled."""
+    """Fill one side of a section: side = 1 or -1."""
     r, z = np.vstack([fine(profile.bottom), fine(profile.top)[::-1]]).T
     axes.fill(side * r, z, color=colour)
 

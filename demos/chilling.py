@@ -22,7 +22,7 @@ NAMES = ("face", "mid", "top", "tool_face")
 
 
 def chill(mesh, conductivity, capacity, tolerance):
-    """(run, temperatures of NAMES, shape (times, 4))."""
+    """Return the run and its temperatures at NAMES, shape (times, 4); k in W/(m K), rho c in J/(m3 K)."""
     tool = fx.ConductingTool(thickness=DEPTH, conductivity=conductivity, heat_capacity=capacity, back=BACK)
     run = fx.heat(mesh, SHEET, [fx.ContactWithTool("bottom", conductance=CONDUCTANCE, tool=tool),
                                 fx.Convection("top", h=H, air=AIR)], start=START, times=TIMES, unit="C",
@@ -32,7 +32,7 @@ def chill(mesh, conductivity, capacity, tolerance):
 
 
 def exact(conductivity, capacity):
-    """The same by Laplace transform."""
+    """Return the temperatures of `chill` by Laplace transform."""
     sheet, tool = reference.on_tool(
         same_slab(THICKNESS), reference.Slab(DEPTH, conductivity, capacity), CONDUCTANCE, START, BACK, H, AIR,
         [0.0, THICKNESS / 2, THICKNESS], [0.0], TIMES)
@@ -40,7 +40,7 @@ def exact(conductivity, capacity):
 
 
 def draw_tool(axes, _, run):
-    """The tool below the sheet, as far as it is warm."""
+    """Draw the temperatures of the tool below the sheet, to a depth of two thicknesses."""
     for t, line in zip(TIMES, list(axes.lines)):
         depth, T = run.tool_profile("bottom", (0.0, 0.0), t)
         near = depth < 2 * THICKNESS

@@ -25,13 +25,13 @@ COLOURS = {"rings": "tab:green", "clamped": "tab:red", "simply_supported": "tab:
 
 
 def sheet(n, radius, *small):
-    """The sheet with small elements at some radii."""
+    """Return the mesh of 30 n x 2 n elements, small at some radii."""
     return fx.mesh.disc(radius=radius, thickness=THICKNESS, elements=(30 * n, 2 * n),
                         concentrate=dict.fromkeys(small, 0.25))
 
 
 def scene(held, n):
-    """The sheet, held in one of three ways, on the n-th mesh."""
+    """Return the scene of the sheet on the n-th mesh; `held` is one of its three supports."""
     if held == "rings":
         flat = RADIUS + FILLET
         mesh = sheet(n, flat + GRIPPED, RADIUS, flat).with_part("blown", "bottom", within=(0, RADIUS))
@@ -46,7 +46,7 @@ def scene(held, n):
 
 
 def inflate(held, n):
-    """The path beyond the maximum of the pressure, or what there is of it: a clamped corner may crease."""
+    """Return the path beyond the maximum of the pressure, or up to the crease of a clamped corner."""
     try:
         return fx.trace(scene(held, n), until=fx.pole_stretch(END), intermediate=[fx.pole_stretch(STRETCH)],
                         progress=False)
@@ -57,7 +57,7 @@ def inflate(held, n):
 
 
 def key_numbers(path):
-    """What the summary holds of one path; the peak is that of the outer part of the sheet."""
+    """Return the numbers of the summary of one path; the peak is taken in the outer part of the sheet."""
     state, limit = path.met(fx.pole_stretch(STRETCH)), path.limit_points
     peak = path.stress(state).peak(radii=(0.9 * RADIUS, 2 * RADIUS))
     return {"limit_pressure_kg_per_cm2": limit[0].measures["pressure"] if limit else None,
@@ -68,7 +68,7 @@ def key_numbers(path):
 
 
 def table(numbers):
-    """One line for each run."""
+    """Return the lines of a table of all runs."""
     lines = [f"{'':18}{'n':>3}{'limit pressure':>16}{'peak stress':>13}  at (R, Z)        converged  arrived"]
     for held, runs in numbers.items():
         for n, found in runs.items():
@@ -80,7 +80,7 @@ def table(numbers):
 
 
 def draw(numbers, paths, out):
-    """Peaks against refinement, and the sheet at the rim, clamped and between the rings."""
+    """Draw the peaks against the refinement, and the sheet at the rim, clamped and between the rings."""
     figure, (left, *right) = plots.figure(3, width=4.6, height=4.2)
     for held, runs in numbers.items():
         left.plot([int(n) for n in runs], [r["peak_stress_kg_per_cm2_at_stretch_1.5"] for r in runs.values()], ".-",
@@ -96,7 +96,7 @@ def draw(numbers, paths, out):
 
 
 def stressed(axes, path, held):
-    """The deformed elements at the rim, shaded by the largest principal stress."""
+    """Draw the deformed elements at the rim; return their colours by the largest principal stress."""
     fields = Fields(path)
     found = fields.of(path.met(fx.pole_stretch(STRETCH)))
     corners = (fields.points + found["displacement"])[:, :3]

@@ -37,12 +37,12 @@ KEYS = {"base": "base", "corner": "corner", "least": "minimum wall"}
 
 
 def modulus(at_hot):
-    """By temperature, MPa."""
+    """Return a modulus as a function of the temperature, given its value at 150 C (MPa)."""
     return fx.of_temperature(lambda T: at_hot * STIFFER(T))
 
 
 def scene(relaxes, plug, friction, elements, comm):
-    """plug: (temperature, conductance in W/(m2 K))."""
+    """Return the scene. plug: (temperature in C, conductance in W/(m2 K)) of the plug."""
     if relaxes:
         sheet = fx.Viscoelastic(fx.NeoHookean(c10=modulus(0.02)), [(modulus(0.16), 0.5)], shift=SLOWER)
     else:
@@ -57,14 +57,14 @@ def scene(relaxes, plug, friction, elements, comm):
 
 
 def process(assisted):
-    """The stages; without a plug: vacuum alone."""
+    """Return the stages: plug and vacuum, or vacuum alone."""
     suck = fx.Stage("vacuum", control="vacuum", until=fx.pressure(VACUUM), duration=SUCTION,
                     step=fx.StepControl(target=8), inactive=[] if assisted else ["plug"])
     return [fx.Stage("plug", control="plug", until=fx.travel(TRAVEL), duration=STROKE), suck] if assisted else [suck]
 
 
 def form(case):
-    """Numbers and shapes of one run, on this process alone. case: relaxes, plug, friction, elements, accuracy."""
+    """Return numbers and shapes of one run on this process. case: relaxes, plug, friction, elements, accuracy."""
     relaxes, plug, friction, elements, accuracy = case
     made = scene(relaxes, plug or (HOT, 0), friction, elements, MPI.COMM_SELF)
     stages, stopped = process(plug is not None), ""
@@ -90,7 +90,7 @@ def form(case):
 
 
 def under_plug(path, state):
-    """Force on the plug at full travel, temperature and wall of the base there."""
+    """Return the force on the plug at full travel, and temperature and wall of the base there."""
     below, above = path.temperature([[0.0, 0.0], [0.0, THICKNESS]], state)
     return {"plug_force_N": -float(state.measures["plug_force"]),
             "base_under_plug": float(path.profile(state).wall_ratio[0]),
@@ -98,7 +98,7 @@ def under_plug(path, state):
 
 
 def thickness(profile):
-    """Wall over the sheet's thickness: of the base, of what lies in the middle of the corner, and the least."""
+    """Return the walls of base and corner and the minimum wall, over the thickness of the sheet."""
     arc = next(p for p in POT.mould.pieces if getattr(p, "radius", None) == FILLET)
     middle = arc.centre + FILLET * np.array([np.cos(a := arc.start + arc.sweep / 2), np.sin(a)])
     ratio, corner = profile.wall_ratio, np.hypot(*(profile.top - middle).T).argmin()
@@ -111,12 +111,12 @@ def name_of(plug):
 
 
 def combination(relaxes, chills, rubs):
-    """What is there of the three factors, in words."""
+    """Return the names of the factors that are present."""
     return " + ".join(f for f, there in zip(FACTORS, (relaxes, chills, rubs)) if there) or "none of the three"
 
 
 def cases_of(quick):
-    """{name: (relaxes, plug, friction)}: plugs, what the three factors do, and what is beside them."""
+    """Return {name: (relaxes, plug, friction)} of the plugs, of the eight combinations, and of runs for comparison."""
     plugs = [PLUGS[0], MOST] if quick else PLUGS
     cases = {name_of(plug): (True, plug, "by temperature") for plug in plugs} | {
         "straight vacuum": (True, None, "by temperature")}
@@ -129,13 +129,13 @@ def cases_of(quick):
 
 
 def effects(factorial):
-    """{factor: {wall: its effect, averaged over the other two}}, of {(relaxes, chills, rubs): numbers}."""
+    """Return {factor: {wall: effect, averaged over the other two}} of {(relaxes, chills, rubs): numbers}."""
     return {factor: {key: float(np.mean([(1 if which[k] else -1) * n[key] for which, n in factorial.items()]) * 2)
                      for key in KEYS} for k, factor in enumerate(FACTORS)}
 
 
 def line(name, n):
-    """One run in words."""
+    """Return a line about one run."""
     wall = ", ".join(f"{word} {n[key]:.4f}" for key, word in KEYS.items() if key in n)
     under = "" if "base_under_plug" not in n else (
         f"; under the plug {n['base_under_plug']:.4f}, {n['base_C_at_plug']:.1f} C at the plug")
@@ -143,7 +143,7 @@ def line(name, n):
 
 
 def draw(found, shapes, factorial):
-    """The coldest run, walls of all plugs, and what the factors do."""
+    """Return a figure: the run of the coldest plug, the walls of all plugs, the effects of the factors."""
     figure, (sections, walls, bars) = plots.figure(3, width=4.2, height=4.2)
     sections.plot(*POT.mould.outline().T, "k", linewidth=1.2)
     sections.plot(*(POT.plug.outline() + [0, TRAVEL]).T, "0.6", linewidth=1.2)

@@ -16,7 +16,17 @@ COMM = MPI.COMM_WORLD
 
 def parser(name: str, about: str, elements: int | None = None, layers: int | None = None,
            accuracy: float | None = None) -> argparse.ArgumentParser:
-    """Options that all demos share, --out and --quick, and those for which a default is given; about: its docstring."""
+    """Return a parser with the options of all demos.
+
+    --out and --quick always; --elements, --layers and --accuracy if a default is given.
+
+    Args:
+        name: name of the demo.
+        about: its docstring; the first line is the description.
+        elements: default of --elements, or None.
+        layers: default of --layers, or None.
+        accuracy: default of --accuracy, or None.
+    """
     options = argparse.ArgumentParser(prog=f"demos/{name}.py", description=about.splitlines()[0],
                                       formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, help="folder for results")
@@ -44,7 +54,7 @@ def save(figure, file: Path) -> None:
 
 
 def plain_ticks(axis, values) -> None:
-    """Those of these ticks of a logarithmic axis that it reaches, written as they are."""
+    """Set those of the given ticks that a logarithmic axis reaches, written as plain numbers."""
     low, high = axis.get_view_interval()
     there = [v for v in values if low <= v <= high]
     axis.set_ticks(there, [f"{v:g}" for v in there])
@@ -52,7 +62,7 @@ def plain_ticks(axis, values) -> None:
 
 
 def sweep(function, cases: list) -> list:
-    """function(case) of every case, in parallel: over the ranks, or on one rank in processes of their own.
+    """Return function(case) of every case, computed in parallel: over the ranks, or on one rank in processes.
 
     The function must work on `MPI.COMM_SELF` and be importable by name.
     """
@@ -64,7 +74,7 @@ def sweep(function, cases: list) -> list:
 
 
 def _end_with_parent() -> None:
-    """End this process once the one that started it is gone, killed for one: nobody waits for what it computes."""
+    """End this process when its parent process has ended, because nobody waits for its results."""
     def wait() -> None:
         parent_process().join()
         os._exit(1)
@@ -72,6 +82,6 @@ def _end_with_parent() -> None:
 
 
 def summarise(out: Path, summary: dict) -> None:
-    """Write OUT/summary.json and say where the results are."""
+    """Write OUT/summary.json and print the names of the files in OUT."""
     files.write_summary(out / "summary.json", summary, COMM)
     say(f"Results are in {out}/: " + ", ".join(sorted(f.name for f in out.iterdir())) if COMM.rank == 0 else "")

@@ -32,12 +32,12 @@ MESHES = {"stuck": ((16, 8), 0.025), "stuck_coarse": ((12, 6), 0.05)}      # at 
 
 
 def travel(ratio):
-    """Of the plate, cm."""
+    """Return the travel of the plate (cm) at a compression ratio H/h."""
     return HALF_HEIGHT * (1 - 1 / ratio)
 
 
 def frictionless(elements):
-    """(path, force over the exact one at the ratios, how it ended)."""
+    """Return the path, its force over the exact one at the ratios, and how it ended."""
     scene = block(fx.NeoHookean(c10=I1_CONSTANT), "none", elements, present_area=True)
     path, end = press(scene, [travel(r) for r in RATIOS], progress=False)
     met = {r: path.met(fx.travel(travel(r))) for r in RATIOS}
@@ -46,7 +46,7 @@ def frictionless(elements):
 
 
 def stuck(elements, size, ratios):
-    """(path, numbers) of the stuck block, remeshed on the way."""
+    """Return the path of the stuck block, which is remeshed, and its numbers."""
     scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), "stick", elements, roll_over=True,
                   model=fx.MixedPressure(volume_stiffness=10.0))
     path, end = press(scene, [travel(r) for r in ratios], progress=False,
@@ -93,7 +93,7 @@ def main():
 
 
 def draw(paths):
-    """Forces over the compression ratio."""
+    """Return a figure of the forces over the compression ratio."""
     figure, axes = plots.figure()
     ratio = np.geomspace(1.02, 20, 200)
     axes.plot(ratio, exact_force(HALF_HEIGHT / ratio), "k", linewidth=1, label="without friction, exact, eq. (7.6)")

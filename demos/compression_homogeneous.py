@@ -15,13 +15,13 @@ I1_CONSTANT, PRESSED = 0.10, 0.3288                          # MPa, cm
 
 
 def exact_force(h):
-    """Eq. (7.6), N."""
+    """Return the force (N) of eq. (7.6) at a half height h (cm)."""
     l2 = HALF_HEIGHT / h                                     # radial stretch squared
     return NEWTON * 2 * np.pi * RADIUS**2 * (l2**2 - 1 / l2) * I1_CONSTANT
 
 
 def exact_stress(h):
-    """Second Piola-Kirchhoff stress S^zz of eq. (7.7), MPa."""
+    """Return the second Piola-Kirchhoff stress S^zz (MPa) of eq. (7.7) at a half height h (cm)."""
     return -2 * ((HALF_HEIGHT / h) ** 3 - 1) * I1_CONSTANT
 
 

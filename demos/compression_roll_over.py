@@ -17,12 +17,12 @@ GRIDS = ((8, 4), (16, 8), (24, 16))
 
 
 def travel(ratio):
-    """Of the plate, cm."""
+    """Return the travel of the plate (cm) at a compression ratio H/h."""
     return HALF_HEIGHT * (1 - 1 / ratio)
 
 
 def plate_stress(path, state):
-    """(r, normal stress on the plate) of both faces that touch it, sorted by r."""
+    """Return r and the normal stress on the plate, of both faces that touch it, sorted by r."""
     found = []
     for contact in path.problem.contacts:
         with path.problem.state_context(state):
@@ -38,7 +38,7 @@ def plate_stress(path, state):
 
 
 def compress(elements, friction="stick"):
-    """(path, {ratio as text: state that met it}, how it ended)."""
+    """Return the path, {ratio as text: state that met it}, and how the path ended."""
     scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True, nodes_per_step=1)
     path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
     met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}

@@ -18,14 +18,17 @@ NAMES = {"none": "frictionless", "stick": "stick"}
 
 
 def lindley(deflection, c=1.1):
-    """Eq. (7.9) with k = 1, N: c = C01 + C10, MPa."""
+    """Return Lindley's force (N) at a total deflection (cm): eq. (7.9) with k = 1, c = C01 + C10 (MPa)."""
     axial = 1 - deflection / (2 * HALF_HEIGHT)               # 1 / lambda_r^2
     shape = 1 + RADIUS**2 / (8 * HALF_HEIGHT**2)
     return NEWTON * 6 * np.pi * RADIUS**2 * c * shape * (1 - axial) * (2 - axial)
 
 
 def tanner(deflection, c=1.1):
-    """Eq. (7.11), the force at h = H/2, taken as proportional to the deflection, N."""
+    """Return Tanner's force (N) at a total deflection (cm).
+
+    Eq. (7.11) gives the force at h = H/2; it is taken as proportional to the deflection.
+    """
     at_half = NEWTON * 9 / 16 * np.pi * RADIUS**2 * 6 * c * (RADIUS / (HALF_HEIGHT / 2)) ** 2
     return at_half * deflection / HALF_HEIGHT
 
@@ -69,9 +72,10 @@ def main():
 
 
 def beyond(n, out) -> dict:
-    """Stuck, to a total deflection of 1.3 cm as the thesis, with roll-over and without, on 64 triangles and on ours.
+    """Return the numbers of stuck blocks at a total deflection of 1.3 cm, the largest of the thesis.
 
-    Where a run does not reach it: the state that was pressed furthest, which is not `reached`.
+    The blocks have a side that may roll onto the plates or not, on 64 triangles and on n x n elements. A run that ends
+    earlier gives its largest deflection, and `reached` is false.
     """
     found = {}
     for elements in dict.fromkeys([(8, 4), (n, n)]):

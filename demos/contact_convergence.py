@@ -11,7 +11,7 @@ MEASURES = {"correction": r"$\|\Delta x\|/\|x\|$  (3.5.1)", "work": "work, over 
 
 
 def errors(state):
-    """{measure: its values, one per iteration}; the converged state gives the last residual only."""
+    """Return {quantity: its values, one per iteration}; the converged state has a residual alone."""
     return {name: [value for value in (getattr(i, name) for i in state.history) if value > 0] for name in MEASURES}
 
 

@@ -18,7 +18,7 @@ LAWS = ("stick", "none", 0.3)
 
 
 def form(friction, elements, pressures=PRESSURES, kinematics=None, step=None, **options):
-    """The path to the last pressure, and the mould; in plane strain, the cup is a long trough."""
+    """Return the path to the last pressure, and the mould; in plane strain, the cup is a long trough."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
     mould = fx.tools.cup(radius=RADIUS, depth=DEPTH, mouth=THICKNESS, fillet=FILLET)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=I1_CONSTANT, c01=I2_CONSTANT),
@@ -31,7 +31,7 @@ def form(friction, elements, pressures=PRESSURES, kinematics=None, step=None, **
 
 
 def key_numbers(path, mould):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     corner = mould.pieces[1]
     angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -22,7 +22,7 @@ INSIDE = 0.95                                                # of the radius: th
 
 
 def form(mesh, pressures):
-    """The path to the last pressure."""
+    """Return the path to the last pressure."""
     mould = fx.tools.cup(radius=RADIUS, depth=DEPTH, mouth=THICKNESS, fillet=CORNER)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=I1_CONSTANT, c01=I2_CONSTANT),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
@@ -32,7 +32,7 @@ def form(mesh, pressures):
 
 
 def disc(columns):
-    """Columns of one size."""
+    """Return a mesh with columns of one size."""
     return fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=(columns, 2))
 
 
@@ -70,7 +70,7 @@ def main():
 
 
 def columns(path) -> int:
-    """How many."""
+    """Return the number of columns of a path's mesh."""
     return len(path.problem.scene.mesh.columns.ends) - 1
 
 

@@ -18,7 +18,7 @@ PRESSURES = (2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
 
 
 def form(friction, elements, depth, draft, fillet):
-    """The path to the last pressure, and the mould."""
+    """Return the path to the last pressure, and the mould."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
     mould = fx.tools.cup(radius=RADIUS, depth=depth, mouth=THICKNESS, draft=draft, fillet=fillet)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
@@ -30,7 +30,7 @@ def form(friction, elements, depth, draft, fillet):
 
 
 def key_numbers(path, mould):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     corner = next(p for p in mould.pieces if hasattr(p, "radius"))
     angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -18,7 +18,7 @@ EXACT = {s: membrane_inflation(s, radius=1.0, thickness=THICKNESS, c10=C10) for 
 
 
 def inflate(size):
-    """The path to pole stretch 3."""
+    """Return the path to pole stretch 3, on triangles of a size, and its targets."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=C10), loads=[fx.Pressure("bottom")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
@@ -27,7 +27,7 @@ def inflate(size):
 
 
 def key_numbers(path, targets):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     limit = membrane_limit_point(radius=1.0, thickness=THICKNESS, c10=C10)[1].pressure
     states = {f"{s:g}": (path.met(target), EXACT[s]) for s, target in zip(STRETCHES, targets)}
     return {

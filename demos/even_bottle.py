@@ -19,13 +19,13 @@ ROUND = np.pi / 2 * RADIUS                                    # length of the in
 
 
 def along_meridian(Z):
-    """Part of the inner meridian, 0 at the axis, 1 at the neck, at heights of the inner face."""
+    """Return the share of the inner meridian, 0 at the axis, 1 at the neck, at heights Z of the inner face."""
     angle = np.arccos(np.clip(-np.minimum(Z, 0.0) / RADIUS, -1, 1))
     return (np.where(Z < 0, RADIUS * angle, ROUND + Z)) / (ROUND + LENGTH)
 
 
 def bottle(wall, elements=(60, 1)):
-    """The scene of a parison with a programmed wall, and its target."""
+    """Return the scene of a parison with a programmed wall, and the target of its run."""
     mesh = fx.mesh.parison(inner_radius=RADIUS, thickness=lambda Z: wall(along_meridian(Z)), length=LENGTH,
                            elements=elements)
     mould = fx.tools.bottle(radius=BODY, height=10.0, neck=NECK, shoulder=SHOULDER, neck_height=LENGTH - BASE - 12.0,

@@ -20,12 +20,12 @@ MODELS = {"membrane": fx.Membrane, "solid": fx.MixedPressure}
 
 
 def relative(profile, R):
-    """A profile, whose logarithms are given, over its value at the pole."""
+    """Return a profile at R over its value at the pole; `profile` gives its logarithm."""
     return np.exp(profile(R) - profile(0.0))
 
 
 def sheet(model, elements, stretch, h0=None, c=None):
-    """The scene of a sheet with profiles of thickness or constant, and its target."""
+    """Return the scene of a sheet with a profile of thickness or constant, and the target of its run."""
     mesh = fx.mesh.disc(radius=1.0, elements=elements, concentrate={0.0: 0.5, 1.0: 0.15},   # the rim turns, a solid's
                         thickness=THICKNESS if h0 is None else lambda R: THICKNESS * relative(h0, R))
     c10 = C if c is None else lambda R, Z: C * relative(c, R)
@@ -35,14 +35,14 @@ def sheet(model, elements, stretch, h0=None, c=None):
 
 
 def search(model, elements, knots, stretch, of):
-    """The answer of one case: `of` is "h0" or "c"."""
+    """Return the answer of one case; `of` is "h0" or "c"."""
     design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
                        {"profile": fx.spline(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
     return design.fit(even=True, volume=None, runs=6, good=2e-4)
 
 
 def numbers(answer, name):
-    """What the summary holds of one answer."""
+    """Return the numbers of the summary of one answer."""
     profile, wall = answer.values["profile"], answer.best.wall
     over = {"h0_over_h": THICKNESS / wall.mean(), "C_over_C0": 1.0}[name]
     pressure = answer.best.path.last.measures["pressure"]

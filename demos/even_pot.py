@@ -24,7 +24,7 @@ STEP = fx.StepControl(target=8)
 
 
 def pot(travel, nose, mu, heat, elements=(24, 1)):
-    """The scene of a pot and its stages; heat: the temperature over R/R0."""
+    """Return the scene of a pot and its stages; heat is the temperature over R/R0."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=SHEET, elements=elements)
     mould = fx.tools.cup(radius=3.0, depth=2.6, mouth=SHEET, draft=8.0, fillet=0.6, lip=0.15)
     plug = fx.tools.male(radius=1.5, height=8.0, base=-8.0, draft=3.0, fillet=nose)
@@ -38,14 +38,14 @@ def pot(travel, nose, mu, heat, elements=(24, 1)):
 
 
 def run(travel, nose, mu, elements=(24, 1), **heat):
-    """The same as one path, the temperatures of the knots as numbers."""
+    """Return the path of a pot; the temperatures of the knots are numbers."""
     places, T = np.linspace(0, 1, len(heat)), list(heat.values())
     scene, stages = pot(travel, nose, mu, lambda s: np.interp(s, places, T), elements)
     return fx.Process(scene).run(stages, step=STEP, progress=False)
 
 
 def cv(path):
-    """Standard deviation over mean of the wall."""
+    """Return the standard deviation over the mean of the wall."""
     profile = path.profile()
     wall = profile.thickness[profile.reference_length <= PART]
     return wall.std() / wall.mean()

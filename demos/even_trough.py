@@ -25,7 +25,7 @@ PLACES = {"rim": 0.0, "half_wall": (DEPTH - 1) / 2, "mouth": DEPTH - 1, "corner_
 
 
 def trough(profile, of, elements):
-    """The scene of a sheet whose thickness ("h0") or constant ("C") goes with a profile over its width, its target."""
+    """Return the scene and its target; thickness ("h0") or constant ("C") varies with a profile over the width."""
     thickness = (lambda R: SHEET * np.exp(profile(R))) if of == "h0" else SHEET
     c10 = (lambda R, Z: C * np.exp(profile(R) - profile(0.5))) if of == "C" else C
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=elements)
@@ -37,14 +37,14 @@ def trough(profile, of, elements):
 
 
 def search(of, elements, knots, runs):
-    """The answer for "h0" or "C"."""
+    """Return the answer for "h0" or "C"."""
     design = fx.Design(lambda profile: trough(profile, of, elements),
                        {"profile": fx.spline(knots, start=0.0, low=-6.0, high=6.0)}, step=fx.StepControl(target=8))
     return design.fit(even=True, volume="kept" if of == "h0" else None, within=(0.0, COUNTED), runs=runs, good=2e-3)
 
 
 def places(answer):
-    """Reference R of the places, on the wall; and of those beside the corner, on the floor."""
+    """Return {name: reference R} of the points on the wall, and of those beside the corner on the floor."""
     profile = answer.best.profile
     R, (r, z) = profile.reference_radius, profile.middle.T
     on_wall = r > z / z.max()                                # beyond the diagonal through the corner
@@ -55,7 +55,10 @@ def places(answer):
 
 
 def arc(answer):
-    """Radius of the free arc in the corner: a wall that touches both sides is (sqrt(2) - 1) of it from the corner."""
+    """Return the radius of the free arc in the corner.
+
+    An arc that touches wall and floor is at a distance of (sqrt(2) - 1) of its radius from the corner.
+    """
     middle = answer.best.profile.middle
     corner = np.array([1.0, DEPTH])
     return float(np.hypot(*(middle - corner).T).min() / (np.sqrt(2) - 1))

@@ -16,12 +16,12 @@ TITLES = {"uniaxial": "uniaxial tension", "pure_shear": "pure shear (planar tens
 
 
 def gent_gent(I1, I2, mu, Jm, c2):
-    """A user's own energy: Gent's and a term in I2 (Pucci and Saccomandi, 2002). The root ends it at its limit."""
+    """Return Gent's energy with a term in I2 (Pucci, Saccomandi 2002); the root ends it at its limit."""
     return -mu * Jm * ufl.ln(ufl.sqrt(1 - (I1 - 3) / Jm)) + c2 * ufl.ln(I2 / 3)
 
 
 def fits(quick):
-    """{name: Fit} of every model."""
+    """Return {name: Fit} of every material."""
     data, terms = fx.treloar1944(), 1 if quick else 3
     models = {"neo-Hookean": fx.NeoHookean, "Mooney-Rivlin": fx.MooneyRivlin, "Yeoh": fx.Yeoh, "Gent": fx.Gent,
               "Arruda-Boyce": fx.ArrudaBoyce, "own: Gent-Gent": fx.Hyperelastic(gent_gent, mu=0.3, Jm=100.0, c2=0.05)}
@@ -31,14 +31,14 @@ def fits(quick):
 
 
 def constants(material):
-    """The constants in a line, four digits; what is zero to round-off as 0."""
+    """Return the constants in a line, with four digits; a constant that is zero to round-off is 0."""
     values = material.parameters
     largest = max(map(abs, values.values()))
     return ", ".join(f"{k} {v if abs(v) > 1e-12 * largest else 0:.4g}" for k, v in values.items())
 
 
 def table(found):
-    """Constants, residuals, and where each material is stable within the range of the data."""
+    """Return lines of constants and residuals, and of the range of stability within the data."""
     lines = [f"{'':16}{'rms of nominal stress, MPa':>41}", f"{'':16}{'all':>8}{'uniaxial':>10}{'pure shear':>12}"
              f"{'equibiaxial':>13}  constants (stresses in MPa)"]
     for name, result in found.items():
@@ -52,7 +52,7 @@ def table(found):
 
 
 def picture(found):
-    """Data and curves, one panel for each test."""
+    """Return a figure of data and curves, a panel for each test."""
     import matplotlib.pyplot as plt
     data = fx.treloar1944()
     figure, panels = plt.subplots(1, 3, figsize=(13, 6), layout="constrained")

@@ -14,7 +14,10 @@ RADIUS, TRAVEL = 10.0, 4.0
 
 
 def draw(thickness, elements):
-    """The path of a disc drawn down by the ball; elements are smaller at the rim, where a thin disc bends sharply."""
+    """Return the path of a disc drawn down by the ball.
+
+    Elements are smaller at the rim, where a thin disc bends sharply.
+    """
     mesh = fx.mesh.disc(radius=RADIUS, thickness=thickness, elements=elements, concentrate={RADIUS: 0.1})
     ball = fx.tools.sphere(radius=4.0, z=thickness)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0),
@@ -25,13 +28,16 @@ def draw(thickness, elements):
 
 
 def watch(path, thickness):
-    """(radii at rest, hoop resultants over shear modulus times thickness of all states, shape (states, n))."""
+    """Return the reference radii of the columns and their hoop resultants.
+
+    The resultants are over shear modulus times thickness, shape (states, n).
+    """
     found = [path.hoop_resultants(state) for state in path.states]
     return found[0].points[:, 0], np.array([one.resultant for one in found]) / (130.0 * thickness)
 
 
 def main():
-    """Draw, count, and look where the hoop is compressed."""
+    """Draw the discs down, count their unstable modes, and find where hoops are compressed."""
     options = parser("flange", __doc__).parse_args()
     elements, modes = ((80, 1), range(7, 10)) if options.quick else ((200, 2), range(2, 25))
     summary = {}

@@ -32,7 +32,7 @@ POT_RADII = (0.25, 0.75, 1.25, 1.75, 2.25, 2.75)
 
 
 def inflated(kind, model, height, elements):
-    """A `build` of one case, a function of b."""
+    """Return the function `build` of one case of the inflated sheet, a function of b."""
     def build(b):
         thickness = (lambda R: THICKNESS * (1 + b * R**2)) if kind == "h0_R2" else THICKNESS
         c10 = (lambda R, Z: C * (1 + b * CONSTANTS[kind](R))) if kind in CONSTANTS else C
@@ -44,7 +44,7 @@ def inflated(kind, model, height, elements):
 
 
 def cup(b, fillet, elements=(30, 1)):
-    """A sheet that sticks to a cup."""
+    """Return the scene of a sheet that sticks to a cup, and its target."""
     mesh = fx.mesh.disc(radius=1.0, thickness=CUP_SHEET, elements=elements)
     mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=CUP_SHEET, draft=10.0, fillet=fillet)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: C * (1 + b * (R**2 - 0.5))),
@@ -54,7 +54,7 @@ def cup(b, fillet, elements=(30, 1)):
 
 
 def pot(mu, travel, nose, c10, relaxing=False, elements=(24, 1)):
-    """A plug, then a little air."""
+    """Return the scene of a plug and a little air, and its stages."""
     mesh = fx.mesh.disc(radius=3.0, thickness=POT_SHEET, elements=elements)
     mould = fx.tools.cup(radius=3.0, depth=2.6, mouth=POT_SHEET, draft=8.0, fillet=0.6, lip=0.15)
     plug = fx.tools.male(radius=1.5, height=8.0, base=-8.0, draft=3.0, fillet=nose)
@@ -70,7 +70,7 @@ def pot(mu, travel, nose, c10, relaxing=False, elements=(24, 1)):
 
 
 def beside(design, values, name, step, radii, thickness):
-    """d(wall/thickness)/d(parameter) at some reference radii, exact and by differences of whole runs."""
+    """Return d(wall/thickness)/d(parameter) at some reference radii: exact, and by differences of whole runs."""
     run = design.run(values)
     R = run.profile.reference_radius
     exact = run.derivative("wall")[1][:, list(values).index(name)]
@@ -80,7 +80,7 @@ def beside(design, values, name, step, radii, thickness):
 
 
 def draw(exact, whole, step):
-    """The derivative of the cup's wall by b."""
+    """Return a figure of the derivative of the cup's wall by b."""
     drawing, axes = figure()
     axes.plot(RADII, list(exact.values()), "C0.-", label="derivative of one run")
     axes.plot(RADII, list(whole.values()), "ko", mfc="none", label=f"differences of runs, b = {step:g} and -{step:g}")
@@ -92,7 +92,7 @@ def draw(exact, whole, step):
 
 
 def ratios(path):
-    """Wall over that at rest at R = 0 and 0.5."""
+    """Return the wall over its reference value at R = 0 and 0.5."""
     profile = path.profile()
     return np.interp([0.0, 0.5], profile.reference_radius, profile.thickness_ratio)
 

@@ -26,7 +26,7 @@ FINE = {"membrane": {float(x): 1.0 for x in PLACES}, "solid": {float(x): 1.0 for
 
 
 def inflate(model, modulus, elements=None):
-    """The path to the largest pole stretch."""
+    """Return the path to the largest pole stretch."""
     mesh = fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=elements or ELEMENTS[model],
                         concentrate=FINE[model])
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: modulus(R)), loads=[fx.Pressure("bottom")],
@@ -36,7 +36,7 @@ def inflate(model, modulus, elements=None):
 
 
 def key_numbers(path, modulus):
-    """{pole stretch: {name: number}}."""
+    """Return {pole stretch: {name: number}} of a path."""
     found = {}
     for stretch in STRETCHES:
         state = path.met(fx.pole_stretch(float(stretch)))
@@ -49,7 +49,7 @@ def key_numbers(path, modulus):
 
 
 def theory(modulus):
-    """`key_numbers` of membrane theory."""
+    """Return the numbers of `key_numbers` by membrane theory."""
     found = {}
     for stretch in STRETCHES:
         exact = membrane_inflation(float(stretch), radius=1.0, thickness=THICKNESS, c10=modulus)
@@ -60,7 +60,7 @@ def theory(modulus):
 
 
 def largest_errors(found, exact):
-    """{name: largest relative difference over the stretches}; the thickness at R = 1 by itself."""
+    """Return {name: largest relative difference over the stretches}; the thickness at R = 1 stands by itself."""
     errors = dict.fromkeys(("p_R0_over_C0_h0", "w_over_R0", "thickness", "thickness_at_1"), 0.0)
     for stretch in STRETCHES:
         a, b = found[stretch], exact[stretch]
@@ -74,7 +74,7 @@ def largest_errors(found, exact):
 
 
 def draw(paths, file):
-    """Modulus, loading curves, and the wall at the largest stretch: solid in lines, membrane dashed."""
+    """Draw modulus, loading curves, and the wall at the largest stretch: solids as lines, membranes dashed."""
     figure, (left, middle, right) = plots.figure(3, width=4.2)
     R = np.linspace(0, 1, 200)
     for k, (case, modulus) in enumerate(CASES.items()):

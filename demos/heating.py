@@ -21,17 +21,17 @@ FLUX, KAPPA = 8000.0, 1500.0                                        # W/m2 into 
 
 
 def run(mesh, boundaries, times, tolerance):
-    """Heat the sheet."""
+    """Return the run of the heated sheet."""
     return fx.heat(mesh, SHEET, boundaries, start=START, times=times, unit="C", tolerance=tolerance)
 
 
 def along(heated, places):
-    """Temperatures at places over the thickness, from the bottom, shape (times, places)."""
+    """Return the temperatures at shares of the thickness from the bottom, shape (times, places)."""
     return heated.at([(0.0, THICKNESS * x) for x in places])
 
 
 def by_air(mesh, sides, tolerance):
-    """(run, its reference as a function of places): convection, sides = ((h, air) of the bottom, of the top)."""
+    """Return the run with convection, and its exact solution at places; sides: (h, air) of bottom and top."""
     heated = run(mesh, [fx.Convection(face, h=h, air=air) for face, (h, air) in zip(("bottom", "top"), sides)],
                  AIR_TIMES, tolerance)
     h, air = zip(*sides)
@@ -39,7 +39,7 @@ def by_air(mesh, sides, tolerance):
 
 
 def by_heaters(mesh, top, bottom, tolerance):
-    """The same between heaters at temperatures top and bottom."""
+    """Return the run between heaters at temperatures `top` and `bottom`, and its exact solution."""
     faces = (("bottom", bottom), ("top", top))
     heated = run(mesh, [law for face, heater in faces for law in (
         fx.Radiation(face, emissivity=EMISSIVITY, heater=heater), fx.Convection(face, h=H, air=AIR))],
@@ -54,7 +54,7 @@ def by_heaters(mesh, top, bottom, tolerance):
 
 
 def by_absorption(mesh, tolerance):
-    """The same, semi-transparent, in a beam from each side."""
+    """Return the run of a semi-transparent sheet in a beam from each side, and its exact solution."""
     heated = run(mesh, [law for face in ("bottom", "top") for law in (
         fx.Absorption(face, flux=FLUX, coefficient=KAPPA), fx.Convection(face, h=H, air=AIR))],
         HEATER_TIMES, tolerance)

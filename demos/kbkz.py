@@ -29,7 +29,7 @@ MET, R_OVER_H, VOLUME = (0.5, 1.0, 3.0), 100.0, 2.0                             
 
 
 def block(melt, mode):
-    """A block of 1 x 1 whose top or rim is pulled."""
+    """Return the scene of a block of 1 x 1 whose top or rim is pulled."""
     face, direction = PULLED[mode]
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=MELTS[melt],
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
@@ -37,7 +37,7 @@ def block(melt, mode):
 
 
 def pull(melt, mode, rate, accuracy):
-    """(the path, {stretch: sigma1 - sigma3}) at a constant Hencky rate."""
+    """Return the path at a constant Hencky rate, and {stretch: sigma1 - sigma3 in Pa}."""
     at = [np.log(stretch) / rate for stretch in STRETCHES]
     stage = fx.Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
                      until=fx.process_time(at[-1]), intermediate=times(0.0, at[:-1]))
@@ -50,7 +50,7 @@ def pull(melt, mode, rate, accuracy):
 
 
 def blow(damping, elements, accuracy):
-    """The path of a disc."""
+    """Return the path of a disc."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1 / R_OVER_H, elements=(elements, 1)),
                      materials=fx.KBKZ(SHEET, DAMPINGS[damping]), model=fx.Membrane(),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
@@ -63,7 +63,7 @@ def blow(damping, elements, accuracy):
 
 
 def numbers(path):
-    """p R0/h0 in MPa and the thickness at the pole at the times MET."""
+    """Return p R0/h0 (MPa) and the thickness ratio at the pole at the times MET."""
     states = [at_time(path, "hold" if t > 1 else "blow", t) for t in MET]
     return {"p_R0_over_h0": {f"{t:g}": R_OVER_H * s.measures["pressure"] for t, s in zip(MET, states)},
             "pole_thickness_ratio": {f"{t:g}": s.measures["pole_stretch"] ** -2 for t, s in zip(MET, states)}}

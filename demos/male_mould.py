@@ -22,7 +22,7 @@ RUNS = (("drape", "none"), ("vacuum", "stick"), ("vacuum", 0.3))
 
 
 def form(process, friction, elements):
-    """The path of a process, "drape" or "vacuum", its targets, and the mould where it ends."""
+    """Return the path of "drape" or "vacuum", its targets, and the mould in its last position."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
     drape = process == "drape"
     if drape:
@@ -41,7 +41,7 @@ def form(process, friction, elements):
 
 
 def key_numbers(path, targets):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     drape = targets[0].name == "travel"
     unit, states = "cm" if drape else "psi", {f"{t.value:g}": path.met(t) for t in targets}
     profiles = {at: path.profile(state) for at, state in states.items()}

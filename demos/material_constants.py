@@ -36,7 +36,7 @@ SAME_LOAD = 10.0                                              # psi, for cases 4
 
 
 def inflate(sheet, elements, until, through=()):
-    """The path of one sheet."""
+    """Return the path of one sheet."""
     radius, thickness, c10, c01 = sheet
     mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=c10, c01=c01), loads=[fx.Pressure("bottom")],
@@ -77,7 +77,7 @@ def relaxing_numbers(sheet, elements, elastic):
 
 
 def sheet_numbers(sheet, path):
-    """Key numbers of a case of table 4.2."""
+    """Return the numbers of a case of table 4.2."""
     radius, _, c10, c01 = sheet
     states = {h: path.met(fx.pole_height(float(h) * radius)).measures for h in HEIGHTS}
     numbers = {
@@ -88,7 +88,7 @@ def sheet_numbers(sheet, path):
 
 
 def plate_numbers(sheet, path):
-    """Key numbers of plate A or B; null where the path has no such state."""
+    """Return the numbers of plate A or B; None where the path has no such state."""
     limit = path.limit_points[0].measures if path.limit_points else None
     top = path["pressure"].max()
     membrane = membrane_limit_point(radius=sheet[0], thickness=sheet[1], c10=sheet[2], c01=sheet[3])
@@ -102,7 +102,7 @@ def plate_numbers(sheet, path):
 
 
 def findings(paths, numbers):
-    """The section's qualitative findings, each as a number."""
+    """Return the qualitative findings of the section, each as a number."""
     thickness = {k: n["pole_thickness_ratio_at_height"]["1.5"] for k, n in numbers.items() if k in CASES}
     uneven = {}
     for name in ("case4", "case5"):
@@ -120,7 +120,7 @@ def findings(paths, numbers):
 
 
 def table(numbers, found):
-    """Own values, the thesis' where its text has them."""
+    """Return lines of our values, and of those of the thesis where its text has them."""
     cell = "{:.5g}".format
     lines = [f"{'':8}{'pole thickness ratio at height/r0 of':>40}{'pressure/K there':>32}{'limit, psi':>14}",
              f"{'':8}" + "".join(f"{h:>13}" for h in HEIGHTS) + " " + "".join(f"{h:>12}" for h in HEIGHTS)]
@@ -153,7 +153,7 @@ def table(numbers, found):
 
 
 def draw(paths, out, quick):
-    """Figures 4.9 to 4.13."""
+    """Draw figures 4.9 to 4.13."""
     names = {k: f"{k[-1]}: {c10:g}, {c01:g} psi, r$_0$/h$_0$ = {r / h:g}" for k, (r, h, c10, c01) in CASES.items()}
     figure, (left, right) = plots.figure(2)
     for k, (name, label) in enumerate(names.items()):

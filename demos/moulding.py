@@ -11,37 +11,40 @@ from formingx.results.show import plots
 
 
 def name_of(friction) -> str:
-    """A friction law as a key of the summary."""
+    """Return the key of a friction law in the summary."""
     return {"none": "frictionless"}.get(friction, friction if isinstance(friction, str) else f"coulomb_{friction:g}")
 
 
 def largest_gap(profile, corner: np.ndarray) -> float:
-    """Largest distance of points of a mould, shape (n, 2), to the facing side of a sheet."""
+    """Return the largest distance from points of a mould, shape (n, 2), to the facing side of a sheet."""
     return float(distance_to_line(corner, profile.top).max())
 
 
 def filled_at(path, corner: np.ndarray, gap: float) -> float | None:
-    """Pressure at which the gap in a corner falls below `gap`; None if it does not."""
+    """Return the pressure at which the gap in a corner falls below `gap`, or None."""
     gaps = [largest_gap(path.profile(s), corner) for s in path.states]
     k = next((k for k, (a, b) in enumerate(zip(gaps, gaps[1:])) if b < gap <= a), None)
     return None if k is None else bisected(path, k, lambda s: largest_gap(path.profile(s), corner) < gap)
 
 
 def first_touch(path, start: int = 0):
-    """The first state at which more than the rim touches."""
+    """Return the first state at which more than the rim touches."""
     rim = path.states[0].measures["contact_length"]
     return next(s for s in path.states[start:] if s.measures["contact_length"] > rim + 1e-12)
 
 
 def first_touch_at(path) -> float:
-    """Pressure at which more than the rim begins to touch."""
+    """Return the pressure at which more than the rim begins to touch."""
     rim, first = path.states[0].measures["contact_length"], first_touch(path)
     k = next(k for k, state in enumerate(path.states) if state is first)
     return bisected(path, k - 1, lambda s: s.measures["contact_length"] > rim + 1e-12)
 
 
 def bisected(path, k: int, beyond) -> float:
-    """Pressure between states k and k + 1 from which on `beyond(state)` is true, to 1/256 of what is between them."""
+    """Return the pressure between states k and k + 1 from which on `beyond(state)` is true.
+
+    The bisection ends at 1/256 of the difference of the two pressures.
+    """
     before, after = (path.states[i].measures["pressure"] for i in (k, k + 1))
     for _ in range(8):
         middle = (before + after) / 2
@@ -51,7 +54,7 @@ def bisected(path, k: int, beyond) -> float:
 
 
 def at_pressures(path, pressures, unit: str) -> dict:
-    """Thickness at given pressures, each of them hit exactly."""
+    """Return the thickness at given pressures, each of them met exactly."""
     profiles = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
     thinnest = {p: int(np.argmin(profile.thickness_ratio)) for p, profile in profiles.items()}
     return {
@@ -63,15 +66,14 @@ def at_pressures(path, pressures, unit: str) -> dict:
 
 
 def cost(path) -> dict:
-    """What a run took."""
+    """Return the counts of a run."""
     counts = path.counts
     return {"steps": counts.steps, "newton_iterations": counts.iterations, "cutbacks": counts.failures,
             "solve_seconds": counts.seconds}
 
 
 def report(path, mould, numbers: dict, pressures, out, name: str, **drawn) -> None:
-    """Say what came out under a friction law, and write its path, its last profile and its picture (`drawn`: its
-    options)."""
+    """Print the results of a friction law; write its path, last profile and picture (options `drawn`)."""
     n = numbers
     filled = "not filled" if n["filled_pressure_psi"] is None else f"filled at {n['filled_pressure_psi']:.4g} psi"
     say(f"{name}: first contact {n['first_contact_pressure_psi']:.5g} psi, {filled}, penetration"
@@ -85,7 +87,7 @@ def report(path, mould, numbers: dict, pressures, out, name: str, **drawn) -> No
 
 
 def write(path, tool, states, out, name: str, **drawn) -> None:
-    """A path, its last profile, and the picture of some of its states."""
+    """Write a path, its last profile, and the picture of some of its states."""
     path.to_csv(out / f"{name}.csv")
     files.write_profile(path.profile(), out / f"{name}_profile.csv", COMM)
     save(draw_forming(path, states, tool, name, **drawn), out / f"{name}.png")
@@ -93,11 +95,18 @@ def write(path, tool, states, out, name: str, **drawn) -> None:
 
 def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "top",
                  along: str = "reference radius R", largest: float = 1.4, curve=None):
-    """Profiles in the mould, thickness and contact pressure against reference arc length: the figure.
+    """Return a figure of profiles in the mould, and of thickness and contact pressure over the reference arc length.
 
-    `unit`: of the pressure, or of the travel of a moving tool; `side`: the face that looks at the tool; `along`: what
-    arc length is called; `largest`: contact pressure that is drawn, over the pressure; `curve`: (arc length, thickness
-    ratio, label) of a law to compare with.
+    Args:
+        path: path of the run.
+        states: states to be drawn.
+        tool: the mould.
+        name: title.
+        unit: unit of the pressure, or of the travel of a moving tool.
+        side: face towards the tool.
+        along: name of the arc length.
+        largest: largest contact pressure to be drawn, over the pressure.
+        curve: (arc length, thickness ratio, label) of a law for comparison.
     """
     control = "pressure" if "pressure" in path.columns else "travel"
     outline, profiles = tool.outline(), [path.profile(state) for state in states]
@@ -125,7 +134,7 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
 
 
 def contact_pressure(path, state, profile, side: str = "top") -> tuple[np.ndarray, np.ndarray]:
-    """(reference arc length, contact pressure per current area) at the nodes of the facing side at a state."""
+    """Return reference arc length and contact pressure per current area, at the nodes of the face towards the tool."""
     with path.problem.state_context(state) as problem:
         points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
     rest, now = getattr(profile, f"reference_{side}"), getattr(profile, side)

@@ -31,7 +31,7 @@ def scene(thickness, elements, weight):
 
 
 def form(thickness, elements, accuracy, time=None):
-    """The path through oven and forming; time: in the oven, of a sheet without weight."""
+    """Return the path through oven and forming; time: time in the oven of a sheet without weight (s)."""
     process = fx.Process(scene(thickness, elements, weight=time is None))
     heat = fx.Stage("heat", duration=time) if time else fx.Stage(
         "heat", until=fx.sag(LIMIT), duration=300.0, intermediate=[fx.process_time(t) for t in TIMES[thickness]])
@@ -43,7 +43,7 @@ def form(thickness, elements, accuracy, time=None):
 
 
 def draw(axes, path, thickness, colour):
-    """Sag and the temperatures of faces and middle over time; the formed wall."""
+    """Draw sag and temperatures of faces and middle over time, and the formed wall."""
     sags, walls = axes
     oven = [s for s in path.states if s.stage == "heat"]
     sags.plot([s.time for s in oven], [1e3 * s.measures["sag"] for s in oven], color=colour, label=f"{thickness} mm")

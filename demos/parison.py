@@ -21,7 +21,7 @@ FILLED = (0.1, 0.3, 0.5, 0.7, 0.85, 0.95)                       # parts of the m
 
 
 def blow(friction, elements):
-    """The path to the last pressure, and the mould."""
+    """Return the path to the last pressure, the mould, and the volume between mould and parison."""
     mesh = fx.mesh.parison(inner_radius=RADIUS, thickness=WALL, length=LENGTH, elements=elements)
     mould = fx.tools.bottle(radius=BODY, height=10.0, neck=NECK, shoulder=SHOULDER, neck_height=LENGTH - BASE - 12.0,
                             base=BASE, fillet=FILLET, shoulder_fillet=FILLET)
@@ -36,13 +36,13 @@ def blow(friction, elements):
 
 
 def content(line):
-    """Volume between a line (r, z), shape (n, 2), and the axis."""
+    """Return the volume between a line (r, z), shape (n, 2), and the axis."""
     (r, s), dz = (line[:-1, 0], line[1:, 0]), np.diff(line[:, 1])
     return abs(np.sum(np.pi / 3 * (r * r + r * s + s * s) * dz))
 
 
 def key_numbers(path, mould, room):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     profile, touch = path.profile(), first_touch(path)
     angles = mould.pieces[-2].start + mould.pieces[-2].sweep * np.linspace(0, 1, 41)
     fillet = mould.pieces[-2].centre + FILLET * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -67,7 +67,7 @@ def key_numbers(path, mould, room):
 
 
 def touching(path, state):
-    """Reference Z of the nodes that touch."""
+    """Return the reference Z of the nodes that touch."""
     with path.problem.state_context(state) as problem:
         points, traction = resultants.traction(problem.contacts[0], state.x, state.control)
     found = points[traction[:, 0] > 0, 1]

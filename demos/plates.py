@@ -17,7 +17,14 @@ NEWTON = 100.0                                               # N in one MPa cm2
 
 def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT, radius=RADIUS, kinematics=None,
           model=None, **options):
-    """A block under a plate that moves down. friction: "stick", "none", mu; roll_over: the side may touch the plate."""
+    """Return the scene of a block under a plate that moves down.
+
+    Args:
+        materials: material, or {layer: material}.
+        friction: "stick", "none" or a coefficient.
+        elements: numbers of elements along the radius and the height.
+        roll_over: True if the side may touch the plate.
+    """
     mesh = fx.mesh.disc(radius=radius, thickness=layers, elements=elements)
     height = sum(layers.values()) if isinstance(layers, dict) else layers
     faces = ("top", "rim") if roll_over else ("top",)
@@ -28,7 +35,7 @@ def block(materials, friction, elements, *, roll_over=False, layers=HALF_HEIGHT,
 
 
 def press(scene, travels, **options):
-    """(path, how it ended): to the last travel of the plate, through the others, or as far as the elements hold."""
+    """Return the path through all travels of the plate, as far as the elements allow, and how it ended."""
     targets = [fx.travel(t) for t in travels]
     options["step"] = fx.StepControl(target=8)
     try:
@@ -38,18 +45,18 @@ def press(scene, travels, **options):
 
 
 def force(state) -> float:
-    """Force on one plate, N."""
+    """Return the force on one plate (N)."""
     return NEWTON * state.measures["tool_force"]
 
 
 def forces(path, travels, keys) -> dict:
-    """{key: force in N} at the travels that were met."""
+    """Return {key: force in N} at the travels that were met."""
     met = {key: path.met(fx.travel(t)) for key, t in zip(keys, travels, strict=True)}
     return {key: force(state) for key, state in met.items() if state is not None}
 
 
 def where(path, state, points) -> np.ndarray:
-    """Where material points (R, Z), shape (n, 2), are in a state, shape (n, 2)."""
+    """Return the positions of material points (R, Z) in a state; both shape (n, 2)."""
     x = path.problem.x.duplicate()
     x.setArray(state.x)
     points = np.asarray(points, dtype=float)
@@ -59,7 +66,7 @@ def where(path, state, points) -> np.ndarray:
 
 
 def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, **style) -> None:
-    """The element edges in a state: material lines."""
+    """Draw the edges of the elements in a state: material lines."""
     fine_r, fine_z = np.linspace(0, radius, 61), np.linspace(0, height, 61)
     for Z in np.linspace(0, height, elements[1] + 1):
         axes.plot(*where(path, state, np.column_stack([fine_r, 0 * fine_r + Z])).T, **style)
@@ -69,7 +76,7 @@ def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, *
 
 
 def draw_grids(path, states, labels, elements, file, **size) -> None:
-    """Deformed grids below one another, all on one scale."""
+    """Draw deformed grids below one another, on one scale."""
     side = [(RADIUS, Z) for Z in np.linspace(0, HALF_HEIGHT, 41)]
     moved = [where(path, s, [*side, (0.0, HALF_HEIGHT)]) for s in states]
     wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]

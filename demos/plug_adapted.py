@@ -48,13 +48,13 @@ def main():
 
 
 def sheet(columns, mu):
-    """Columns of one size; friction shears the face, and elements there are flat."""
+    """Return a mesh with columns of one size; friction shears the face, so elements there are flat."""
     through = THROUGH if mu >= ROUGH else (1,)
     return fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=(columns, through), comm=MPI.COMM_SELF)
 
 
 def push(mesh, mu, fillet, travels):
-    """(path, how it ended) of a sheet under the plug, pushed through the travels."""
+    """Return the path of a sheet under the plug through the travels, and how it ended."""
     scene = fx.Scene(
         mesh=mesh, materials=fx.NeoHookean(c10=C10), model=fx.MixedPressure(space="P1"),
         supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -64,7 +64,7 @@ def push(mesh, mu, fillet, travels):
 
 
 def run(case):
-    """Pilots and the run of one coefficient of friction: its numbers, and what is drawn of it."""
+    """Return the numbers of one coefficient of friction, and the curves to be drawn."""
     mu, fillet, travels = case
     pilots = [travels[:1]] if mu >= ROUGH or len(travels) < 3 else [travels[:1], travels[:2]]
     if fillet == SHARP:
@@ -92,13 +92,13 @@ def run(case):
 
 
 def forces(path, travels) -> dict:
-    """{travel as text: force, N} at those that a path met."""
+    """Return {travel as text: force in N} at the travels that a path met."""
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     return {t: plugs.force(state) for t, state in met.items() if state is not None}
 
 
 def tell(mu, fillet, n) -> None:
-    """The numbers of one run."""
+    """Print the numbers of one run."""
     uniform = [n["uniform"]] if "uniform" in n else []
     say(f"mu = {mu:g}, edge {fillet:.3g} cm: {n['columns']} columns (pilots {n['columns_of_pilots']}), {n['jumps']}"
         f" jumps, {n['steps']} states, {n['solve_seconds']:.1f} s; force (membrane), N: " + ", ".join(
@@ -109,7 +109,7 @@ def tell(mu, fillet, n) -> None:
 
 
 def draw(ran):
-    """Force over travel, the membrane dashed, and the columns that the pilots made."""
+    """Return a figure: force over travel, the membrane dashed, and the columns of the adapted meshes."""
     figure, (left, right) = plots.figure(2, width=5.0)
     for k, ((mu, fillet, _), (_, (travel, force, at, membrane, ends))) in enumerate(ran):
         label = f"$\\mu$ = {mu:g}" + (", edge $h_0/8$" if fillet == SHARP else "")

@@ -34,7 +34,7 @@ LABELS = {"straight": "straight vacuum", "lifts": "plug, sheet lifts off", "hold
 
 
 def plug_then_vacuum(way, radius, share, elements, comm=COMM, progress=True):
-    """The path of the process, the plug travelling to a share of the depth first."""
+    """Return the path of the process; the plug travels a share of the depth first."""
     lifts = way == "lifts"
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements, comm=comm)
     plug = fx.tools.male(radius=radius, height=40.0, base=-40.0, fillet=EDGE)
@@ -62,12 +62,12 @@ def plug_then_vacuum(way, radius, share, elements, comm=COMM, progress=True):
 
 
 def end_of(path, stage):
-    """The last state of a stage."""
+    """Return the last state of a stage."""
     return [state for state in path.states if state.stage == stage][-1]
 
 
 def thickness(path, state) -> dict:
-    """Thickness ratio of the base, of what lies in the middle of the corner, and of the thinnest place."""
+    """Return the thickness ratios of base and corner and the smallest one."""
     arc = next(p for p in MOULD.pieces if hasattr(p, "radius"))
     angle = arc.start + arc.sweep / 2
     profile = path.profile(state)
@@ -78,7 +78,7 @@ def thickness(path, state) -> dict:
 
 
 def case(arguments):
-    """One point of the map, on this process alone: its thickness, or why there is none."""
+    """Return the thickness ratios of one point of the map, or why there are none, on this process."""
     way, radius, share, elements = arguments
     try:
         path = plug_then_vacuum(way, radius, share, elements, MPI.COMM_SELF, progress=False)
@@ -121,7 +121,7 @@ def main():
 
 
 def draw(paths, radius):
-    """The stages of the plug that carries the base, and thickness of all: figs. 6.16 and 6.17."""
+    """Return a figure of the stages of the plug that carries the base, and of all walls: figs. 6.16 and 6.17."""
     figure, (shapes, ratios) = plots.figure(2, width=5.2, height=5.0)
     path = paths["carries"]
     shapes.plot(*MOULD.outline().T, "k", linewidth=1.5)
@@ -141,7 +141,7 @@ def draw(paths, radius):
 
 
 def draw_map(found, radii, ways):
-    """Base, corner and thinnest place over plug radius, for every travel and way."""
+    """Return a figure of base, corner and minimum wall over the plug's radius, for every travel and way."""
     figure, axes = plots.figure(3, width=3.8)
     for ax, key in zip(axes, ("base", "corner", "least")):
         for share, way in ways:

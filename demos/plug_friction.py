@@ -52,7 +52,7 @@ def main():
 
 
 def run(case) -> dict:
-    """One coefficient of friction: its numbers, and what is drawn of it."""
+    """Return the numbers of one coefficient of friction, and the curves to be drawn."""
     mu, fillet, refine, travels, folder = case
     membrane, rough = membrane_curve(mu, fillet, travels[-1]), mu >= ROUGH
     path, end, elements = pushed(mu, fillet, membrane, travels, refine * (2 if mu >= HELD else 1),
@@ -74,7 +74,7 @@ def run(case) -> dict:
 
 
 def pushed(mu, fillet, membrane, travels, refine, through, ramp) -> tuple:
-    """(path, how it ended, elements) of a sheet whose elements are made for the last of these travels."""
+    """Return the path of a sheet whose elements suit the last travel, how it ended, and the elements."""
     stretch = float(np.interp(travels[-1], membrane.travel, membrane.face_stretch))
     made, elements = plugs.sliding(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), mu, min(stretch, MOST),
                                    refine, through, penalty=2e5, ramp=ramp, elastic_slip=5e-3,
@@ -83,7 +83,13 @@ def pushed(mu, fillet, membrane, travels, refine, through, ramp) -> tuple:
 
 
 class Membrane(NamedTuple):
-    """A membrane that slides over the plug: travel, cm, force, N, stretch of its face, shapes (n,)."""
+    """Curves of a membrane that slides over the plug.
+
+    Attributes:
+        travel: travel of the plug, cm, shape (n,).
+        force: force on the plug, N, shape (n,).
+        stretch: stretch of the face of the membrane, shape (n,).
+    """
 
     travel: np.ndarray
     force: np.ndarray
@@ -91,7 +97,7 @@ class Membrane(NamedTuple):
 
 
 def membrane_curve(mu, fillet, last) -> Membrane:
-    """The membrane, up to a travel."""
+    """Return the curves of the membrane, up to a travel."""
     found = [(0.0, 0.0, 1.0)]
     for stretch in FACE_STRETCHES:
         state = membrane_sliding_over_plug(stretch, radius=RADIUS, plug_radius=PLUG, fillet=fillet,
@@ -115,7 +121,7 @@ def at_travels(path, travels) -> dict:
 
 
 def key_numbers(path, end, travels) -> dict:
-    """Forces, walls, jumps and cost of one path."""
+    """Return forces, walls, jumps and cost of one path."""
     return {
         **at_travels(path, travels),
         "jumps": len(path.jumps),
@@ -130,7 +136,7 @@ def key_numbers(path, end, travels) -> dict:
 
 
 def tell(mu, n) -> None:
-    """The numbers of one run."""
+    """Print the numbers of one run."""
     say(f"mu = {mu:g}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton"
         f" iterations, {n['cutbacks']} cut back, {n['jumps']} jumps, {n['solve_seconds']:.1f} s; force (membrane), N: "
         + ", ".join(f"{t} cm {f:.1f} ({n['membrane_force_N_at_travel_cm'][t]:.0f})"
@@ -140,7 +146,7 @@ def tell(mu, n) -> None:
 
 
 def draw(runs):
-    """Force over travel, jumps ringed, the membrane dashed, and the wall at the end."""
+    """Return a figure: force over travel, jumps as rings, the membrane dashed, and the wall at the end."""
     figure, (forces, walls) = plots.figure(2, width=5.0)
     for k, (mu, found) in enumerate(runs.items()):
         forces.plot(found["travel"], found["force"], color=f"C{k}", label=f"$\\mu$ = {mu:g}")

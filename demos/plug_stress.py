@@ -27,7 +27,7 @@ LABELS = {"sigma_1": r"$\sigma_1$, MPa", "sigma_3": r"$\sigma_3$, MPa", "eps_1":
 
 
 class Corners:
-    """Values at the corners of all cells that lie near the plug, each cell with its own: shape (cells, 3)."""
+    """Values at the corners of all cells near the plug, shape (cells, 3)."""
 
     def __init__(self, path, state):
         fields, stress = Fields(path), path.stress(state).in_cells(CORNERS)
@@ -45,7 +45,7 @@ class Corners:
         self.values = {name: rows[..., 4 + k] for k, name in enumerate(names)}
 
     def largest(self, name) -> dict:
-        """The largest value, and where: R, height in the sheet at rest, side."""
+        """Return the largest value and its place: R, height in the reference sheet, side."""
         k = np.unravel_index(self.values[name].argmax(), self.values[name].shape)
         R, Z = self.rest[k]
         side = "top" if Z > 0.95 * THICKNESS else "bottom" if Z < 0.05 * THICKNESS else "inside"
@@ -54,14 +54,14 @@ class Corners:
 
 
 def press(law, elements, fillet, travels):
-    """The path through the travels."""
+    """Return the path through the travels."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, fillet, fx.NeoHookean(c10=C10), law, elements)
     *through, until = [fx.travel(t) for t in sorted(travels)]
     return fx.trace(made, until=until, intermediate=through, step=fx.StepControl(target=6), max_steps=400)
 
 
 def key_numbers(path, state, corners) -> dict:
-    """What the summary holds of one state."""
+    """Return the numbers of the summary of one state."""
     found = {f"largest_{name}": corners.largest(name) for name in corners.values}
     sigma, eps = found["largest_sigma_1"], found["largest_eps_1"]
     apart = np.hypot(sigma["r_cm"] - eps["r_cm"], sigma["z_cm"] - eps["z_cm"])
@@ -98,7 +98,7 @@ def main():
 
 
 def tell(name, n) -> None:
-    """The numbers of one state."""
+    """Print the numbers of one state."""
     say(f"{name}:", *(f"  largest {key[8:]:8} {m['value']:8.4f} at R = {m['R_cm']:.3f} cm, Z = {m['Z_over_h0']:.2f} h0,"
                       f" {m['side']}" for key, m in n.items() if key.startswith("largest")),
         f"  largest sigma_1 and eps_1 are {n['distance_of_largest_sigma_1_and_eps_1_over_rp']:.3f} rp apart",
@@ -106,8 +106,11 @@ def tell(name, n) -> None:
 
 
 def draw(found, tool, travel, law):
-    """Contours near the plug, in units (right of the bar) and normalised to 0 ... 1 as in the thesis (left), the
-    largest value ringed, and the first principal direction of strain: figs. 6.11 to 6.13, 6.15."""
+    """Return a figure of contours near the plug and of the first direction of strain: figs. 6.11 to 6.15.
+
+    The scales show units to the right and, as in the thesis, values from 0 to 1 to the left. A ring marks the
+    largest value.
+    """
     figure, axes = plots.figure(3, width=4.6, height=3.5, rows=2)
     x, triangles = found.now.reshape(-1, 2), np.arange(found.now[..., 0].size).reshape(-1, 3)
     near = x[:, 0] < 1.6 * PLUG
@@ -146,7 +149,7 @@ def draw(found, tool, travel, law):
 
 
 def draw_faces(paths):
-    """The first principal stress along both faces: fig. 6.14."""
+    """Return a figure of the first principal stress along both faces: fig. 6.14."""
     figure, axes = plots.figure(len(paths), width=4.8)
     R = np.linspace(0, 0.97 * RADIUS, 400)
     for ax, (law, path) in zip(axes, paths.items()):

@@ -20,27 +20,30 @@ GROWTH, AT_RIM = 0.09, 0.5
 
 
 def plug(radius, thickness, fillet, height=60.0):
-    """A round flat-ended plug with a rounded edge, that stands on a sheet."""
+    """Return a round plug with a flat end and a rounded edge, which stands on the sheet."""
     return fx.tools.male(radius=radius, height=height, base=-height, fillet=fillet).mirrored().moved(z=thickness)
 
 
 def sheet(radius, thickness, plug_radius, law, elements, near=None, comm=COMM):
-    """Small elements where the law asks for them: around the edge, or wherever the sheet slides over it.
+    """Return the mesh of a sheet, with small elements around the edge, or wherever the sheet slides over it.
 
-    near: {radius: size of the elements there over that of the largest}, if they are to be elsewhere.
+    near: {radius: size of the elements there over that of the largest}, for other places of the small elements.
     """
     near = near or ({1.1 * plug_radius: 0.2} if law in ("held", "stick") else {0.65 * plug_radius: 0.2})
     return fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate=near, comm=comm)
 
 
 def name_of(law) -> str:
-    """A law as a key of the summary."""
+    """Return the key of a law in the summary."""
     return law if isinstance(law, str) else f"coulomb_{law:g}"
 
 
 def scene(radius, thickness, plug_radius, fillet, material, law, elements, support=None, near=None, model=None,
           comm=COMM, **options):
-    """A sheet held at its rim under a plug that moves down. law: of LAWS, or a coefficient of friction."""
+    """Return the scene of a sheet fixed at its rim under a plug that moves down.
+
+    law: one of LAWS, or a coefficient of friction.
+    """
     friction, separates = LAWS.get(law, (law, True))
     mesh = sheet(radius, thickness, plug_radius, law, elements, near, comm)
     return fx.Scene(mesh=mesh, materials=material, supports=[fx.Symmetry("axis"), support or fx.Clamped("rim")],
@@ -50,14 +53,15 @@ def scene(radius, thickness, plug_radius, fillet, material, law, elements, suppo
 
 
 def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, refine=1, through=(1,), **options):
-    """(scene, elements) of a sheet that slides over the edge with Coulomb friction; options: of `scene`.
+    """Return the scene of a sheet that slides over the edge with Coulomb friction, and its numbers of elements.
 
-    refine: divides the elements along the sheet; through: relative sizes of those through it, the last one at the face
-    that touches.
+    The size of the elements is in proportion to the radius, so that the same number lies around the edge at any travel.
+    At the axis it is a third of the size that suits the edge when the face is stretched by face_stretch. From half way
+    to the rim it falls to AT_RIM of the largest. The elements are slim, so pressures are continuous.
 
-    Elements in proportion to the radius: whatever comes to the edge has as many around it. At the axis they are a third
-    of what the edge holds when the face is stretched by face_stretch; half way to the rim they begin to fall to AT_RIM
-    of the largest. They are slim, so pressures are continuous.
+    Args:
+        refine: divisor of the element size along the sheet.
+        through: relative sizes of the elements through the sheet, the last one at the face that touches.
     """
     smallest = 2 * plug_radius / radius / face_stretch / 3
     along = (np.log(1 / smallest) + np.log(1 / AT_RIM) / (1 - AT_RIM)) / GROWTH
@@ -69,9 +73,9 @@ def sliding(radius, thickness, plug_radius, fillet, material, mu, face_stretch, 
 
 
 def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
-    """(path, how it ended): to the last travel, or to a pole stretch, through the (other) travels.
+    """Return the path to the last travel, or to a pole stretch, through all travels, and how it ended.
 
-    smallest: length of a step below which a run gives up.
+    smallest: step length below which a run gives up.
     """
     targets = [fx.travel(t) for t in travels]
     until = targets.pop() if pole_stretch is None else fx.pole_stretch(pole_stretch)
@@ -83,9 +87,10 @@ def push(made, travels, pole_stretch=None, smallest=1e-6, **options):
 
 
 def driven_nodes(radius, thickness, plug_radius, material, elements):
-    """The scheme of the thesis (6.1 to 6.4): nodes within the plug's radius go with it, not sideways; the face is free.
+    """Return the scene of the thesis' scheme (6.1 to 6.4): nodes within the plug's radius move with it.
 
-    They are of the lower face and go up: the same upside down.
+    These nodes do not move sideways; the face is free. They belong to the lower face and move up: the same scene upside
+    down.
     """
     mesh = fx.mesh.disc(radius=radius, thickness=thickness, elements=elements, concentrate={plug_radius: 0.2})
     return fx.Scene(mesh=mesh.with_part("plug", "bottom", (0, plug_radius)), materials=material, supports=[
@@ -94,22 +99,25 @@ def driven_nodes(radius, thickness, plug_radius, material, elements):
 
 
 def force(state) -> float:
-    """Force on the plug, N, whether it is a tool or driven nodes."""
+    """Return the force on the plug (N), of a tool or of driven nodes."""
     found = state.measures
     return NEWTON * (found["tool_force"] if "tool_force" in found else -found["support_force"])
 
 
 def force_limit(plug_radius, thickness, c10) -> float:
-    """The force that a frictionless plug on a neo-Hookean membrane cannot pass, N: 2 pi rp T, T = 2 c10 h0.
+    """Return the largest force (N) of a frictionless plug on a neo-Hookean membrane: 2 pi rp T, T = 2 c10 h0.
 
-    T = 2 c10 h0 (1 - l^-6) is the tension, per current length, of a membrane stretched l both ways, as it is under the
-    plug; around an edge without friction it stays the same, and the wall can do no more than hang straight down.
+    T = 2 c10 h0 (1 - l^-6) is the tension, per current length, of a membrane stretched l in both directions, as under
+    the plug. Around an edge without friction it stays the same, and the wall can at most hang straight down.
     """
     return NEWTON * 4 * np.pi * plug_radius * c10 * thickness
 
 
 def course(path, end, travels, places) -> dict:
-    """Forces and thickness of one path. places: {name: reference radius}; travels not met have no entry."""
+    """Return forces and thickness of one path; a travel that was not met has no entry.
+
+    places: {name: reference radius}.
+    """
     met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
     met = {key: state for key, state in met.items() if state is not None}
     shapes = {key: path.profile(state) for key, state in met.items()}
@@ -128,7 +136,7 @@ def course(path, end, travels, places) -> dict:
 
 
 def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
-    """What the summary holds of the path of a plug: `course`, and what its last state is like."""
+    """Return the numbers of the summary of the path of a plug: `course`, and numbers of its last state."""
     return {
         **course(path, end, travels, places),
         **shape_numbers(path, path.last, plug_radius, thickness),
@@ -137,7 +145,10 @@ def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
 
 
 def shape_numbers(path, state, plug_radius, thickness) -> dict:
-    """Stretches at the pole, least and largest wall of what lay under the plug at rest, hoop stretch outside it."""
+    """Return stretches at the pole, the smallest and largest wall under the plug, and the hoop stretch outside it.
+
+    Points under the plug are those within its radius in the reference configuration.
+    """
     shape = path.profile(state)
     flat = shape.wall_ratio[shape.reference_radius <= plug_radius]
     outside = shape.reference_top[:, 0] > plug_radius
@@ -150,13 +161,13 @@ def shape_numbers(path, state, plug_radius, thickness) -> dict:
 
 
 def pole_stretches(path, state, thickness) -> dict:
-    """Principal stretches of the top face at the pole: in the plane and through the thickness."""
+    """Return the principal stretches of the top face at the pole: in the plane and through the thickness."""
     F = path.stress(state).at([[0.0, thickness]]).deformation_gradient[0]
     return {"meridional": float(F[0, 0]), "hoop": float(F[2, 2]), "thickness": float(F[1, 1])}
 
 
 def tell(name, n) -> None:
-    """How far a run went, and what it cost."""
+    """Print how far a run went, and its cost."""
     say(f"{name}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton iterations,"
         f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s; hoop stretch outside the plug off 1 by"
         f" {n['mean_hoop_deviation_outside_plug']:.3f} in the mean; wall under the plug over h0"
@@ -165,19 +176,19 @@ def tell(name, n) -> None:
 
 
 def states(path, travels) -> list:
-    """Those that were met, and the last one."""
+    """Return the states of the travels that were met, and the last one."""
     found = [path.met(fx.travel(float(t))) for t in travels]
     return [*(s for s in found if s is not None and s is not path.last), path.last]
 
 
 def write(path, out, name) -> None:
-    """A path and its last profile as files."""
+    """Write a path and its last profile to files."""
     path.to_csv(out / f"{name}.csv")
     files.write_profile(path.profile(), out / f"{name}_profile.csv", COMM)
 
 
 def draw_shapes(axes, path, states, tool, **style) -> None:
-    """Profiles of some states and the plug in the last of them."""
+    """Draw profiles of some states, and the plug in the last of them."""
     for k, state in enumerate(states):
         plots.outline(path.profile(state), axes, color=style.get("color", f"C{k}"))
     low = states[-1].measures["travel"]

@@ -25,7 +25,7 @@ UNITS = fx.Units("mm", "MPa")
 
 
 def pot(travel, radius, friction, elements=(30, 1)):
-    """The path of one pot, on this process alone."""
+    """Return the path of one pot, computed on this process alone."""
     mesh = fx.mesh.disc(radius=SHEET, thickness=THICKNESS, elements=elements, comm=MPI.COMM_SELF)
     mould = fx.tools.cup(radius=38.0, depth=DEPTH, mouth=THICKNESS, draft=6.0, fillet=5.0, lip=2.0)
     plug = fx.tools.male(radius=radius, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
@@ -49,7 +49,7 @@ def min_wall(path):
 
 
 def plug_force(path):
-    """The largest force that the plug takes, N."""
+    """Return the largest force on the plug (N)."""
     return path.tool_forces()["plug"].max()
 
 

@@ -15,11 +15,11 @@ from formingx.results import files
 
 
 def stuck_membrane(half_width, depth, fillet, points=400):
-    """(R, thickness ratio) of a membrane stuck in a filled trough that is wider than it is deep.
+    """Return R and the thickness ratio of a membrane stuck in a filled trough that is wider than it is deep.
 
-    The free part is an arc of circle of one thickness t and of length L; what it lays down keeps its thickness.
-    First it touches nothing, then the floor, d(t L) = -t dx, then floor and wall in the corner, d(t L) = 2 t drho, of
-    radius rho: t is in proportion to rho^(4/pi - 1). It ends on the fillet.
+    The free part is an arc of a circle with one thickness t and the length L; parts in contact keep their thickness.
+    First the arc touches nothing, then the floor, d(t L) = -t dx. Then it touches floor and wall in the corner, d(t L)
+    = 2 t drho, with the radius rho: t is in proportion to rho^(4/pi - 1). It ends on the fillet.
     """
     w = np.linspace(half_width, depth, points)                     # width of the free arc while it comes down the floor
     rho = (w**2 + depth**2) / (2 * depth)

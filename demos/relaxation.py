@@ -23,7 +23,7 @@ MANY = 100_000                                               # states: as many a
 
 
 def block(material, mode):
-    """A cylinder of radius and height 1, pulled at its top or at its rim."""
+    """Return the scene of a cylinder of radius and height 1, pulled at its top or at its rim."""
     face, direction, _ = PULLED[mode]
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=material,
                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z", guide=True),
@@ -35,19 +35,19 @@ def run(scene, stages, accuracy):
 
 
 def true_stress(state, mode):
-    """sigma1 - sigma3: nominal stress times stretch; the body pulls its support back."""
+    """Return sigma1 - sigma3: nominal stress times stretch; the force is that of the body on its support."""
     return float(-state.measures["support_force"] / PULLED[mode][2] * (1 + state.measures["travel"]))
 
 
 def relax(mode, stretch, accuracy):
-    """Stretched at once and held: the path, and {time: stress}."""
+    """Return the path at a constant stretch, and {time: stress}."""
     path = run(block(P0, mode), [fx.Stage("pull", control="pull", until=fx.travel(stretch - 1.0)),
                                  fx.Stage("hold", duration=TIMES[-1], intermediate=times(0.0, TIMES[:-1]))], accuracy)
     return path, {f"{t:g}": true_stress(at_time(path, "hold", t), mode) for t in (0, *TIMES)}
 
 
 def pull(mode, rate, accuracy):
-    """At a constant Hencky rate: the path, and {stretch: stress}."""
+    """Return the path at a constant Hencky rate, and {stretch: stress}."""
     at = [np.log(stretch) / rate for stretch in MET]
     stage = fx.Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
                      until=fx.process_time(at[-1]), intermediate=times(0.0, at[:-1]))
@@ -56,7 +56,10 @@ def pull(mode, rate, accuracy):
 
 
 def creep(accuracy):
-    """A dead force put on at once, held, taken off at once: the path, {time: stretch} under it and {} without."""
+    """Return the path of a dead force that is applied at once and removed at once.
+
+    Beside the path: {time: stretch} under the force, and after its removal.
+    """
     force, end = fx.force(-FORCE * np.pi), CREEP[-1]
     path = run(block(P1, "uniaxial"), [
         fx.Stage("load", control="pull", until=force),
@@ -71,12 +74,12 @@ def creep(accuracy):
 
 
 def miss(found, sought, stretches):
-    """Largest relative difference of true stresses from nominal ones of a homogeneous test."""
+    """Return the largest relative difference of true stresses from nominal ones of a homogeneous test."""
     return float(np.abs(np.array(list(found.values())) / (np.asarray(sought) * stretches) - 1).max())
 
 
 def draw(relaxing, pulling, path):
-    """Stress over time, stress over stretch, stretch over time."""
+    """Return a figure: stress over time, stress over stretch, stretch over time."""
     figure, (held, pulled, crept) = plots.figure(3, width=3.9)
     for k, (stretch, run_) in enumerate(relaxing.items()):
         held.loglog(*over_time(run_), color=f"C{k}", label=f"{stretch:g}")
@@ -94,7 +97,7 @@ def draw(relaxing, pulling, path):
 
 
 def over_time(path):
-    """Times of a hold, from 10 ms on, and true stresses."""
+    """Return times at constant stretch, from 10 ms on, and true stresses."""
     states = [s for s in path.states if s.stage == "hold" and s.time >= 0.01]
     return [s.time for s in states], [true_stress(s, "uniaxial") for s in states]
 

@@ -8,12 +8,12 @@ P1 = fx.Viscoelastic(RUBBER, branches=[(0.3, 0.5), (0.4, 5.0)])
 
 
 def times(begin, after) -> list:
-    """Targets at some times after one."""
+    """Return targets at some times after a first one."""
     return [fx.process_time(begin + t) for t in after]
 
 
 def at_time(path, stage, time):
-    """The last state of a stage at a time that was a target, or at which the stage ends."""
+    """Return the last state of a stage at a time that was a target, or at its end."""
     found = [s for s in path.states if s.stage == stage and abs(s.time - time) <= 1e-11 * max(time, 1.0)]
     if not found:
         raise LookupError(f"stage {stage!r} has no state at {time:g} s")
@@ -21,7 +21,7 @@ def at_time(path, stage, time):
 
 
 def cost(path) -> dict:
-    """What a run took."""
+    """Return the counts of a run."""
     counts = path.counts
     return {"steps": counts.steps, "newton_iterations": counts.iterations, "cutbacks": counts.failures,
             "solve_seconds": counts.seconds}

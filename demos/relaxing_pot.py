@@ -37,7 +37,7 @@ def scene(sheet, elements):
 
 
 def process(speed, hold):
-    """The stages; speed None: no plug."""
+    """Return the stages; without a speed there is no plug."""
     vacuum = {"control": "vacuum", "until": fx.pressure(PRESSURES[-1]), "intermediate": [fx.pressure(PRESSURES[0])]}
     stages = [fx.Stage("vacuum", inactive=["plug"], step=STEP, **vacuum)]
     if speed is not None:
@@ -49,7 +49,7 @@ def process(speed, hold):
 
 
 def form(sheet, speed, hold, elements, accuracy):
-    """(the path as far as it came, what stopped it or "")."""
+    """Return the path as far as it came, and why it stopped ("" at its end)."""
     try:
         return fx.Process(scene(sheet, elements)).run(process(speed, hold), accuracy=accuracy, max_steps=2000,
                                                       progress=False), ""
@@ -58,7 +58,7 @@ def form(sheet, speed, hold, elements, accuracy):
 
 
 def numbers(path, stopped):
-    """What the summary holds of one run: the wall in the mould, forces of the plug, springback of the base."""
+    """Return the numbers of one run: wall in the mould, forces of the plug, springback of the base."""
     done = {state.stage for state in path.states}
     found: dict = {"stopped": stopped} if stopped else {}
     if "plug" in done:
@@ -75,7 +75,7 @@ def numbers(path, stopped):
 
 
 def line(name, n):
-    """One run in words."""
+    """Return a line about one run."""
     parts = [name + ":"]
     if "plug_force_lbf_at_full_travel" in n:
         parts.append(f"plug {n['plug_force_lbf_at_full_travel']:.4g} lbf, {n['plug_force_lbf_after_hold']:.4g} after"
@@ -89,7 +89,7 @@ def line(name, n):
 
 
 def draw(paths, found):
-    """The wall with and without a plug, and base and corner over the hold time."""
+    """Return a figure: walls with and without a plug, base and corner over the hold time."""
     figure, (walls, bases) = plots.figure(2, width=5.2)
     for name, path in paths.items():
         if "vacuum" in {s.stage for s in path.states}:

@@ -28,19 +28,19 @@ AROUND = 8.0                                                          # radius o
 
 
 def rounded(a, b, radius):
-    """The smaller of two, with a fillet between."""
+    """Return the smaller of two heights, with a fillet between them."""
     h = np.clip(0.5 + 0.5 * (b - a) / radius, 0, 1)
     return b + (a - b) * h - radius * h * (1 - h)
 
 
 def away(x, y, middle, half, corner):
-    """Distance to a rounded rectangle in the plane, below 0 inside."""
+    """Return the distance to a rounded rectangle in the plane, negative inside."""
     u, v = np.abs(x - middle[0]) - half[0] + corner, np.abs(y - middle[1]) - half[1] + corner
     return np.hypot(np.maximum(u, 0), np.maximum(v, 0)) + np.minimum(np.maximum(u, v), 0) - corner
 
 
 def height(x, y):
-    """z of the mould's surface."""
+    """Return z of the surface of the mould."""
     wall = -away(x, y, (0, 0), HALF, CORNER) / np.tan(DRAFT)
     deep = rounded(wall, np.full_like(x, DEPTH), 9.0)
     for middle, half, high in BARS:                                   # their flanks have a draft of 20 degrees
@@ -50,7 +50,7 @@ def height(x, y):
 
 
 def write_mould(file, step):
-    """The height on a grid, closed by sides and a bottom."""
+    """Write the surface of the mould on a grid, closed by sides and a bottom."""
     x, y = (np.linspace(-w / 2 - 10, w / 2 + 10, int(w / step) + 2) for w in SHEET)
     X, Y = np.meshgrid(x, y, indexing="ij")
     n, m = X.shape
@@ -67,12 +67,12 @@ def write_mould(file, step):
 
 
 def flat(size):
-    """The sheet, of triangles of one size."""
+    """Return the sheet, in triangles of one size."""
     return fx.mesh.sheet(fx.mesh.rectangle(*SHEET, corner=25), size=size)
 
 
 def form(sheet, mould):
-    """The path of plug and vacuum."""
+    """Return the path of plug and vacuum."""
     plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
     contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=2),
                 fx.Contact("top", plug, "stick", direction=(0, 0, -1), name="plug", nodes_per_step=2)]
@@ -94,7 +94,7 @@ def minimum(wall):
 
 
 def numbers(path):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     part, wall = path.part(density=DENSITY, trim=-0.5, units=UNITS), path.wall()
     return {"least_wall_mm": part.min_wall, "least_at_mm": list(part.min_wall_at), **minimum(wall),
             "weight_g": part.weight, "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],

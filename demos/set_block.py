@@ -21,7 +21,7 @@ HEAT = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000
 
 
 def form(mode, modulus):
-    """The path: drawn at once, 20 s of cold air on both faces, let go."""
+    """Return the path: drawn at once, 20 s of cold air on both faces, released."""
     on, component, _ = MODES[mode]
     air = [fx.Convection(face, h=500.0, air=COLD) for face in ("top", "bottom")]
     scene = fx.Scene(mesh=fx.mesh.disc(radius=SIZE, thickness=SIZE, elements=(2, 2)), temperature=HOT,
@@ -35,13 +35,13 @@ def form(mode, modulus):
 
 
 def stretch(path, mode):
-    """Of the direction that was drawn, the mean over the block."""
+    """Return the mean stretch of the block in the drawn direction."""
     F = path.stress().at_quadrature_points().deformation_gradient
     return float(np.mean(F[:, 0, 0] if mode == "equibiaxial" else F[:, 1, 1]))
 
 
 def exact(mode, modulus):
-    """The stretch at which rubber and glass balance."""
+    """Return the stretch at which rubber and glass balance."""
     k = MODES[mode][2]
     return brentq(lambda l: 2 * C10 * (l**2 - l**-k) + modulus * ((l / DRAWN)**2 - (l / DRAWN)**-k), 1, DRAWN,
                   xtol=1e-14)

@@ -34,7 +34,7 @@ HOLD, IN_MOULD, TRIM = 1.0, 30.0, 0.97 * RADIUS
 
 
 def form(material, elements, accuracy):
-    """The path up to the chilled part in its mould."""
+    """Return the path up to the chilled part in its mould."""
     plug = fx.tools.male(radius=PLUG_RADIUS, height=40.0, base=-40.0, fillet=EDGE)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements),
                      materials=MATERIALS[material], temperature=HOT,
@@ -52,7 +52,7 @@ def form(material, elements, accuracy):
 
 
 def draw(axes, wall, colour, label):
-    """The section of a part, standing on its base, upside down: the mould is above."""
+    """Draw the section of a part that stands on its base; the run has it upside down."""
     base = max(wall.profile.bottom[:, 1].max(), wall.profile.top[:, 1].max())
     for side in (1, -1):
         outline = np.vstack([fine(wall.profile.bottom), fine(wall.profile.top)[::-1]])

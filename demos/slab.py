@@ -13,7 +13,7 @@ SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=18
 
 
 def slab(thickness, elements):
-    """A narrow disc, its rim insulated: one column of elements, finer towards both faces; m."""
+    """Return the mesh of a narrow disc with an insulated rim: one column of elements, finer towards both faces; m."""
     mesh = fx.mesh.disc(radius=0.03 * thickness, thickness=thickness, elements=(1, elements))
     z = mesh.domain.geometry.x[:, 1]
     levels = thickness * (1 - np.cos(np.pi * np.arange(elements + 1) / elements)) / 2
@@ -22,24 +22,24 @@ def slab(thickness, elements):
 
 
 def same_slab(thickness):
-    """The same sheet for the reference solutions."""
+    """Return the same sheet for the exact solutions."""
     return Slab(thickness, SHEET.conductivity, SHEET.density * SHEET.heat_capacity)
 
 
 def at_times(names, times, values):
-    """{"NAME_C_at_s": {time: value}} of values, shape (times, names)."""
+    """Return {"NAME_C_at_s": {time: value}} of values, shape (times, names)."""
     return {f"{name}_C_at_s": {f"{t:g}": float(v) for t, v in zip(times, column)}
             for name, column in zip(names, np.transpose(values))}
 
 
 def cost(run):
-    """Steps, estimated errors, heat balance, in words."""
+    """Return a line about steps, estimated errors and heat balance."""
     return (f"{len(run.times) - 1} steps, estimated error of one at most {run.errors.max():.1e} C, heat balance of each"
             f" within {np.abs(run.balance).max():.0e}")
 
 
 def print_errors(name, names, times, values, exact, span, run):
-    """The table of a run and how far it is off; returns the largest error over the span of temperatures."""
+    """Print the table of a run and its errors; return the largest error over the span of temperatures."""
     off = (values - exact) / span
     say(f"{name}: {cost(run)}", f"  {'s':>6}" + "".join(f"{n:>12}" for n in names) + "    largest error / span")
     for t, row, e in zip(times, values, off):
@@ -48,7 +48,7 @@ def print_errors(name, names, times, values, exact, span, run):
 
 
 def draw(runs, file, columns, between):
-    """Temperature through the thickness of every run, {title: run}, and its extremes over time.
+    """Draw the temperature through the thickness of every run, {title: run}, and the extremes over time.
 
     between(axes, title, run) adds to a plot.
     """

@@ -22,7 +22,7 @@ RATIOS = (1.5, 2.0, 2.5, 3.0, 3.5)
 
 
 def purity(loss, radius, length):
-    """How much of the mode, on a face, is one half wave along the body: 1, all of it."""
+    """Return the share of one half wave along the body in a mode on a face: 1 for a pure one."""
     there = np.abs(loss.points[:, 0] - radius) < 1e-9
     z, U = loss.points[there, 1], loss.amplitudes[there, 0]
     z, U = z[np.argsort(z)], U[np.argsort(z)]
@@ -31,9 +31,9 @@ def purity(loss, radius, length):
 
 
 def search(scene, targets, wanted, radius, length):
-    """{(n, flipped): its loss with one half wave}: the path goes on from target to target until all are found.
+    """Return {(n, flipped): critical point of one half wave}, from target to target until all are found.
 
-    Every state is counted: before one half wave is lost, or in the same step, many shorter ones may be.
+    The modes of every state are counted, because many shorter ones may become unstable before, or in the same step.
     """
     found, path = {}, None
     for target in targets:
@@ -51,15 +51,15 @@ def search(scene, targets, wanted, radius, length):
 
 
 def compressed(length):
-    """How far plates go."""
+    """Return the travels of the plates."""
     return [fx.travel(-(1 - s) * length) for s in STRETCHES]
 
 
 def cylinder(nu, numbers, fine):
-    """{n: the loss with one half wave} of a cylinder between plates, its height.
+    """Return {n: critical point of one half wave} of a cylinder between plates, and its height.
 
-    A stubby one loses short waves at its side first: elements grow smaller towards it, and none is shorter than an
-    eighth of the height, which is enough for one half wave.
+    A short cylinder first becomes unstable in short waves at its side. Elements are smaller towards it, and none is
+    shorter than an eighth of the height, which is enough for one half wave.
     """
     height = np.pi / nu
     elements = (6 * fine, 5 * fine) if nu > 1 else (4 * fine, max(8, round(height * (4 if nu < 1 else 8))) * fine // 2)
@@ -70,7 +70,7 @@ def cylinder(nu, numbers, fine):
 
 
 def tube(ratio, fine):
-    """{n: its loss} of a ring of a long tube under outer pressure."""
+    """Return {n: critical point} of a ring of a long tube under outer pressure."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=(1 - ratio) / (8 * fine), elements=(8 * fine, 1))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL, loads=[fx.Pressure("rim")],
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")])
@@ -85,7 +85,7 @@ def tube(ratio, fine):
 
 
 def inflated(ratio, kB, numbers, fine):
-    """{n: the loss with one half wave} of a tube inflated at its length, and the length."""
+    """Return {n: critical point of one half wave} of a tube inflated at constant length, and the length."""
     length = np.pi / kB
     along = max(12, round(4 * length))
     mesh = fx.mesh.disc(radius=1.0, inner_radius=ratio, thickness=length, elements=(2 * fine, along * fine // 2))
@@ -97,7 +97,7 @@ def inflated(ratio, kB, numbers, fine):
 
 
 def block(nu, kinds, fine):
-    """{kind: the loss with one half wave} of half a plane-strain block between plates, its length."""
+    """Return {kind: critical point of one half wave} of half a plane-strain block between plates, and its length."""
     length = np.pi / nu
     elements = (5 * fine, max(10, round(6 * length)) * fine // 2) if nu < 1 else (6 * fine, 5 * fine)   # see `cylinder`
     mesh = fx.mesh.disc(radius=1.0, thickness=length, elements=elements, grading=0.2 if nu >= 1 else 0.3)
@@ -109,7 +109,7 @@ def block(nu, kinds, fine):
 
 
 def plate(fine):
-    """{n: N a^2/D} of a thin clamped plate whose rim is pushed inward."""
+    """Return {n: N a^2/D} of a thin clamped plate whose rim is pushed inward."""
     thickness = 0.02
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(32 * fine, 2 * fine))
     scene = fx.Scene(mesh=mesh, materials=MATERIAL,
@@ -120,7 +120,10 @@ def plate(fine):
 
 
 def switched(ratio, kB, fine):
-    """(largest difference of the two bulges, one turned round, over their largest displacement; the loss; a bulge)."""
+    """Return the two branches of an inflated tube, compared: largest difference, critical point, one branch.
+
+    The difference of the two bulges, one of them turned round, is over their largest displacement.
+    """
     losses, length = inflated(ratio, kB, [0], fine)
     loss, path = losses[0], losses[0].path
     ends, z = {}, np.linspace(0, length, 41)
@@ -210,7 +213,7 @@ def main():
 
 
 def _radial(path, state, ratio):
-    """Radial displacement of the inner face at its lower end."""
+    """Return the radial displacement of the inner face at its lower end."""
     from formingx.forms.probes import probe
     with path.problem.state_context(state) as problem:
         return float(probe(problem, [(ratio, 0.0)]).displacement(problem.x)[0, 0])

@@ -24,29 +24,29 @@ THESIS_PRESSURE = 1.26                                         # MPa, at 50 cm
 
 
 def stretch(displacement):
-    """Of the inner face, displacement in cm."""
+    """Return the stretch of the inner face at its displacement in cm."""
     return 1 + float(displacement) / INCH / INNER
 
 
 def exact(kind, displacement, R=None):
-    """The exact state (in, psi)."""
+    """Return the exact state (in, psi)."""
     return thick_wall(kind, stretch(displacement), inner_radius=INNER, outer_radius=OUTER, R=R, **CONSTANTS[kind])
 
 
 def exact_stress(kind, displacement, points):
-    """The exact Cauchy stress (psi) at reference points, shape (n, 3, 3)."""
+    """Return the exact Cauchy stress (psi) at reference points, shape (n, 3, 3)."""
     R = points[:, 0] if kind == "tube" else np.hypot(*points.T)
     return exact(kind, displacement, R).cauchy((1.0, 0.0) if kind == "tube" else points)
 
 
 def inner(displacement, mesh):
-    """The target: displacement of the inner face, in cm."""
+    """Return the target: displacement of the inner face, in cm."""
     R, Z = mesh.nodes_of("inner")[-1]                          # the sphere's node on the equator
     return fx.displacement(float(displacement) / INCH, at=(R, Z), component="r")
 
 
 def inflate(kind, mesh, **scene):
-    """The path to an inner displacement of 50 cm; returns it and the targets."""
+    """Return the path to an inner displacement of 50 cm, and its targets."""
     supports = [fx.Symmetry("bottom", normal="z"), fx.Symmetry("top", normal="z")] if kind == "tube" else \
         [fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")]
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(**{"c01": 0.0, **CONSTANTS[kind]}), supports=supports,
@@ -58,14 +58,14 @@ def inflate(kind, mesh, **scene):
 
 
 def wall(kind, n):
-    """A mesh of n elements through the wall: the tube two rows high, the sphere 2 n along the meridian."""
+    """Return a mesh of n elements through the wall: the tube two rows high, the sphere 2 n along the meridian."""
     if kind == "tube":
         return fx.mesh.disc(radius=OUTER, inner_radius=INNER, thickness=2 * (OUTER - INNER) / n, elements=(n, 2))
     return fx.mesh.sphere(inner_radius=INNER, thickness=OUTER - INNER, elements=(2 * n, n))
 
 
 def through(kind, mesh, n):
-    """(points through the wall, shape (n, 2), their radii, the direction): the sphere's at 45 degrees."""
+    """Return points through the wall, shape (n, 2), their radii and their direction: 45 degrees in the sphere."""
     R = np.linspace(INNER, OUTER, n)
     if kind == "tube":
         return np.column_stack([R, np.full(n, 0.7 * mesh.nodes_of("top")[0, 1])]), R, np.array([1.0, 0.0])
@@ -74,10 +74,11 @@ def through(kind, mesh, n):
 
 
 def errors(kind, path, targets):
-    """Errors over the size of the exact solution: largest of the five pressures; displacement and stress at 10 cm.
+    """Return errors over the size of the exact solution.
 
-    Displacement: at the exact pressure, root mean square through the wall; stress (radial, hoop, pressure): at the
-    quadrature points. Last, the estimated over the true error of the stress (effectivity), both integrated.
+    The pressure has the largest error of five. Displacement and stress are taken at 10 cm: the displacement at the
+    exact pressure, as root mean square through the wall; the stress (radial, hoop, pressure) at the quadrature points.
+    The last number is the estimated over the true error of the stress (effectivity), both integrated.
     """
     pressure = max(abs(path.met(t).measures["pressure"] / exact(kind, d).pressure - 1) for d, t in targets.items())
     points, R, direction = through(kind, path.problem.scene.mesh, 101)
@@ -97,7 +98,7 @@ def errors(kind, path, targets):
 
 
 def study(kind, counts):
-    """Paths on all meshes: the finest path with its targets, and the key numbers."""
+    """Return the finest path with its targets, and the key numbers of all meshes."""
     runs = {}
     for n in counts:
         path, targets = inflate(kind, wall(kind, n))
@@ -126,7 +127,7 @@ def study(kind, counts):
 
 
 def coarse():
-    """The thesis' grids of 6 and 12 triangles."""
+    """Return the thesis' grids of 6 and 12 triangles."""
     found = {}
     for n in (6, 12):
         mesh = fx.mesh.read(GRIDS / f"cylinder_{n}.msh")
@@ -135,7 +136,10 @@ def coarse():
 
 
 def geometry_of_the_thesis():
-    """Which wall would give the thesis' pressure at 50 cm: (outer radius, inner radius), in, the other as given."""
+    """Return the outer radius and the inner radius (in) that give the thesis' pressure at 50 cm.
+
+    In each case the other radius is the given one.
+    """
     from scipy.optimize import brentq
 
     def miss(A, B):
@@ -145,7 +149,7 @@ def geometry_of_the_thesis():
 
 
 def table(cylinder, grids, sphere):
-    """Pressures beside the exact ones, then the errors on all meshes."""
+    """Return lines of pressures beside the exact ones, and of the errors on all meshes."""
     head = [f"{d:>10}" for d in DISPLACEMENTS]
     lines = [f"{'pressure, MPa, at an inner displacement of, cm':48}" + "".join(head)]
 
@@ -174,13 +178,13 @@ def table(cylinder, grids, sphere):
 
 
 def thesis_h(stress):
-    """The scalar h of (3.4.2), read off the stress along the tube (Z), where the stretch is 1 (psi)."""
+    """Return the scalar h of (3.4.2), from the stress along the tube (Z), where the stretch is 1 (psi)."""
     I1 = np.sum(stress.principal_stretches**2, axis=1)
     return stress.cauchy[:, 1, 1] - 2 * C10 - 2 * C01 * (I1 - 1)
 
 
 def draw_wall(grids, path, targets, out):
-    """Figure 3.4: hydrostatic pressure through the wall at 50 cm, and the thesis' h; returns errors on the grids."""
+    """Draw figure 3.4, pressure through the wall at 50 cm, and the thesis' h; return errors on the grids."""
     figure, (left, right) = plots.figure(2, width=5.2)
     R = np.linspace(INNER, OUTER, 49)
     true = exact("tube", "50", R)
@@ -211,7 +215,7 @@ def draw_wall(grids, path, targets, out):
 
 
 def draw_curves(kind, path, targets, out, grids=None):
-    """Figure 3.3: pressure against inner displacement."""
+    """Draw the pressure over the inner displacement (figure 3.3)."""
     figure, axes = plots.figure()
     u = np.linspace(0, 50, 101)
     axes.plot(u, [exact(kind, d).pressure * PSI for d in u], "k", linewidth=1, label="exact")

@@ -22,24 +22,24 @@ STIFFNESS = 6 * (C10 + C01) * THICKNESS**3 / 12 / (1 - POISSON**2)      # D, wit
 
 
 def linear(pressure, support):
-    """Pole height by linear plate theory (in)."""
+    """Return the pole height (in) by linear plate theory."""
     clamped = pressure * RADIUS**4 / (64 * STIFFNESS)
     return clamped if support == "clamped" else clamped * (5 + POISSON) / (1 + POISSON)
 
 
 def timoshenko_pressure(height):
-    """Eq. (4.6), clamped, solved for the pressure (psi)."""
+    """Return the pressure (psi) of eq. (4.6), clamped, at a pole height."""
     return height * STIFFNESS / RADIUS**4 * (64 + 28.2828 / ((1 - POISSON**2) * THICKNESS**2) * height**2)
 
 
 def timoshenko(pressure):
-    """Eq. (4.6): the pole height (in), its one real root."""
+    """Return the pole height (in) of eq. (4.6), its one real root."""
     cubic = [28.2828 / ((1 - POISSON**2) * THICKNESS**2), 0, 64, -pressure * RADIUS**4 / STIFFNESS]
     return float(next(r.real for r in np.roots(cubic) if abs(r.imag) < 1e-9 * abs(r)))
 
 
 def inflate(elements, support):
-    """The path to 40.1 psi, or what there is of it: a clamped corner on a fine mesh may crease."""
+    """Return the path to 40.1 psi, or up to the crease of a clamped corner on a fine mesh."""
     mesh = fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=elements)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=C10, c01=C01), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), support])
@@ -52,7 +52,7 @@ def inflate(elements, support):
 
 
 def key_numbers(path, support):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     def met(p):
         state = path.met(fx.pressure(float(p)))
         return None if state is None else state.measures["pole_height"]
@@ -77,7 +77,7 @@ def key_numbers(path, support):
 
 
 def table(numbers):
-    """Own values beside both theories."""
+    """Return lines of our values beside both theories."""
     simple, clamped = numbers["simply_supported"], numbers["clamped"]
     lines = [f"{'pole height, in, at a pressure of, psi':42}" + "".join(f"{p:>10}" for p in PRESSURES)]
 
@@ -98,7 +98,7 @@ def table(numbers):
 
 
 def draw(paths, grid, out, quick):
-    """Figure 4.3, (a) and (b), and the plate in 3-D."""
+    """Draw figure 4.3, (a) and (b), and the plate in 3-D."""
     figure, axes = plots.figure(width=6)
     for name, color in (("clamped", "tab:red"), ("simply_supported", "tab:blue")):
         paths[name].plot("pole_height", "pressure", axes, label=name.replace("_", " "), color=color)

@@ -31,7 +31,7 @@ QUICK_TRAVELS = (3.0, 7.0)
 
 
 class Sheet(NamedTuple):
-    """Lengths in cm, constants in MPa."""
+    """Sheet and plug: lengths in cm, constants in MPa."""
 
     thickness: float
     plug: float
@@ -54,7 +54,7 @@ MU, FACE_STRETCH = 0.3, 25.0                                 # of friction, and 
 
 
 def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="clamped"):
-    """(path, how it ended), to a pole stretch or to the last travel; fillet over the plug's radius."""
+    """Return the path to a pole stretch or to the last travel, and how it ended; fillet: over the plug's radius."""
     support = fx.Clamped("rim") if rim == "clamped" else fx.SimplySupported("rim")
     made = plugs.scene(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
                        fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), law, elements, support)
@@ -62,7 +62,7 @@ def press(sheet, law, elements, travels, stretch=None, fillet=FILLETS[0], rim="c
 
 
 def slide(sheet, travels, fillet, refine):
-    """(path, how it ended, elements) of a sheet that slides over the edge with Coulomb friction."""
+    """Return the path of a sheet that slides over the edge with Coulomb friction, how it ended, and the elements."""
     made, elements = plugs.sliding(RADIUS, sheet.thickness, sheet.plug, fillet * sheet.plug,
                                    fx.MooneyRivlin(c10=sheet.c10, c01=sheet.c01), MU, FACE_STRETCH, refine,
                                    (1,) * refine, penalty=2e4, ramp=0.1, elastic_slip=0.02)
@@ -71,7 +71,7 @@ def slide(sheet, travels, fillet, refine):
 
 @cache
 def membrane(sheet, law, travel):
-    """The membrane under a sharp plug, or None where there is none."""
+    """Return the membrane under a plug with a sharp edge, or None where there is none."""
     if law not in RUNS:
         return None
     try:
@@ -82,7 +82,7 @@ def membrane(sheet, law, travel):
 
 
 def key_numbers(sheet, law, path, end, travels) -> dict:
-    """Those of all plugs, and the membrane's force beside them."""
+    """Return the numbers of `plugs.key_numbers`, and the force of the membrane."""
     rp, h0 = sheet.plug, sheet.thickness
     places = {"0": 0.0, "rp/2": rp / 2, "1.5rp": 1.5 * rp, "2rp": 2 * rp, "3rp": 3 * rp}
     n = plugs.key_numbers(path, end, travels, places, rp, h0)
@@ -134,7 +134,7 @@ def main():
 
 
 def sharpen(refine) -> dict:
-    """Force on the thin sheet, held, over the membrane's at three plug radii or so, with ever sharper edges."""
+    """Return the force on the thin sheet, held, over that of the membrane at about three plug radii, by fillet."""
     sheet, travel = SHEETS["thin_treloar"], 3.0
     found = {}
     for fillet in FILLETS:
@@ -146,7 +146,7 @@ def sharpen(refine) -> dict:
 
 
 def compare(found) -> dict:
-    """What the thesis speaks of, in numbers: ratios of forces at the travels that both reached."""
+    """Return the findings of the thesis as numbers: ratios of forces at the travels that both runs reached."""
     def ratio(a, b):
         a, b = (n["force_N_at_travel_cm"] for n in (a, b))
         return {t: a[t] / b[t] for t in a if t in b}
@@ -167,7 +167,7 @@ def compare(found) -> dict:
 
 
 def tell(name, n) -> None:
-    """The numbers of one run."""
+    """Print the numbers of one run."""
     plugs.tell(name, n)
     for t, f in n["force_N_at_travel_cm"].items():
         exact = n["membrane_force_N_at_travel_cm"].get(t)
@@ -175,7 +175,7 @@ def tell(name, n) -> None:
 
 
 def draw_forces(paths, summary):
-    """Forces on the thick and on the thin sheet, with the membrane's: figs. 6.8 and 6.9."""
+    """Return a figure of forces on the thick and the thin sheet, with those of the membrane: figs. 6.8 and 6.9."""
     figure, both = plots.figure(2, width=5.0, height=4.4)
     for axes, title, names in zip(both, ("thick sheet", "thin sheet"), (["thick"], ["thin_treloar", "thin_throne"])):
         laws = (*RUNS, plugs.name_of(MU))
@@ -192,7 +192,7 @@ def draw_forces(paths, summary):
 
 
 def draw_shapes(paths, fillet):
-    """Profiles and thickness of the thin and of the thick sheet: fig. 6.6."""
+    """Return a figure of profiles and thickness of the thin and the thick sheet: fig. 6.6."""
     figure, (thin, thick, walls) = plots.figure(3, width=4.4, height=4.8)
     for axes, name in ((thin, "thin_treloar"), (thick, "thick")):
         sheet, path = SHEETS[name], paths[name, "held"]

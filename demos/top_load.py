@@ -25,7 +25,7 @@ GROOVED = fx.tools.Tool([(1.5, 10.6), (1.5, 9.1), (RADIUS, 7.1), (RADIUS, GROOVE
 
 
 def blow(elements, mould):
-    """The blown bottle as a mesh."""
+    """Return the blown bottle as a mesh."""
     mesh = fx.mesh.parison(inner_radius=1.1, thickness=0.3, length=10.6, elements=(elements, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
@@ -34,7 +34,7 @@ def blow(elements, mould):
 
 
 def numbers(found):
-    """What goes into the summary, N and cm."""
+    """Return the numbers of the summary, N and cm."""
     summary = {"axisymmetric": {"largest_force_N": 100 * found.largest_force, "travel_cm": found.at_travel,
                                 "travel_reached_cm": float(found.travel.max()), "ended": found.ended}}
     for n in found.stability.numbers:
@@ -45,7 +45,7 @@ def numbers(found):
 
 
 def main():
-    """Blow, crush, count, draw."""
+    """Blow, crush, count the modes and draw."""
     options = parser("top_load", __doc__).parse_args()
     elements, travel, modes = (60, 0.75, [4]) if options.quick else (180, 1.6, WAVES)
     drawing, axes = figure()

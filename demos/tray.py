@@ -19,7 +19,7 @@ PLACES = {"floor": (0, 0, -1), "long_wall": (1, 0, -0.5), "bottom_edge": (0.9414
 
 
 def fill(sheet, tool, supports, **contact):
-    """The path to the last pressure; contact: more of its arguments."""
+    """Return the path to the last pressure; `contact` are further arguments of the contact."""
     contact = {"friction": "stick", "separates": False} | contact
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=fx.NeoHookean(c10=C10), loads=[fx.Pressure("top")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), *supports],
@@ -28,13 +28,13 @@ def fill(sheet, tool, supports, **contact):
 
 
 def tray(size, tool, **contact):
-    """The path of a quarter of the tray."""
+    """Return the path of a quarter of the tray."""
     sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 3.0, corner=0.3, part="quarter"), size=size)
     return fill(sheet, tool, [fx.Symmetry("y0", "y")], **contact)
 
 
 def key_numbers(path):
-    """What the summary holds of a tray."""
+    """Return the numbers of the summary of a tray."""
     wall = path.wall()
     return {**{name: wall.around(place, 0.06) for name, place in PLACES.items()}, "least": wall.ratio.min(),
             "iterations": path.counts.iterations, "failures": path.counts.failures, "states": len(path),
@@ -42,7 +42,7 @@ def key_numbers(path):
 
 
 def trough(size):
-    """Errors of the wall and of the fillet of a trough against its law."""
+    """Return the errors of wall and fillet of a trough against its law."""
     sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, 0.3), (0, 0.3)], size, names=["y0", "rim", "y1", "x0"])
     profile = fx.Tool([(3.0, 0.0), (1.0, 0.0), (1.0, -1.0), (0.0, -1.0)], [0.0, 0.0, 0.2, 0.0])
     path = fill(sheet, fx.tools.extruded(profile), [fx.Symmetry("y0", "y"), fx.Symmetry("y1", "y")])

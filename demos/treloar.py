@@ -19,7 +19,7 @@ THESIS = {"limit pressure": 0.493, "pressure at stretch 8.5": 0.349, "pole thick
 
 
 def inflate(mesh, support):
-    """The path to pole stretch 8.5."""
+    """Return the path to pole stretch 8.5."""
     scene = fx.Scene(mesh=mesh, materials={"sheet": fx.NeoHookean(c10=C10)},
                      supports=[fx.Symmetry("axis"), support], loads=[fx.Pressure("bottom")])
     targets = [fx.pole_stretch(float(s)) for s in STRETCHES]
@@ -33,7 +33,7 @@ def inflate(mesh, support):
 
 
 def key_numbers(path):
-    """What the summary holds of one path."""
+    """Return the numbers of the summary of one path."""
     limit, profile = path.limit_points[0].measures, path.profile()
     whole = path.met(fx.pole_stretch(float(STRETCHES[-1]))) is not None
     return {
@@ -53,7 +53,7 @@ def key_numbers(path):
 
 
 def table(numbers):
-    """Own values beside membrane theory and the thesis."""
+    """Return lines of our values beside membrane theory and the thesis."""
     limit = membrane_limit_point(radius=RADIUS, thickness=THICKNESS, c10=C10)
     at = {s: membrane_inflation(float(s), radius=RADIUS, thickness=THICKNESS, c10=C10) for s in STRETCHES}
     simple, clamped = numbers["simply_supported"], numbers["clamped"]
@@ -78,7 +78,7 @@ def table(numbers):
 
 
 def draw(paths, out, quick):
-    """Figures 4.6, 4.7 and 4.8, the convergence of Newton's method, and the sheet in 3-D."""
+    """Draw figures 4.6, 4.7 and 4.8, the convergence of Newton's method, and the sheet in 3-D."""
     path = paths["simply_supported"]
     figure, axes = plots.figure()
     for name, style in (("simply_supported", {"color": "tab:blue"}), ("clamped", {"color": "tab:red"})):

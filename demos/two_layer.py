@@ -23,7 +23,7 @@ LAST = 20.0                                                    # pole height at 
 
 
 def inflate(stack, elements):
-    """The path of a stack of materials, bottom up, through both levels of the study."""
+    """Return the path of a stack of materials, from the bottom up, through both levels of the study."""
     layers = {f"layer{k}": LAYER for k in range(1, len(stack) + 1)}
     mesh = fx.mesh.disc(radius=RADIUS, thickness=layers, elements=elements)
     materials = {m: fx.MooneyRivlin(c10=CONSTANTS[m][0], c01=CONSTANTS[m][1]) for m in set(stack)}
@@ -33,13 +33,13 @@ def inflate(stack, elements):
 
 
 def levels(path):
-    """The states at equal pressure (None if the path does not reach it) and at equal pole height."""
+    """Return the states at equal pressure (None if the path does not reach it) and at equal pole height."""
     reached = path["pressure"].max() > PRESSURE
     return path.at(fx.pressure(PRESSURE)) if reached else None, path.met(fx.pole_height(HEIGHT))
 
 
 def interfaces(path, state, R):
-    """[(stress below, stress above)] at radii R of each interface, from the bottom up."""
+    """Return [(stress below, stress above)] at radii R of each interface, from the bottom up."""
     names = list(path.problem.scene.mesh.layers)
     stress = path.stress(state)
     return [tuple(stress.at(np.column_stack([R, np.full(len(R), k * LAYER)]), name) for name in pair)
@@ -47,7 +47,7 @@ def interfaces(path, state, R):
 
 
 def key_numbers(path):
-    """What the summary holds of one stack."""
+    """Return the numbers of the summary of one stack."""
     load, height = levels(path)
     profile = path.profile(height)
     numbers = {"pole_height_cm_at_0.142MPa": load.measures["pole_height"] if load else None,
@@ -68,7 +68,7 @@ def key_numbers(path):
 
 
 def table(numbers):
-    """Key numbers of all stacks."""
+    """Return lines of the key numbers of all stacks."""
     lines = [f"{'':12}{'at 0.142 MPa:':>14}{'thickness':>12}{'':>9}{'rim':>9}{f'at {HEIGHT} cm:':>16}{'thickness':>12}",
              f"{'':12}{'height, cm':>14}{'pole':>12}{'rim':>9}{'/pole':>9}{'pressure, MPa':>16}{'pole':>12}{'rim':>9}"]
     for name, n in numbers.items():
@@ -88,7 +88,7 @@ def table(numbers):
 
 
 def draw(paths, out, quick):
-    """Figures 4.14 to 4.16, and the stresses on both sides of the interface."""
+    """Draw figures 4.14 to 4.16, and the stresses on both sides of the interface."""
     figure, axes = plots.figure(3, width=4.6)
     for k, (name, path) in enumerate(paths.items()):
         load, height = levels(path)

@@ -19,7 +19,7 @@ MODELS = {"membrane": fx.Membrane(), "solid": fx.MixedPressure()}
 
 
 def inflate(model, T, n, accuracy):
-    """The path of a flow, n elements along the radius."""
+    """Return the path of a flow, with n elements along the radius."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=R0, thickness=H0, elements=(n, 1)), materials=P1, model=MODELS[model],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
@@ -31,7 +31,7 @@ def inflate(model, T, n, accuracy):
 
 
 def numbers(path, T):
-    """What the summary holds of one run."""
+    """Return the numbers of the summary of one run."""
     volume, held = CASES[T]
     met = {f"{volume * k / 8:g}": at_time(path, "blow", T * k / 8).measures for k in range(1, 9)}
     return {"p_R0_over_h0_at_volume": {v: float(m["pressure"] * R0 / H0) for v, m in met.items()},
@@ -40,12 +40,12 @@ def numbers(path, T):
 
 
 def changes(numbers, others):
-    """Largest relative difference of each group of the numbers of two runs."""
+    """Return the largest relative difference of each group of the numbers of two runs."""
     return {group: float(max(abs(others[group][k] / v - 1) for k, v in of.items())) for group, of in numbers.items()}
 
 
 def draw(paths):
-    """Pressure and pole thickness over volume, pressure held."""
+    """Return a figure: pressure and pole thickness over volume, pressure at constant volume over time."""
     figure, (p_axes, t_axes, held) = plots.figure(3, width=3.9)
     for (model, T), path in paths.items():
         style, color = "-" if model == "membrane" else "k:", None if model == "solid" else f"C{list(CASES).index(T)}"

@@ -20,7 +20,7 @@ HELD, AFTER = (0, 0.1, 0.5, 1, 2), (0, 0.5, 1, 2, 5, 10, 20, 50)
 
 
 def body(kind, n):
-    """A tube of n elements through the wall, one row high, or the half of a sphere, n elements along the meridian."""
+    """Return the scene of a tube, n elements through the wall, or of half a sphere, n along the meridian."""
     if kind == "tube":
         mesh = fx.mesh.disc(radius=OUTER, inner_radius=INNER, thickness=0.5, elements=(n, 1))
         supports = [fx.Symmetry("bottom", normal="z"), fx.Symmetry("top", normal="z")]
@@ -31,7 +31,7 @@ def body(kind, n):
 
 
 def inflate(kind, speed, n, accuracy):
-    """The path of the whole process."""
+    """Return the path of the whole process."""
     scene, full = body(kind, n), (OUTER - INNER) / speed
     at = tuple(scene.mesh.nodes_of("inner")[-1])             # the sphere's node on the equator
 
@@ -47,7 +47,7 @@ def inflate(kind, speed, n, accuracy):
 
 
 def numbers(path, speed):
-    """What the summary holds of one run."""
+    """Return the numbers of the summary of one run."""
     full = (OUTER - INNER) / speed
     end = full + HELD[-1]
 
@@ -60,12 +60,12 @@ def numbers(path, speed):
 
 
 def change(fine, coarse):
-    """Largest relative difference of the numbers of two runs."""
+    """Return the largest relative difference of the numbers of two runs."""
     return float(max(abs(coarse[group][k] / v - 1) for group in fine for k, v in fine[group].items()))
 
 
 def draw(paths):
-    """Pressure over inner radius, and inner radius over time after the release, both shapes."""
+    """Return a figure: pressure over inner radius, and inner radius over time after the release, of both shapes."""
     figure, axes = plots.figure(2, width=5.2)
     for kind, style in (("tube", "-"), ("sphere", "--")):
         for k, speed in enumerate(SPEEDS):

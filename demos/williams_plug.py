@@ -69,7 +69,7 @@ def main():
 
 
 def tell(name, n) -> None:
-    """The numbers of one run."""
+    """Print the numbers of one run."""
     plugs.tell(name, n)
     for t, f in n["force_N_at_travel_cm"].items():
         ratios = "  ".join(f"{v:.4f}" for v in n["wall_ratio_at_travel_cm"][t].values())
@@ -77,7 +77,7 @@ def tell(name, n) -> None:
 
 
 def tell_driven(n, held) -> None:
-    """The thesis' own scheme beside the rounded plug that holds the sheet."""
+    """Print the thesis' own scheme beside the rounded plug that holds the sheet."""
     forces, others = n["force_N_at_travel_cm"], held["force_N_at_travel_cm"]
     walls, other = n["wall_ratio_at_travel_cm"], held["wall_ratio_at_travel_cm"]
     say(f"driven nodes (the thesis' scheme, a sharp edge): to {n['reached_travel_cm']:.4g} cm, {n['steps']} states,"
@@ -88,7 +88,7 @@ def tell_driven(n, held) -> None:
 
 
 def draw(paths, tool, limit):
-    """Shapes, force curves and thickness: figs. 6.1 to 6.3."""
+    """Return a figure of shapes, force curves and thickness: figs. 6.1 to 6.3."""
     figure, (shapes, slips, forces, thickness) = plots.figure(4, width=3.9, height=4.6)
     plugs.draw_shapes(shapes, paths["held"], plugs.states(paths["held"], (4, 8, 12, 16, 20)), tool)
     shapes.set(title="held")
@@ -110,7 +110,7 @@ def draw(paths, tool, limit):
 
 
 def draw_stretches(path, state):
-    """Principal stretches and Lagrange strains of the top face, with slip: figs. 6.4 and 6.5."""
+    """Return a figure of principal stretches and Lagrange strains of the top face, with slip: figs. 6.4 and 6.5."""
     figure, (stretches, strains) = plots.figure(2, width=5.0)
     R = np.linspace(0, 0.99 * RADIUS, 300)
     F = path.stress(state).at(np.column_stack([R, np.full_like(R, THICKNESS)])).deformation_gradient
@@ -128,7 +128,7 @@ def draw_stretches(path, state):
 
 
 def draw_rims(clamped, hinged):
-    """Shapes and forces with both rims: fig. 6.10."""
+    """Return a figure of shapes and forces with both rims: fig. 6.10."""
     figure, (shapes, forces) = plots.figure(2, width=4.6, height=4.6)
     for color, path, label in (("C0", clamped, "clamped"), ("C3", hinged, "hinged")):
         for state in plugs.states(path, (1, 2, 4, 8)):

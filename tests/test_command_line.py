@@ -20,7 +20,7 @@ def table(file, header, *columns):
 
 def test_overview_lists_every_demo():
     text = run("-m", "formingx")
-    assert "  treloar" in text and "Free inflation of Treloar's rubber sheet" in text
+    assert "  treloar" in text and "Inflate Treloar's rubber sheet" in text
     assert "compare OURS THEIRS" in text and "common" not in text
     for file in (ROOT / "demos").glob("*.py"):               # what demos share has no main
         assert (f"\n  {file.stem} " in text) == ("def main" in file.read_text())
