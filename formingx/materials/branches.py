@@ -1,11 +1,13 @@
 r"""Relaxing branches in homogeneous tests: integration of their elastic strains in time.
 
-In principal direction i a branch has the elastic logarithmic strain w_i, part of the strain :math:`e_i = \ln l_i`, and
-the Kirchhoff stress :math:`\mu \exp(2 w_i)`. Its flow is
+In principal direction i the body has the stretch l_i and the logarithmic strain :math:`e_i = \ln l_i`. A branch has the
+elastic part w_i of this strain, the modulus mu, and the Kirchhoff stress :math:`\mu \exp(2 w_i)` besides a pressure.
+The elastic strain relaxes with the relaxation time tau:
 
-.. math:: \frac{dw_i}{dt} = \frac{de_i}{dt} - \frac{f_i(w)}{2 \tau},
+.. math:: \frac{dw_i}{dt} = \frac{de_i}{dt} - \frac{f_i(w)}{2 \tau}
 
-where f is the law of its material.
+The function f is the flow law of the material, such as :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`
+(`formingx.materials.viscoelastic`).
 """
 
 import itertools
@@ -18,25 +20,27 @@ from ..errors import ConvergenceError, InputError, known
 from .homogeneous import MODES
 
 BETWEEN = ("stretch", "strain")
-"""Quantity with a constant rate between two times: the stretch, or the logarithmic strain (a constant Hencky rate)."""
+"""Quantities that may have a constant rate between two times: the stretch, or the logarithmic strain (Hencky rate)."""
 
 
 def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stretches: np.ndarray,
                     between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
-    """Return the elastic strains w_i of every branch at every time.
+    r"""Integrate the elastic logarithmic strains w of relaxing branches over the time of a homogeneous test.
+
+    .. math:: \frac{dw_i}{dt} = \frac{d \ln l_i}{dt} - \frac{f_i(w)}{2 \tau}
 
     Args:
-        flow: function f, called with w of shape (branches, 3).
+        flow: function f, from w to f(w), shape (branches, 3) each.
         tau: relaxation times, shape (branches,), time.
         mode: a test of `homogeneous.MODES`.
-        times: times, shape (n,), ascending.
-        stretches: stretches at these times, shape (n,). The first stretch is applied suddenly; a second stretch at the
-            same time is a jump.
-        between: one of `BETWEEN`.
+        times: times, shape (n,), not descending.
+        stretches: stretches in the loaded direction at these times, shape (n,). The first stretch is applied suddenly
+            to a body in the reference configuration; a second stretch at the same time is a jump.
+        between: "stretch" or "strain", the quantity with a constant rate between two times, see `BETWEEN`.
         accuracy: relative accuracy of a time step; the error of a test is about a hundred times larger.
 
     Returns:
-        Elastic strains, shape (n, branches, 3).
+        Elastic strains w in the three principal directions, shape (n, branches, 3).
 
     Raises:
         ConvergenceError: the integration stopped before the last time.
@@ -68,14 +72,14 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Check the arguments of a test in time.
+    """Check the arguments of a homogeneous test with given stretches over time.
 
     Args:
         name: beginning of the messages.
         mode: a test of `homogeneous.MODES`.
-        times: times, shape (n,).
-        stretches: stretches at these times, shape (n,).
-        between: one of `BETWEEN`.
+        times: times, shape (n,), not descending.
+        stretches: stretches at these times, shape (n,), positive.
+        between: "stretch" or "strain", see `BETWEEN`.
 
     Returns:
         Times and stretches as arrays, shape (n,) each.
@@ -100,7 +104,7 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
 
 
 def _pieces(times: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield (first, last) of the parts of a history in which the values change at a constant rate."""
+    """Yield the numbers (first, last) of the ends of each piece of a table in which the values have a constant rate."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.diff(values) / np.diff(times)
     scale = 1e-9 * np.abs(rates[np.isfinite(rates)]).max(initial=0)

@@ -1,4 +1,4 @@
-"""Material card: a page with the response in three tests, at rates and temperatures of forming, and the limits."""
+"""Material card: a page with the response of a material in three tests at forming rates, and its limits."""
 
 import base64
 import html
@@ -16,21 +16,22 @@ from .homogeneous import MODES
 
 _LARGEST_STRETCH = 6.0
 """Largest stretch of the curves, if the material has no smaller limit."""
-_PART = 0.97
+
+_SHARE = 0.97
 """Largest stretch of the curves over the largest stretch of the material."""
 
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
-    """Write the card of a material; see `Material.report`.
+    """Write the card of a material as an HTML page; see `Material.report`.
 
     Args:
         material: the material.
         file: name of the HTML file.
         temperatures: temperatures of the curves.
-        rates: Hencky rates, 1/time.
-        unit: unit of stress.
-        unit_of_time: unit of time.
+        rates: Hencky rates of the curves, 1/time.
+        unit: unit of stress, for labels.
+        unit_of_time: unit of time, for labels.
 
     Returns:
         Path of the file.
@@ -40,10 +41,10 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
     """
     caller, path = f"{material}: report", place("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
-    at = several(f"{caller}: temperatures", temperatures, "temperatures")
-    if depends and not at:
+    values = several(f"{caller}: temperatures", temperatures, "temperatures")
+    if depends and not values:
         raise InputError(f"{caller}: {', '.join(depends)} depend on the temperature: give temperatures=[...]")
-    cases = [(f"{T:g}", material.at_temperature(T), _shift(material, T)) for T in at] if depends else [
+    cases = [(f"{T:g}", material.at_temperature(T), _shift(material, T)) for T in values] if depends else [
         ("", material, 1.0)]
     rates = [positive(f"{caller}: rates", rate) for rate in several(f"{caller}: rates", rates, "rates")]
     parts = [_limits(name, entry, shift, unit, unit_of_time) for name, entry, shift in cases]
@@ -57,46 +58,50 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
 
 
 def _shift(material: Any, temperature: float) -> float:
-    """Return the shift factor aT at a temperature: a rate acts as aT times this rate at the reference temperature."""
+    """Return the shift factor aT at a temperature: relaxation times are aT times those at the reference temperature."""
     law = material.parameters.get("aT")
     return float(law(temperature)) if isinstance(law, OfTemperature) else 1.0
 
 
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
-    """Return rows (quantity, value) for the summary of a material at one temperature: moduli and limits of stretch.
+    """Return rows (quantity, value) of a table for a material at one temperature: moduli and limits of stretch.
 
-    shift: factor of the relaxation times at this temperature.
+    `name` is the temperature as text, or "", and `shift` the factor of the relaxation times at this temperature.
     """
-    def said(value: float, symbol: str = "") -> str:
+    def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
     rows = [(f"at {name}" if name else "", "")] if name else []
-    rows.append(("instantaneous shear modulus", said(material.shear_modulus, unit)))
+    rows.append(("instantaneous shear modulus", with_unit(material.shear_modulus, unit)))
     for mode in MODES:
         largest = material.largest_stretch(mode)
         if np.isfinite(largest):
-            rows.append((f"largest stretch, {mode}", said(largest)))
+            rows.append((f"largest stretch, {mode}", with_unit(largest)))
     for mode in MODES:
         if np.isfinite(most := material.rupture_stretch(mode)):
-            rows.append((f"stretch at which it ruptures when stretched suddenly, {mode}", said(most)))
+            rows.append((f"stretch at which it ruptures when stretched suddenly, {mode}", with_unit(most)))
     if material.branches:
         times = [shift * tau for _, tau in material.branches]
         rows.append(("relaxation times", f"{min(times):.3g} to {max(times):.3g} {unit_of_time}"))
         rest = material.equilibrium
-        rows.append(("relaxed shear modulus", said(rest.shear_modulus if rest else 0.0, unit)))
+        rows.append(("relaxed shear modulus", with_unit(rest.shear_modulus if rest else 0.0, unit)))
     elif not material.internal and material.equilibrium is material:
-        top = min(_LARGEST_STRETCH, _PART * material.largest_stretch("equibiaxial"))
+        top = min(_LARGEST_STRETCH, _SHARE * material.largest_stretch("equibiaxial"))
         stable = material.check_stability((0.5, top))
         low, high = stable.drucker["equibiaxial"]
-        rows.append(("stable (Drucker), equibiaxial", f"from {low:.3g} to {high:.3g} of the range that was looked at"))
+        rows.append(("stable (Drucker), equibiaxial",
+                     f"at stretches from {low:.3g} to {high:.3g} (examined: {stable.stretches[0]:.3g} to {top:.3g})"))
     return rows
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """Return the curves of true stress against stretch in the three tests, as an image for a page."""
+    """Return a PNG image, base64-encoded, with curves of true stress against stretch in the three tests.
+
+    `cases` holds (temperature as text, material, factor of the relaxation times) for each temperature.
+    """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):
         for k, (name, material, shift) in enumerate(cases):
-            l = np.linspace(1.0, min(_LARGEST_STRETCH, _PART * material.largest_stretch(mode)), 40)[1:]
+            l = np.linspace(1.0, min(_LARGEST_STRETCH, _SHARE * material.largest_stretch(mode)), 40)[1:]
             label = f"{name}: " * bool(name)
             if not rates:
                 axis.plot(l, material.stress(mode, l, true=True), color=f"C{k}", label=name)
@@ -118,7 +123,8 @@ td {{padding: .2rem 1rem .2rem 0}} img {{max-width: 100%}} code {{overflow-wrap:
 <h1>{title}</h1><p><code>{card}</code></p>
 <img alt="true stress against stretch in three tests" src="data:image/png;base64,{picture}">
 <h2>Limits</h2><table>{rows}</table>
-<p>Not modelled: crystallisation as it is drawn or cooled, anisotropy, changes of volume under pressure, damage and
-tearing. Beyond the stretches, rates and temperatures of the tests that its constants come from it is a guess; a damping
-that was fitted to shear or uniaxial data is not known in equibiaxial extension, which a sheet sees.</p></html>
+<p>Not modelled: crystallisation during stretching or cooling, anisotropy, changes of volume under pressure, damage and
+tearing. Beyond the stretches, rates and temperatures of the tests of its constants the response is a guess. A damping
+function that was fitted to shear or uniaxial data is unknown in equibiaxial extension, the deformation of a sheet.</p>
+</html>
 """

@@ -1,12 +1,12 @@
-"""Spatially varying material constants.
+"""Material constants that vary over the body.
 
-A constant is one of the following:
+Each constant of a material can be one of the following.
 
-- a number;
-- a function f(R, Z) of the reference position, called with arrays of shape (n,);
-- a UFL expression of the scene's mesh, such as a DOLFINx `Function`;
-- a `table` over the temperature, or the result of `of_temperature`;
-- an object of a subclass of `Varying`.
+- A number.
+- A function f(R, Z) of the reference position, called with arrays of shape (n,).
+- A UFL expression of the scene's mesh, such as a DOLFINx `Function`.
+- A `table` over the temperature, or the result of `of_temperature`.
+- An object of a subclass of `Varying`.
 """
 
 from abc import ABC, abstractmethod
@@ -24,14 +24,16 @@ from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
 
 class Sample(NamedTuple):
-    """Sample of the body for the check of constants: quadrature points of the locally owned cells of a layer.
+    """Quadrature points of a layer at which the constants of its material are checked.
+
+    They are q points in each of the m locally owned cells of the layer, cell by cell.
 
     Attributes:
-        points: reference positions (R, Z), shape (m q, 2), length.
-        cells: local numbers of the m cells, shape (m,).
-        places: positions of the q points in the reference cell, shape (q, 2).
+        points: reference positions (R, Z) of the points, shape (m q, 2), length.
+        cells: local numbers of the cells, shape (m,).
+        places: positions of the points in the reference cell, shape (q, 2).
         domain: the `dolfinx.mesh.Mesh`.
-        temperature: temperatures at the points, shape (m q,), or None.
+        temperature: temperatures at the points, shape (m q,); None if the scene has no temperature.
     """
 
     points: np.ndarray
@@ -42,30 +44,30 @@ class Sample(NamedTuple):
 
 
 class Varying(ABC):
-    """Spatially varying constant."""
+    """Base class of material constants that vary over the body."""
 
     @abstractmethod
     def values(self, sample: Sample) -> np.ndarray:
-        """Return the values at the points of a sample, for checks, moduli and scales.
+        """Return the values of the constant at quadrature points, for checks, moduli and scales.
 
         Args:
-            sample: the sample with n points.
+            sample: the n points.
 
         Returns:
             Values, shape (n,).
 
         Raises:
-            InputError: the constant cannot be evaluated there.
+            InputError: the constant has no value at a point.
         """
 
     @abstractmethod
     def expression(self, fields: Any) -> Any:
-        """Return the constant in a form.
+        """Return the constant as an expression for a UFL form.
 
         Args:
-            fields: possible arguments of the constant: `fields.X` is the reference position (UFL, shape (2,)).
-                `fields.of_position(f)` and `fields.of_temperature(f)` are coefficients with the values f(R, Z) and f(T)
-                at the quadrature points of the energy. The latter follows changes of the temperature.
+            fields: source of fields that the expression may use. `fields.X` is the reference position (UFL, shape
+                (2,)). `fields.of_position(f)` and `fields.of_temperature(f)` are coefficients with the values f(R, Z)
+                and f(T) at the quadrature points of the energy. The latter follows changes of the temperature.
 
         Returns:
             The constant (UFL scalar).
@@ -73,17 +75,25 @@ class Varying(ABC):
 
 
 class OfPosition(Varying):
-    """Material constant that varies in space, as a function f(R, Z) of the reference coordinates.
+    """Material constant that is a function f(R, Z) of the reference position.
 
     Args:
-        function: f, of two arrays of shape (n,), length; it returns the constant at these n points, shape (n,).
+        function: function f of two arrays, shape (n,), length; it returns the constant at these n points, shape (n,).
     """
 
     def __init__(self, function: Callable):
         self.function = function
 
     def __call__(self, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the values at positions, shape (n,), all finite."""
+        """Return the constant at reference positions (R, Z), checked to be finite.
+
+        Args:
+            R: first coordinates, shape (n,), length.
+            Z: second coordinates, shape (n,), length.
+
+        Returns:
+            Values, shape (n,).
+        """
         return values(f"the constant {self!r}", self.function, {"R": R, "Z": Z})
 
     def values(self, sample):
@@ -97,7 +107,7 @@ class OfPosition(Varying):
 
 
 class OfTemperature(FunctionOfTemperature, Varying):
-    """Constant that depends on the temperature of the scene, see `FunctionOfTemperature`."""
+    """Material constant that is a function of the temperature of the scene, see `FunctionOfTemperature`."""
 
     def values(self, sample):
         if sample.temperature is None:
@@ -133,7 +143,7 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
 
     .. math:: G(T) = G_0 \, \frac{T - T_z}{T_0 - T_z}
 
-    :math:`T_z` is absolute zero.
+    Here :math:`T_z` is absolute zero in the unit of the temperatures.
 
     Args:
         value: modulus :math:`G_0` at the reference temperature, stress.
@@ -160,10 +170,10 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
 
 
 class OfMesh(Varying):
-    """Constant that is a UFL scalar of the scene's own mesh.
+    """Material constant that is a UFL expression of the scene's own mesh.
 
     Args:
-        expression: the UFL scalar.
+        expression: the UFL expression, a scalar.
     """
 
     def __init__(self, expression: Any):
@@ -184,13 +194,13 @@ class OfMesh(Varying):
 
 
 def varying(value: Any) -> Varying | None:
-    """Return a constant as `Varying`.
+    """Return a constant that varies over the body as an object of `Varying`.
 
     Args:
-        value: the constant.
+        value: the constant, in one of the forms that this module lists.
 
     Returns:
-        The constant, or None if it does not vary.
+        The object, or None if the constant is a number.
     """
     if isinstance(value, Varying):
         return value

@@ -1,4 +1,9 @@
-"""Energies and history of a material: the part of its interface that the forms use."""
+r"""Energies and internal variables of a material: the part of its interface that the forms use.
+
+In a step the internal variables are updated implicitly. A potential of the step replaces the strain energy:
+
+.. math:: P = \frac{\partial W_{step}}{\partial F}(F_{n+1}, \text{internal variables}_n, dt)
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ import ufl
 
 
 class Energies:
-    """Energies of a material, and its history; see `Material` for the attributes."""
+    """Energies and internal variables of a material; `Material` derives from it and describes the attributes."""
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
@@ -26,7 +31,8 @@ class Energies:
     def strain_energy(self, F: Any, *args: Any, **constants: Any) -> Any:
         """Return the strain energy per reference volume.
 
-        For a material with a history it is the instantaneous energy, from the reference configuration.
+        For a material with internal variables it is the energy of a sudden deformation from the reference
+        configuration.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -35,6 +41,9 @@ class Energies:
 
         Returns:
             Energy (UFL, stress), zero at F = I.
+
+        Raises:
+            NotImplementedError: a subclass without internal variables does not define this method.
         """
         if not self.internal:
             raise NotImplementedError
@@ -44,43 +53,47 @@ class Energies:
 
     @property
     def of_flow(self) -> tuple[str, ...]:
-        """Names of constants that set a rate of flow: a step uses their values at its middle."""
+        """Names of the constants that determine a rate of flow; a step uses their values at its middle."""
         return ()
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """Return the potential of a step: its derivative by F is the stress at the end of the step.
+        r"""Return the potential of a step in time; by default the strain energy.
+
+        The nominal stress at the end of the step is
+
+        .. math:: P = \frac{\partial W_{step}}{\partial F}
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: internal variables at the beginning.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: internal variable at the beginning of the step (UFL)}.
             time_step: length of the step (UFL scalar, time).
             constants: values of the constants by name.
 
         Returns:
-            Potential per reference volume (UFL, stress).
+            Potential :math:`W_{step}` per reference volume (UFL, stress).
         """
         return self.strain_energy(F, **constants)
 
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
-        """Return the internal variables at the end of a step.
+        """Return the internal variables at the end of a step in time; by default none.
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: internal variables at the beginning.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: internal variable at the beginning of the step (UFL)}.
             time_step: length of the step (UFL scalar, time).
             constants: values of the constants by name.
 
         Returns:
-            {name: UFL expression}.
+            {name: internal variable at the end of the step (UFL)}.
         """
         return {}
 
     def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the stored energy per reference volume for given internal variables.
+        """Return the recoverable energy per reference volume in a state; by default the strain energy.
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL)}.
             constants: values of the constants by name.
 
         Returns:
@@ -89,53 +102,53 @@ class Energies:
         return self.strain_energy(F, **constants)
 
     def equilibrium_energy(self, F: Any, **constants: Any) -> Any:
-        """Return the energy per reference volume after complete relaxation.
+        """Return the energy per reference volume after complete relaxation at a constant deformation.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
             constants: values of the constants by name.
 
         Returns:
-            Energy (UFL, stress); None if there is none, or if it is unknown.
+            Energy (UFL, stress); None if the material keeps no stress, or if the energy is unknown.
         """
         return None if self.internal else self.strain_energy(F, **constants)
 
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
-        """Return the largest principal elastic stretch of each relaxing branch.
+        """Return the largest principal elastic stretch of each relaxing branch in a state; by default there is none.
 
-        The stretch is 1 for a relaxed branch, and the largest isochoric stretch of F before any relaxation.
+        The stretch is 1 for a relaxed branch. Before any relaxation it is the largest isochoric stretch of F.
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL)}.
             constants: values of the constants by name.
 
         Returns:
-            List of stretches (UFL scalars).
+            List of stretches (UFL scalars), one for each branch.
         """
         return []
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the dissipated power per reference volume.
+        """Return the dissipated power per reference volume in a state; by default 0.
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL)}.
             constants: values of the constants by name.
 
         Returns:
-            Power (UFL, stress over time); 0 without a history.
+            Power (UFL, stress over time).
         """
         return ufl.as_ufl(0.0)
 
     def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the energy dissipated by damage per reference volume.
+        """Return the energy per reference volume that damage has dissipated since the reference configuration.
 
         Args:
-            internal: internal variables.
+            internal: {name: internal variable in the state (UFL)}.
             constants: values of the constants by name.
 
         Returns:
-            Energy (UFL, stress).
+            Energy (UFL, stress); by default 0.
         """
         return ufl.as_ufl(0.0)

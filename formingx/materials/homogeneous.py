@@ -1,4 +1,4 @@
-"""Homogeneous deformations F = diag(l1, l2, l3) of a strain energy, evaluated at many stretches at once.
+"""Homogeneous deformations F = diag(l1, l2, l3) of a strain energy, evaluated at many principal stretches at once.
 
 UFL differentiates the energy once, and numpy evaluates the derivatives, so a fit of constants needs no compilation.
 """
@@ -18,7 +18,7 @@ from ufl.corealg.traversal import unique_post_traversal
 from ..errors import InputError
 
 MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
-"""Tests by name: the stretches are l, l^k and l^(-1-k), with the value k; the last direction is stress-free."""
+"""Homogeneous tests, {name: k}: the stretches are l, l^k and l^(-1-k), and the third direction is stress-free."""
 
 
 _DOMAIN = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
@@ -27,11 +27,11 @@ _CONSTANTS: list[Any] = []                     # as many as the most constants o
 
 
 class Response:
-    """First and second derivatives of an energy with respect to the principal stretches.
+    """First and second derivatives of a strain energy with respect to the principal stretches.
 
     Args:
-        energy: function of (F, **constants), F of shape (3, 3), that returns a UFL scalar.
-        names: names of its constants.
+        energy: function of (F, **constants), F of shape (3, 3), that returns the energy W as a UFL scalar.
+        names: names of the constants; the methods take their values in this order.
 
     Raises:
         InputError: the energy is not a scalar.
@@ -56,41 +56,47 @@ class Response:
         .. math:: P_i = \frac{\partial W}{\partial l_i} - \frac{l_3}{l_i} \frac{\partial W}{\partial l_3}
 
         Args:
-            stretches: (l1, l2), shape (2, n); l3 = 1/(l1 l2).
+            stretches: stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
             constants: values of the constants, in the order of `names`.
 
         Returns:
-            Stresses in directions 1 and 2, shape (2, n), stress.
+            Stresses P in directions 1 and 2, shape (2, n), stress.
         """
         l = _three(stretches)
         g = self._first(l, constants)
         return g[:2] - l[2] / l[:2] * g[2]
 
     def derivatives(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives of the energy with respect to three independent stretches.
+        r"""Return the derivatives of the energy with respect to three independent stretches.
+
+        .. math:: W_{,i} = \frac{\partial W}{\partial l_i}, \qquad
+                  W_{,ij} = \frac{\partial^2 W}{\partial l_i \, \partial l_j}
 
         Args:
-            stretches: (l1, l2, l3), shape (3, n).
+            stretches: stretches (l1, l2, l3), shape (3, n).
             constants: values of the constants, in the order of `names`.
 
         Returns:
-            W,i, shape (3, n), and W,ij, shape (3, 3, n), stress.
+            First derivatives, shape (3, n), and second derivatives, shape (3, 3, n), stress.
         """
         values = self._all(np.asarray(stretches, float), constants)
         return values[:3], values[3:][[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
 
     @np.errstate(all="ignore")
     def logarithmic(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        r"""Return gradient and Hessian of the energy in the strains ln l1 and ln l2, with l1 l2 l3 = 1.
+        r"""Return gradient and Hessian of the energy in two logarithmic strains, at constant volume (l1 l2 l3 = 1).
 
-        The gradient is the Kirchhoff stress :math:`\tau_i - \tau_3`.
+        .. math:: g_i = \frac{\partial W}{\partial \ln l_i} = \tau_i - \tau_3, \qquad
+                  K_{ij} = \frac{\partial^2 W}{\partial \ln l_i \, \partial \ln l_j}, \qquad i, j = 1, 2
+
+        Here :math:`\tau_i` are the principal Kirchhoff stresses.
 
         Args:
-            stretches: (l1, l2), shape (2, n).
+            stretches: stretches (l1, l2), shape (2, n).
             constants: values of the constants, in the order of `names`.
 
         Returns:
-            Gradient, shape (2, n), and Hessian, shape (2, 2, n), stress.
+            Gradient g, shape (2, n), and Hessian K, shape (2, 2, n), stress.
         """
         l = _three(stretches)
         g, h = self.derivatives(l, constants)
@@ -101,33 +107,41 @@ class Response:
 
 
 def along(mode: str, stretches: Any) -> np.ndarray:
-    """Return the in-plane stretches of a test.
+    r"""Return both in-plane stretches of a homogeneous test.
+
+    .. math:: l_1 = l, \qquad l_2 = l^k
 
     Args:
-        mode: a test of `MODES`.
+        mode: a test of `MODES`, which gives the exponent k.
         stretches: stretches l in the loaded direction, shape (n,).
 
     Returns:
-        (l1, l2), shape (2, n).
+        Stretches (l1, l2), shape (2, n).
     """
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
 
 
 def _three(stretches: Any) -> np.ndarray:
-    """Return the three stretches of an incompressible material, shape (3, n)."""
+    """Return (l1, l2, 1/(l1 l2)), shape (3, n), for the stretches (l1, l2) of an incompressible material."""
     l1, l2 = np.asarray(stretches, float)
     return np.stack([l1, l2, 1 / (l1 * l2)])
 
 
 class Stability(NamedTuple):
-    """Ranges of stretch in which a material is stable.
+    r"""Ranges of stretch in which a material is stable in homogeneous tests.
+
+    With the stretch l and the nominal stress P, the logarithmic strain and the Kirchhoff stress tau, the criteria are
+
+    .. math:: \frac{dP}{dl} > 0 \text{ (load)}, \qquad d\tau : d \ln l > 0 \text{ (Drucker)}
+
+    Each range contains l = 1 and is a tuple (lowest, highest).
 
     Attributes:
-        stretches: the requested range (lowest, highest).
-        finite: {mode: range around l = 1 where the stress is finite}.
-        load: {mode: range around l = 1 where the force increases}.
-        drucker: {mode: range around l = 1 where Drucker's criterion holds}.
+        stretches: the examined range.
+        finite: {test: range in which the stress is finite}.
+        load: {test: range in which the force increases}.
+        drucker: {test: range in which Drucker's criterion holds}.
     """
 
     stretches: tuple[float, float]
@@ -137,7 +151,7 @@ class Stability(NamedTuple):
 
     @property
     def stable(self) -> bool:
-        """True if both criteria hold in the whole range in every test."""
+        """True if both criteria hold in the whole examined range in every test."""
         return all(part == self.stretches for parts in (self.load, self.drucker) for part in parts.values())
 
     def __str__(self) -> str:
@@ -155,15 +169,15 @@ class Stability(NamedTuple):
 
 
 def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
-    """Return the ranges of stretch in which a material is stable; see `Material.check_stability`.
+    """Return the ranges of stretch in which a material is stable in the tests of `MODES`, see `Stability`.
 
-    Bounds are searched for in 400 steps of equal ratio, then bisected.
+    The end of a range is searched for at 400 stretches of equal ratio, then by bisection.
 
     Args:
-        response: derivatives of the energy.
-        constants: values of its constants.
-        low: lowest stretch, at most 1.
-        high: highest stretch, 1 or larger.
+        response: derivatives of the energy of the material.
+        constants: values of the constants, in the order of `Response`.
+        low: lowest examined stretch, at most 1.
+        high: highest examined stretch, 1 or larger.
 
     Returns:
         The ranges.
@@ -172,10 +186,10 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
-        """Return the margins of the three criteria, shape (3, n); negative or not a number where a criterion fails.
+        """Return the margins of three criteria at the stretches l of a test, shape (3, n): positive where one holds.
 
-        They are 1 where the stress is finite, then l^2 dP/dl and the smaller eigenvalue of the Hessian, both divided by
-        the size of Hessian and stress.
+        The first is 1 where the stress is finite, else not a number. The others are l^2 dP/dl and the smaller
+        eigenvalue of the Hessian, both divided by the size of Hessian and stress.
         """
         tau, K = response.logarithmic(along(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
@@ -202,7 +216,12 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
 
 class _Program:
-    """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once."""
+    """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once.
+
+    Args:
+        inputs: UFL constants whose values a call takes: three stretches, then the constants of an energy.
+        outputs: the UFL expressions.
+    """
 
     def __init__(self, inputs: list, outputs: list):
         place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}
@@ -220,7 +239,7 @@ class _Program:
 
     @np.errstate(all="ignore")
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
-        """Return the outputs, shape (number of outputs, n)."""
+        """Return the values of the outputs, shape (outputs, n), for stretches, shape (3, n), and constants."""
         values = [*stretches, *constants]
         for operation, operands in self._steps:
             values.append(operation(*[values[i] for i in operands]))
@@ -229,7 +248,11 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """Return programs of the first and of all derivatives of an energy by `_STRETCHES`, for n of `_CONSTANTS`."""
+    """Return programs for the first and for first and second derivatives of an energy W by the stretches.
+
+    W is a UFL expression of `_STRETCHES` and of the first n entries of `_CONSTANTS`. The second derivatives are 11, 12,
+    13, 22, 23, 33.
+    """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))
     first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]
@@ -251,7 +274,7 @@ _OPERATIONS: dict[type, Callable] = {
 
 
 def _operation(node: Any) -> Callable:
-    """Return the numpy operation of a UFL node."""
+    """Return the numpy function of the operands that evaluates a node of a UFL expression."""
     if isinstance(node, classes.Zero):
         return lambda: 0.0
     if isinstance(node, classes.ScalarValue):

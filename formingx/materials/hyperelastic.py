@@ -20,7 +20,7 @@ class NeoHookean(Material):
     .. math:: W = c_{10} (I_1 - 3)
 
     Args:
-        c10: the I1 constant, stress, greater than 0.
+        c10: constant of I1, stress, greater than 0.
 
     >>> rubber = fx.NeoHookean(c10=0.4)
     >>> rubber.shear_modulus, round(float(rubber.stress("uniaxial", 2.0)), 6)      # 2 c10 (l - l^-2)
@@ -48,8 +48,8 @@ class MooneyRivlin(Material):
     .. math:: W = c_{10} (I_1 - 3) + c_{01} (I_2 - 3)
 
     Args:
-        c10: the I1 constant, stress, at least 0.
-        c01: the I2 constant, stress, at least 0 (both at least 0: else W falls without bound).
+        c10: constant of I1, stress, not negative. With a negative constant W would decrease without bound.
+        c01: constant of I2, stress, not negative.
 
     >>> rubber = fx.MooneyRivlin(c10=0.3, c01=0.1)
     >>> round(float(rubber.stress("uniaxial", 2.0)), 6)                            # 2 (c10 + c01/l) (l - l^-2)
@@ -83,10 +83,14 @@ class Yeoh(Material):
 
     .. math:: W = c_{10} (I_1 - 3) + c_{20} (I_1 - 3)^2 + c_{30} (I_1 - 3)^3
 
+    W increases with I1 everywhere if
+
+    .. math:: c_{10} > 0, \qquad c_{20} > -\sqrt{3 \, c_{10} c_{30}}, \qquad c_{30} \ge 0
+
     Args:
-        c10: stress, greater than 0.
-        c20: stress, greater than -sqrt(3 c10 c30) (at least 0 if c30 is 0), so that W grows with I1 everywhere.
-        c30: stress, at least 0.
+        c10: constant of I1 - 3, stress.
+        c20: constant of (I1 - 3)^2, stress; 0 is allowed also if c30 is 0.
+        c30: constant of (I1 - 3)^3, stress.
 
     >>> round(float(fx.Yeoh(c10=0.2, c20=0.01, c30=0.001).shear_modulus), 6)
     0.4
@@ -114,9 +118,11 @@ class Yeoh(Material):
         return [cls(c10=modulus / 2, c20=0, c30=0.1 * modulus / I1**2)]
 
     def coordinates(self):
-        """Return the variables of a fit: c10, c20 + 0.99 sqrt(3 c10 c30), and sqrt(c30).
+        r"""Return the variables of a fit with their bounds.
 
-        Constants are admissible, with 1 % margin, where no variable is negative.
+        .. math:: c_{10}, \qquad c_{20} + 0.99 \sqrt{3 \, c_{10} c_{30}}, \qquad \sqrt{c_{30}}
+
+        If no variable is negative the constants are admissible, with a margin of 1 %.
 
         Returns:
             List of (value, lowest, highest).
@@ -136,7 +142,7 @@ class Gent(Material):
 
     Args:
         mu: shear modulus, stress, greater than 0.
-        Jm: the limit of I1 - 3, greater than 0. In uniaxial tension the largest stretch is about sqrt(Jm + 3).
+        Jm: limit of I1 - 3, greater than 0. In uniaxial tension the largest stretch is about :math:`\sqrt{J_m + 3}`.
 
     >>> stiffens = fx.Gent(mu=0.8, Jm=50.0)
     >>> round(stiffens.largest_stretch("uniaxial"), 3)                             # l^2 + 2/l - 3 = Jm
@@ -171,8 +177,8 @@ class ArrudaBoyce(Material):
 
     .. math:: \frac{dW}{dy} = \mu N b(y), \qquad y = \sqrt{\frac{I_1}{3 N}},
 
-    with the inverse b of the Langevin function L(b) = coth b - 1/b; y is the stretch of the chains over the largest
-    one. The approximation of Kroeger (2015)
+    with the inverse b of the Langevin function :math:`L(b) = \coth b - 1/b`; y is the stretch of the chains over the
+    largest one. The approximation of Kroeger (2015)
 
     .. math:: b = \frac{3 y - (6 y^3 + y^5 - 2 y^7)/5}{1 - y^2}
 
@@ -183,9 +189,10 @@ class ArrudaBoyce(Material):
     minus its value at s = 1/N.
 
     Args:
-        mu: n k T, stress, positive. The initial shear modulus is larger: mu (1 + 3/(5 N) + ...).
+        mu: number of chains per volume times Boltzmann's constant times temperature, stress, positive. The initial
+            shear modulus is larger: :math:`\mu \, (1 + 3/(5 N) + \dots)`.
         N: number of segments in a chain, greater than 1; I1 stays below 3 N. In uniaxial tension the largest stretch is
-            about sqrt(3 N).
+            about :math:`\sqrt{3 N}`.
 
     >>> fx.ArrudaBoyce(mu=0.8, N=25.0).largest_I1                                  # 3 N
     75.0
@@ -199,7 +206,8 @@ class ArrudaBoyce(Material):
         mu, N = constants.values()
         positive(f"{self}: mu", mu)
         if finite(f"{self}: N", N) <= 1:
-            raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched at rest")
+            raise InputError(f"{self}: N = {N!r}: must be greater than 1, or the chains are fully stretched in the"
+                             f" reference configuration")
 
     @property
     def largest_I1(self):
@@ -225,13 +233,16 @@ class Ogden(Material):
     .. math:: W = \sum_k \frac{\mu_k}{\alpha_k}
               \left(\lambda_1^{\alpha_k} + \lambda_2^{\alpha_k} + \lambda_3^{\alpha_k} - 3\right)
 
-    Where alpha_k < 0, l1^alpha_k is written (l2 l3)^-alpha_k, and so on. Both are equal at constant volume (alpha_k =
-    -2 gives I2), but the second is finite in an element that is squeezed flat during Newton's method. Otherwise
-    Newton's method fails at the stretches of a blown sheet.
+    The shear modulus is :math:`\tfrac{1}{2} \sum_k \mu_k \alpha_k`. A power with a negative exponent is replaced:
+
+    .. math:: \lambda_1^{\alpha_k} \to (\lambda_2 \lambda_3)^{-\alpha_k}, \ldots \qquad (\alpha_k < 0)
+
+    Both are equal at constant volume (alpha_k = -2 gives I2), but the second is finite in an element that is squeezed
+    flat during Newton's method. Otherwise Newton's method fails at the stretches of a blown sheet.
 
     Args:
-        mu: the mu_k, stress; the shear modulus is half the sum of mu_k alpha_k.
-        alpha: the same number of exponents alpha_k, nonzero, each with mu_k alpha_k > 0.
+        mu: list of the mu_k, stress.
+        alpha: list of as many exponents alpha_k, each with mu_k alpha_k > 0.
 
     >>> same = fx.Ogden(mu=[0.8], alpha=[2.0])                                     # neo-Hookean, c10 = mu/2
     >>> round(float(same.stress("equibiaxial", 2.0)), 6)                           # mu (l - l^-5)
@@ -263,7 +274,7 @@ class Ogden(Material):
 
     @staticmethod
     def _pairs(constants):
-        """Return the list of (mu_k, alpha_k)."""
+        """Return the list of pairs (mu_k, alpha_k) for {name: value} of the constants."""
         return [(constants[f"mu{k}"], constants[f"alpha{k}"]) for k in range(1, len(constants) // 2 + 1)]
 
     @classmethod
@@ -271,9 +282,9 @@ class Ogden(Material):
         """Return the initial materials of a fit, one for every choice of `terms` exponents out of six.
 
         Args:
-            modulus: approximate shear modulus, stress.
-            I1: largest I1 of the data.
-            terms: number of exponents; None for 3.
+            modulus: approximate shear modulus of the data, stress.
+            I1: not used.
+            terms: number of exponents, at most 6; None for 3.
 
         Returns:
             The materials.
@@ -290,7 +301,9 @@ class Ogden(Material):
                 for some in itertools.combinations(exponents, n)]
 
     def coordinates(self):
-        """Return the variables of a fit: mu_k and alpha_k keep their signs; alpha_k lies between -30 and 30.
+        """Return the variables of a fit, all mu_k then all alpha_k, with bounds.
+
+        Each keeps its sign, and alpha_k lies between -30 and 30.
 
         Returns:
             List of (value, lowest, highest).
@@ -304,14 +317,14 @@ class Hyperelastic(Material):
     """Material with a user-defined energy, a function of the invariants or of F.
 
     Args:
-        energy: function `energy(I1, I2, **constants)` or `energy(F, **constants)` that returns a UFL scalar. Outside
-            its range the energy and its derivatives should be infinite or not a number: a step that leaves the range is
-            halved.
-        of: argument of the energy, "invariants" or "F" (shape (3, 3)).
-        constants: named constants of the energy; exponents may be among them.
+        energy: function `energy(I1, I2, **constants)` or `energy(F, **constants)` that returns the strain energy per
+            reference volume as a UFL scalar (stress). Outside its range the energy and its derivatives should be
+            infinite or not a number: a step that leaves the range is halved.
+        of: "invariants" for the arguments I1 and I2 of the energy, "F" for the deformation gradient, shape (3, 3).
+        constants: values of the constants of the energy by name; exponents may be among them.
 
     Raises:
-        InputError: an energy that is no function of these arguments.
+        InputError: `energy` is no function of these arguments.
 
     Example: ``Hyperelastic(lambda I1, I2, c1, c2: c1 * (I1 - 3) + c2 * (I1 - 3)**2, c1=0.2, c2=0.01)``
 
@@ -348,12 +361,11 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """Return ln x; for x < 0 value and derivatives are not a number (the derivatives of UFL's ln x are finite there).
-    """
+    """Return ln x (UFL); for x < 0 its derivatives are not a number either, unlike those of UFL's ln."""
     return 2 * ufl.ln(ufl.sqrt(x))
 
 
 def _as_tuple(values: Any) -> tuple:
-    """Return one value or several as a tuple."""
+    """Return a sequence of values as a tuple, and a single value as a tuple with one entry."""
     alone = varying(values) is not None or not hasattr(values, "__iter__") or getattr(values, "ndim", 1) == 0
     return (values,) if alone else tuple(values)

@@ -1,4 +1,4 @@
-"""Common base of materials that relax to an equilibrium, and their tests in time."""
+"""Common base of materials that relax to an equilibrium, with the stresses of homogeneous tests over time."""
 
 import copy
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from .material import Material
 
 
 def checked_shift(name: str, shift: Any) -> Callable:
-    """Check the temperature dependence of relaxation times.
+    """Check that the temperature dependence of relaxation times is a function.
 
     Args:
         name: beginning of the message.
-        shift: the law aT(T).
+        shift: law aT(T), the factor of the relaxation times at the temperature T.
 
     Returns:
-        The same law.
+        The argument `shift`.
 
     Raises:
-        InputError: the law is not callable.
+        InputError: `shift` is not callable.
     """
     if not callable(shift):
         raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
@@ -30,18 +30,18 @@ def checked_shift(name: str, shift: Any) -> Callable:
 
 
 def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
-    """Check a list of pairs, such as (mu, tau).
+    """Check a list of pairs of constants, such as moduli and relaxation times.
 
     Args:
         name: beginning of the messages.
         pairs: the pairs, at least one.
-        what: names of both entries, such as "mu, tau".
+        what: names of the two entries of a pair, for the messages, such as "mu, tau".
 
     Returns:
         The pairs as lists.
 
     Raises:
-        InputError: no pair, or an entry that is not a pair.
+        InputError: `pairs` is empty, or an entry is not a pair.
     """
     found = several(name, pairs, f"({what})")
     if not found:
@@ -54,12 +54,13 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
 
 
 class Relaxing(Material):
-    """Material that relaxes to an equilibrium; `stress(mode, stretches, times=, between=)` computes its tests.
+    """Base class of materials that relax to an equilibrium.
 
-    Subclasses add their own constants to `parameters`, call `check`, and define `_modulus`.
+    Subclasses add their own constants to `parameters`, call `check`, and define `_modulus`. They also define
+    `stress(mode, stretches, times=, between=)`, the nominal stress of a homogeneous test over time.
 
     Args:
-        equilibrium: material without history that describes the relaxed state, or None.
+        equilibrium: material without history that describes the relaxed state; None if all stress relaxes.
 
     Raises:
         InputError: `equilibrium` is no material, or has a history.
@@ -78,19 +79,22 @@ class Relaxing(Material):
         self.parameters = {} if equilibrium is None else dict(equilibrium.parameters)
 
     def _modulus(self, times: Any) -> np.ndarray:
-        """Return G(t) without the modulus of the equilibrium, stress."""
+        """Return the relaxation modulus without the modulus of the equilibrium, stress, of the shape of `times`."""
         raise NotImplementedError
 
     def relaxation_modulus(self, times: ArrayLike) -> np.ndarray:
-        r"""Return the small-strain relaxation modulus.
+        r"""Return the small-strain relaxation modulus, the shear stress over a sudden shear strain.
 
         .. math:: G(t) = G_\infty + \sum_k G_k \exp(-t / \tau_k)
 
+        Here :math:`G_\infty` is the modulus of the equilibrium; branch k has the modulus G_k and the relaxation time
+        tau_k.
+
         Args:
-            times: times t, any shape, time.
+            times: times t after the strain, any shape.
 
         Returns:
-            Moduli, the same shape, stress.
+            Moduli G, the shape of `times`, stress.
         """
         modulus = 0.0 if (rest := self.equilibrium) is None else rest.shear_modulus
         return modulus + self._modulus(finite_array("relaxation_modulus: times", times))
@@ -108,7 +112,7 @@ class Relaxing(Material):
 
     @property
     def largest_I1(self) -> float:
-        """Largest I1 of the equilibrium energy."""
+        """Value of I1 at which the equilibrium energy becomes infinite; infinity if there is none."""
         return np.inf if (rest := self.equilibrium) is None else rest.largest_I1
 
     def check_constants(self, **constants: Any) -> None:
@@ -119,18 +123,18 @@ class Relaxing(Material):
         return None if self._equilibrium is None else self._relaxed_energy(F, constants)
 
     def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
-        """Return the equilibrium energy of F (UFL, stress); 0 without an equilibrium."""
+        """Return the equilibrium energy for F and {name: value} of all constants (UFL, stress); 0 if there is none."""
         if self._equilibrium is None:
             return 0
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
-        """Return the nominal stress of the equilibrium material, stress."""
+        """Return the nominal stress of the equilibrium material in a test, shape of `stretches`; 0 if there is none."""
         return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     @property
     def equilibrium(self) -> Material | None:
-        """Material that describes the relaxed state, or None."""
+        """Material that describes the relaxed state; None if all stress relaxes."""
         if self._equilibrium is None:
             return None
         rest = copy.copy(self._equilibrium)
@@ -138,18 +142,18 @@ class Relaxing(Material):
         return rest
 
     def relaxation(self, mode: str, stretch: float, times: ArrayLike) -> np.ndarray:
-        """Return the nominal stress after a sudden stretch that is then constant.
+        """Return the nominal stress over time in a relaxation test: a sudden stretch that is then constant.
 
         Args:
-            mode: a test of `homogeneous.MODES`.
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
             stretch: the stretch, positive.
             times: times after the stretch, any shape, not negative.
 
         Returns:
-            Stresses, the same shape, stress.
+            Nominal stress, the shape of `times`, stress.
 
         Raises:
-            InputError: a negative time.
+            InputError: a time is negative.
         """
         t = np.asarray(times, float)
         if not np.all(t >= 0):
@@ -159,18 +163,20 @@ class Relaxing(Material):
         return self.stress(mode, constant, times=ordered)[back[1:]].reshape(t.shape)[()]
 
     def constant_rate(self, mode: str, rate: float, stretches: ArrayLike) -> np.ndarray:
-        """Return the nominal stress at a constant Hencky rate.
+        r"""Return the nominal stress in a test at a constant Hencky rate, from the reference configuration.
+
+        .. math:: l(t) = \exp(\pm \dot\varepsilon t)
 
         Args:
-            mode: a test of `homogeneous.MODES`.
-            rate: absolute value of the rate of the logarithmic strain in the loaded direction, 1/time, positive.
-            stretches: stretches, shape (n,), all above or all below 1.
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            rate: absolute rate of the logarithmic strain in the loaded direction, 1/time, positive.
+            stretches: stretches l in the loaded direction, shape (n,), all above or all below 1.
 
         Returns:
-            Stresses, shape (n,), stress.
+            Nominal stress at these stretches, shape (n,), stress.
 
         Raises:
-            InputError: stretches above and below 1.
+            InputError: some stretches are above 1 and others below.
         """
         rate = positive(f"{self}: constant_rate: rate", rate)
         t = np.abs(np.log(np.asarray(stretches, float))) / rate

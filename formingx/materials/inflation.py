@@ -1,7 +1,6 @@
-"""Free inflation of thin bodies of one or more layers: the pressure at a stretch.
+"""Free inflation of a thin tube or disc of one or more layers by membrane theory: the pressure at a stretch.
 
-Membrane theory: a tube stays a tube, a disc becomes a spherical cap. The layers have the same stretches, so their
-forces add up.
+A tube remains a tube, and a disc becomes a spherical cap. The layers have the same stretches, so their forces add up.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,15 +11,15 @@ import numpy as np
 from .homogeneous import along
 from .material import Material
 
-_HALVINGS = 60             # bisections of a stretch, down to round-off
+_HALVINGS = 60             # bisections of the axial stretch, down to round-off
 
 
 class Peak(NamedTuple):
-    """First maximum of the pressure.
+    """First maximum of the pressure over the stretch in free inflation.
 
     Attributes:
         stretch: stretch at the maximum.
-        pressure: pressure, stress.
+        pressure: pressure at the maximum, stress.
     """
 
     stretch: float
@@ -31,8 +30,9 @@ class Inflated:
     """Thin body in free inflation.
 
     Args:
-        layers: list of (material, reference thickness, length) for each layer; all constants are numbers.
-        radius: mean reference radius of the tube, or radius of the opening over which the disc is held, length.
+        layers: pairs (material, reference thickness of the layer in units of length), one for each layer. All constants
+            of the materials are numbers.
+        radius: mean reference radius of the tube, or radius of the opening over which the disc is supported, length.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
@@ -40,11 +40,15 @@ class Inflated:
         self._radius = radius
 
     def tube(self, hoop: np.ndarray) -> np.ndarray:
-        r"""Return the pressure in a long tube with closed ends, free to extend.
+        r"""Return the pressure in a long tube with closed ends that is free to extend.
 
-        The axial Cauchy stress is half of the hoop stress, which gives the axial stretch; P are nominal stresses:
+        The axial Cauchy stress is half of the hoop stress. This condition gives the axial stretch
+        :math:`\lambda_z` at a hoop stretch :math:`\lambda_h`:
 
-        .. math:: P_2 \lambda_z = \tfrac{1}{2} P_1 \lambda_h, \qquad p = \frac{P_1 h_0}{R \lambda_h \lambda_z}
+        .. math:: P_z \lambda_z = \tfrac{1}{2} P_h \lambda_h, \qquad p = \frac{P_h h_0}{R \lambda_h \lambda_z}
+
+        P are nominal stresses, h0 is the reference thickness and R the reference radius. For several layers P h0 is a
+        sum over the layers.
 
         Args:
             hoop: hoop stretches, shape (n,).
@@ -62,13 +66,15 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def disc(self, stretch: np.ndarray) -> np.ndarray:
-        r"""Return the pressure on a disc blown to a spherical cap with uniform stretch l.
+        r"""Return the pressure on a disc that is blown to a spherical cap with a uniform equibiaxial stretch l.
 
-        With the height s a and the radius a of the opening, the area ratio is :math:`l^2 = 1 + s^2`, and
+        Let a be the radius of the opening and s a the height of the cap. With the nominal stress P and the reference
+        thickness h0
 
-        .. math:: p = \frac{4 s \, P h_0 / l}{a (1 + s^2)}
+        .. math:: l^2 = 1 + s^2, \qquad p = \frac{4 s \, P h_0 / l}{a (1 + s^2)}
 
-        The maximum is 2 to 3 % below the pressure of a hinged neo-Hookean disc.
+        For several layers P h0 is a sum over the layers. The maximum of the pressure is 2 to 3 % below the maximum for
+        a hinged neo-Hookean disc.
 
         Args:
             stretch: stretches l, shape (n,), 1 or larger.
@@ -81,13 +87,13 @@ class Inflated:
         return np.where(np.isfinite(found), found, np.inf)
 
     def _forces(self, stretches: np.ndarray) -> np.ndarray:
-        """Return the forces per reference length, shape (2, n)."""
+        """Return the in-plane forces per reference length, shape (2, n), stress length, for stretches, shape (2, n)."""
         each = [h * material.response.stress(stretches, constants) for material, constants, h in self._layers]
         return np.sum(each, axis=0)
 
 
 def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
-    """Return the first maximum of a pressure over stretches from 1 to 20.
+    """Find the first maximum of the pressure in free inflation, for stretches from 1 to 20.
 
     Args:
         pressure: function from stretches, shape (n,), to pressures, shape (n,), stress.

@@ -8,32 +8,31 @@ class IntegralLaw(Protocol):
     """Law of a stress that depends on all past states (`Material.integral`).
 
     Attributes:
-        coefficients: {name: value in the reference configuration}, tuples for tensors; functions of the forms at
-            quadrature points.
+        coefficients: {name: value in the reference configuration}, tuples for tensors. The forms have a function of
+            each name with values at quadrature points.
     """
 
     coefficients: Mapping[str, object]
 
     def history(self, forms: object, terms: object) -> object:
-        """Return the history of past states and coefficients, a `formingx.forms.history.ConstitutiveHistory`.
-
-        Its method `refresh()` makes the coefficients exact for the fields and the time of the forms.
+        """Return the history of the material: its past states, from which the coefficients follow.
 
         Args:
-            forms: the `Formulation`.
+            forms: the `Formulation` of the body.
             terms: the `MaterialTerms` of the material.
 
         Returns:
-            The history.
+            A `formingx.forms.history.ConstitutiveHistory`. Its method `refresh()` updates the coefficients to the
+            current fields and time of the forms.
         """
 
     def unsymmetric_work(self, C: Sequence[object], dC: Sequence[object], coefficients: Mapping[str, object]) -> object:
-        """Return the virtual work that no potential has, per reference volume.
+        """Return the part of the virtual work per reference volume that does not derive from a potential.
 
         Args:
             C: entries 11, 22, 12, 33 of the isochoric right Cauchy-Green tensor (UFL).
-            dC: their virtual changes (UFL).
-            coefficients: {name: function}.
+            dC: virtual changes of these entries (UFL).
+            coefficients: {name of a coefficient: its function (UFL)}.
 
         Returns:
             Virtual work (UFL, stress), or None.

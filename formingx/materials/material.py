@@ -1,13 +1,13 @@
-r"""Interface of every incompressible, isotropic material; the materials are in `hyperelastic`.
+r"""Interface of every incompressible material, isotropic or with fibres.
 
-A material has named constants and one energy. It may have a history: internal variables at every quadrature point,
-which are updated from one accepted state to the next. Where the energy is used, its isotropic stress in the reference
-configuration is removed:
+A material has named constants and one energy W. It may have a history: internal variables at every quadrature point,
+which are updated from one accepted state to the next. The forms remove the isotropic stress of W in the reference
+configuration:
 
 .. math:: W(F) - \sigma_0 \ln J, \qquad \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
 
-On a thin sheet Newton's method takes half as many iterations with this form as with the isochoric part of F. See the
-notes on incompressibility.
+On a thin sheet Newton's method takes half as many iterations with this form as with the isochoric part of F. The page
+docs/theory/incompressibility.md states the form. The module `hyperelastic` has the elastic materials.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from .homogeneous import MODES, Response, Stability
 
 
 class Material(Energies):
-    """Strain energy with named constants.
+    """Base class of materials: a strain energy with named constants, and possibly a history.
 
-    Subclasses set `self.parameters` (name to number, or to a varying coefficient: see `constants`) and define
-    `strain_energy`. The user chooses the unit of stress of the constants; all pressures and stresses have this unit.
+    Subclasses set `self.parameters` and define `strain_energy`. The user chooses the unit of stress of the constants;
+    all pressures and stresses have this unit.
 
-    A material with a history also sets `self.internal`, and defines `step_energy` and `updated`. In their arguments and
-    results, `internal` is {name: UFL expression} with the values at the beginning of the step. `time_step` is the
-    process time since then (UFL scalar); where it is 0 no variable may change by flow.
+    A material with a history also sets `self.internal`, and defines `step_energy` and `updated`. Their argument
+    `internal` is {name: UFL expression} with the values at the beginning of the step. Their argument `time_step` is the
+    length of the step in process time (UFL scalar); where it is 0 no variable may change by flow.
 
     Attributes:
-        parameters: {name: constant}.
-        internal: {name: value in the reference configuration}, a number or nested tuples of the shape of the variable,
-            per quadrature point. Empty: no history.
+        parameters: {name: constant}, each a number or one of the varying constants in `formingx.materials.constants`.
+        internal: {name: value in the reference configuration} of the internal variables at a quadrature point, each a
+            number or nested tuples of the shape of the variable. Empty: no history.
         of_motion: names of internal variables that describe the motion in the last step and predict the rate in the
             next. With their values in the reference configuration they predict no motion.
         shapes: {name: 1 or -1} of internal variables that are positive definite tensors, like C or its inverse, with
@@ -53,7 +53,7 @@ class Material(Energies):
         stores_energy: True if `stored_energy` is defined.
         symmetric: True if the tangent is symmetric.
         tested: tests from which the constants were fitted (a `MeasuredRange`), or None if unknown.
-        branches: list of (modulus, relaxation time) of a relaxing material.
+        branches: pairs (shear modulus, relaxation time) of a relaxing material, stress and time; else empty.
     """
 
     @property
@@ -62,22 +62,22 @@ class Material(Energies):
         return any(varying(value) is not None for value in self.parameters.values())
 
     def constants(self) -> dict[str, float | Varying]:
-        """Return the constants for a form.
+        """Return the constants in the types that the forms use.
 
         Returns:
-            {name: number, or a varying coefficient}.
+            {name: number, or an object of `Varying` for a constant that varies over the body}.
         """
         return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
 
     def _numbers(self) -> list[float]:
-        """Return the values of the constants, in order; raise an InputError if they vary."""
+        """Return the values of the constants, in the order of `parameters`; raise an InputError if they vary."""
         if self.varies:
             raise InputError(f"{self}: its constants vary over the body: use with_constants([...]) for the material at"
                              f" one point of it")
         return list(self.parameters.values())
 
     def _sampled(self, sample: Sample) -> np.ndarray:
-        """Return the distinct sets of values of the constants over a sample, shape (constants, n)."""
+        """Return the n distinct sets of values of the constants at the points of a sample, shape (constants, n)."""
         found = [value.values(sample) if isinstance(value, Varying) else float(value)
                  for value in self.constants().values()]
         columns = np.stack(np.broadcast_arrays(np.zeros(len(sample.points)), *found)[1:])
@@ -85,39 +85,42 @@ class Material(Energies):
 
     @property
     def base(self) -> Material:
-        """Material that has not solidified; by default this material."""
+        """Material before any part of it has solidified (`Solidification`); by default this material."""
         return self
 
     @property
     def equilibrium(self) -> Material | None:
-        """Material that describes the relaxed state, or None; by default this material, which does not relax."""
+        """Material that describes the state after complete relaxation; None if all stress relaxes.
+
+        It is the material itself if the material does not relax, as by default.
+        """
         return self
 
     @property
     def largest_I1(self) -> float:
-        """Value of I1 at which the energy becomes infinite; infinity if there is none."""
+        """Value of the invariant I1 at which the energy becomes infinite; infinity if there is none."""
         return math.inf
 
     @property
     def shear_modulus(self) -> float:
-        r"""Small-strain shear modulus, E/3; with fibres in the stiffest direction. Unit: stress.
+        r"""Small-strain shear modulus mu, a third of Young's modulus, stress.
 
-        For small strains e = ln l with zero sum an isotropic energy is
+        For small principal strains e with zero sum an isotropic energy is
 
         .. math:: W = \mu (e_1^2 + e_2^2 + e_3^2).
 
-        In general mu is half the largest second derivative of W along such strains.
+        In general, as with fibres, mu is half the largest second derivative of W along such strains of unit length.
         """
         return float(self._moduli(self._numbers(), 1)[1, 0])
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
-        """Return the shear modulus for the values of the constants over a sample.
+        """Return the shear moduli for all values that the constants have at quadrature points.
 
         Args:
-            sample: the sample.
+            sample: the points.
 
         Returns:
-            Moduli for the n distinct sets of values, shape (n,), stress.
+            Modulus for each of the n distinct sets of values, shape (n,), stress.
         """
         values = self._sampled(sample)
         return self._moduli(values, values.shape[1])[1]
@@ -131,32 +134,38 @@ class Material(Energies):
 
     @property
     def rest_stress(self) -> float:
-        """dW/dF11 at F = I, stress: 2 (W,1 + 2 W,2) for a function of the invariants."""
+        r"""Stress of the energy in the reference configuration, which the forms remove, stress.
+
+        For an energy that is a function of the invariants
+
+        .. math:: \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
+                  = 2 \frac{\partial W}{\partial I_1} + 4 \frac{\partial W}{\partial I_2}
+        """
         return float(self.response.derivatives(np.ones((3, 1)), self._numbers())[0][0, 0])
 
     @functools.cached_property
     def response(self) -> Response:
-        """Derivatives of the energy by the principal stretches, for any constants."""
+        """Derivatives of the strain energy by the principal stretches, as functions of stretches and constants."""
         return Response(self.strain_energy, list(self.parameters))
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), *, true: bool = False) -> np.ndarray:
-        r"""Return the nominal stress, force over reference area, in a homogeneous test.
+        r"""Return the nominal stress, force over reference area, in a homogeneous test of an incompressible sheet.
 
-        With n = 1 direction pulled, or 2:
-
-        .. math:: P = \frac{1}{n} \frac{dW}{dl}
+        .. math:: P_i = \frac{\partial W}{\partial l_i} - \frac{l_3}{l_i} \frac{\partial W}{\partial l_3}, \qquad
+                  l_1 l_2 l_3 = 1
 
         Args:
-            mode: "uniaxial" (l, l^-1/2, l^-1/2), "pure_shear" (l, 1, 1/l), also called planar tension, or "equibiaxial"
-                (l, l, l^-2); "biaxial": any (l1, l2), as in `stress(stretches=(l1, l2))`.
-            stretches: stretches l, any shape, each positive; for "biaxial" shape (2, ...).
+            mode: "uniaxial" for the stretches (l, l^-1/2, l^-1/2), "pure_shear" for (l, 1, 1/l), also called planar
+                tension, "equibiaxial" for (l, l, l^-2), or "biaxial" for any (l1, l2).
+            stretches: stretches l in the loaded direction, any shape, each positive; for "biaxial" stretches (l1, l2),
+                shape (2, ...).
             true: True for the true stress P l, force over current area.
 
         Returns:
-            Stress of the shape of `stretches`, in the unit of the constants.
+            Stress in the loaded direction, for "biaxial" in both directions, of the shape of `stretches`, stress.
 
         Raises:
-            InputError: unknown mode, a stretch that is not positive or beyond the material's limit.
+            InputError: an unknown mode, or a stretch that is not positive or beyond the limit of the material.
         """
         known(f"{self}: stress: mode", mode, [*MODES, "biaxial"])
         l = np.asarray(stretches, dtype=float)
@@ -175,10 +184,12 @@ class Material(Energies):
         return (P * flat if true else P).reshape(l.shape)[()]
 
     def largest_stretch(self, mode: str) -> float:
-        """Return the stretch of a test at which the energy becomes infinite.
+        r"""Return the stretch l of a test at which the energy becomes infinite.
+
+        .. math:: l^2 + l^{2k} + l^{-2 - 2k} = I_{1,max}, \qquad k = -\tfrac{1}{2}, 0, 1
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            mode: "uniaxial" (k = -1/2), "pure_shear" (k = 0) or "equibiaxial" (k = 1).
 
         Returns:
             The stretch; infinity if there is none.
@@ -191,32 +202,32 @@ class Material(Energies):
         return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the sudden stretch of a test beyond which the force decreases.
+        """Return the stretch beyond which the force decreases, when the material is stretched suddenly in a test.
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial".
 
         Returns:
-            The stretch; infinity if there is none.
+            The stretch; infinity if there is none, as by default.
         """
         return math.inf
 
     def check_stability(self, stretches: Any) -> Stability:
         r"""Return the ranges of stretch in which the material is stable, in each of the three tests.
 
-        Each of two criteria gives the range around l = 1 in which it holds:
+        For each of two criteria the range around l = 1 is given in which it holds. With the nominal stress P and the
+        Kirchhoff stress tau they are
 
-        - "load": dP/dl > 0 for the nominal stress P; a test under an increasing force can continue.
-        - "Drucker": the Hessian of W in the logarithmic strains is positive definite at every stretch of the test. For
-          every change of the three stretches at constant volume, with the Kirchhoff stress tau,
+        .. math:: \frac{dP}{dl} > 0 \text{ (load)}, \qquad d\tau : d \ln l > 0 \text{ (Drucker)}
 
-          .. math:: d\tau : d \ln l > 0
+        The first allows a test under an increasing force to continue. The second holds for every change of the three
+        stretches at constant volume: the Hessian of W in the logarithmic strains is positive definite.
 
         Args:
             stretches: stretches whose smallest and largest value (and 1) bound the examined range.
 
         Returns:
-            The ranges.
+            The ranges in the tests "uniaxial", "pure_shear" and "equibiaxial".
 
         Raises:
             InputError: `stretches` is not a range of positive numbers.
@@ -229,11 +240,11 @@ class Material(Energies):
         return homogeneous.stability(self.response, self._numbers(), min(low, 1.0), max(high, 1.0))
 
     def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "") -> Any:
-        """Draw nominal stress against stretch for the three tests.
+        """Draw nominal stress against stretch for uniaxial tension, pure shear and equibiaxial tension.
 
         Args:
-            axes: matplotlib axes; default a new figure.
-            stretches: stretches, shape (n,); default 1 to 6, or to 95 % of the limit.
+            axes: matplotlib axes; None: a new figure.
+            stretches: stretches, shape (n,); None: from 1 to 6, or to 95 % of the largest stretch of the material.
             unit: unit of stress of the constants, for the label.
 
         Returns:
@@ -249,12 +260,12 @@ class Material(Energies):
 
     def report(self, file: Any = "card.html", *, temperatures: Sequence[float] = (),
                rates: Sequence[float] = (0.1, 1.0, 10.0), unit: str = "", unit_of_time: str = "s") -> Any:
-        """Write an HTML page with the response and the limits of the material.
+        """Write an HTML page with stress-stretch curves and the limits of the material.
 
         Args:
             file: name of the file.
             temperatures: temperatures of the curves; needed if constants or relaxation times depend on the temperature.
-            rates: Hencky rates of forming, 1/time, for a material that relaxes.
+            rates: Hencky rates of the curves, 1/time, for a material that relaxes.
             unit: unit of stress of the constants, for labels.
             unit_of_time: unit of time of the constants, for labels.
 
@@ -293,9 +304,9 @@ class Material(Energies):
             raise InputError(f"{self} has no stiffness: its initial shear modulus is {mu:.6g}, must be positive")
         stress = self.response.derivatives(np.ones((3, n)), sets)[0]
         for g in stress.T[np.ptp(stress, axis=0) > 1e-6 * moduli[1]][:1]:
-            raise InputError(f"{self} is not free of stress at rest: dW/dl along r, z and the hoop are {g[0]:.6g},"
-                             f" {g[1]:.6g} and {g[2]:.6g}; only a part that is the same in all three, a pressure, is"
-                             " removed")
+            raise InputError(f"{self} is not free of stress in the reference configuration: dW/dl along r, z and the"
+                             f" hoop are {g[0]:.6g}, {g[1]:.6g} and {g[2]:.6g}; only a part that is the same in all"
+                             " three, a pressure, is removed")
 
     def check_constants(self, **constants: Any) -> None:
         """Raise an InputError unless these values of the constants are admissible.
@@ -308,7 +319,7 @@ class Material(Energies):
 
     @classmethod
     def guesses(cls, modulus: float, I1: float, terms: int | None) -> list[Material]:
-        """Return initial materials for a fit.
+        """Return materials of this class with initial constants for a fit.
 
         Args:
             modulus: approximate shear modulus of the data, stress.
@@ -325,18 +336,20 @@ class Material(Energies):
                          f" wanted ones instead of the class")
 
     def coordinates(self) -> list[tuple[float, float, float]]:
-        """Return the variables of a fit; all constants within their bounds are admissible.
+        """Return the variables that a fit changes in place of the constants; by default the constants.
+
+        All constants that follow from variables within their bounds are admissible.
 
         Returns:
-            List of (value, lowest, highest).
+            List of (value for the present constants, lowest, highest).
         """
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 
     def constants_at(self, coordinates: Sequence[float] | np.ndarray) -> list[float]:
-        """Return the constants for values of the fit variables.
+        """Return the constants that follow from the variables of a fit.
 
         Args:
-            coordinates: values of the variables of `coordinates`.
+            coordinates: values of the variables, in the order of the method `coordinates`.
 
         Returns:
             Constants, in the order of `parameters`.
@@ -353,7 +366,7 @@ class Material(Energies):
             The material.
 
         Raises:
-            InputError: another number of constants, or constants that are not admissible.
+            InputError: the number of constants differs, or they are not admissible.
         """
         if len(constants) != len(self.parameters):
             raise InputError(f"{self}: with_constants: {len(constants)} numbers for {', '.join(self.parameters)}")
@@ -388,7 +401,7 @@ class Material(Energies):
             raise InputError(f"{self} is not isotropic: its stresses depend on the direction that is pulled")
 
     def _beyond(self, mode: str, stretch: float) -> str:
-        """Return the message for a stretch beyond the limit of the material."""
+        """Return the error message for a stretch in a test that is beyond the limit of the material."""
         k = MODES[mode]
         if math.isfinite(self.largest_I1):
             I1 = stretch**2 + stretch**(2 * k) + stretch**(-2 - 2 * k)
@@ -404,10 +417,10 @@ class Material(Energies):
 
 
 def brief(value: Any) -> str:
-    """Return a constant as text, numbers with six digits.
+    """Return the value of a constant as text, a number with six significant digits.
 
     Args:
-        value: the constant.
+        value: the value.
 
     Returns:
         The text.

@@ -8,13 +8,13 @@ from .material import Material
 
 
 class Published(NamedTuple):
-    """Material as published.
+    """Published material constants with the conditions of their tests.
 
     Attributes:
-        material: the material, constants in `unit`, c10 belongs to I1.
-        unit: unit of the constants.
+        material: the material with constants in `unit`; c10 is the constant of I1, c01 the constant of I2.
+        unit: unit of stress of the constants.
         substance: the tested substance.
-        temperature: temperature in degrees Celsius; None if the source does not state it.
+        temperature: temperature of the tests in degrees Celsius; None if the source does not state it.
         rate: rate of the tests, as text.
         mode: tests from which the constants were fitted, as text.
         source: publication of the constants, and the work that quotes them if they are quoted.
@@ -51,10 +51,10 @@ def register_published(constants: Callable[[], dict[str, Published]]) -> Callabl
 
 
 def published() -> dict[str, Published]:
-    """Return material constants that can be cited, in MPa; for melts in Pa and s.
+    """Return published material constants with their sources, in MPa; for melts in Pa and s.
 
-    They are valid for the stretches, temperatures and rates of their tests, which are given as far as the source states
-    them. Quoted constants were not read in the original. `treloar1944` has test data for fits.
+    The constants are valid for the stretches, temperatures and rates of their tests, as far as the source states them.
+    Quoted constants were taken from the work that quotes them. `treloar1944` has test data for fits.
 
     Returns:
         {name: `Published`}.

@@ -1,16 +1,17 @@
-r"""Relaxing materials: an equilibrium energy and branches, each a spring that flows.
+r"""Relaxing materials: an equilibrium energy and relaxing branches, each a spring in series with a damper.
 
-A branch has a modulus mu, a relaxation time tau, and an energy of its elastic strain; A is the inverse of its internal
-variable Cv, or its variable itself:
+A branch has a modulus mu, a relaxation time tau and a symmetric tensor as internal variable, Cv or A. Its stress
+derives from
 
-.. math:: W_{branch} = \frac{\mu}{2} \left[\mathrm{tr}(\bar C A) - 3\right], \qquad \bar C = J^{-2/3} C
+.. math:: W_{branch} = \frac{\mu}{2} \left[\mathrm{tr}(\bar C M) - 3\right], \qquad M = C_v^{-1} \text{ or } A,
+          \qquad \bar C = J^{-2/3} C
 
-Cbar keeps the branches stress-free in the reference configuration. A step of length dt from a known state has a
-potential, whose derivative by F is the stress at its end. Its tangent is therefore symmetric and consistent, without
-iterations at a point. With x = dt/tau the potential is regular at dt = 0, where it is the elastic energy. For infinite
-dt the branch contributes nothing.
+with the isochoric right Cauchy-Green tensor :math:`\bar C`, which keeps the branches stress-free in the reference
+configuration. A step of length dt from a known state has a potential, whose derivative by F is the stress at the end of
+the step. The tangent is therefore symmetric and consistent, without iterations at a point. The potential is regular at
+dt = 0, where it is the elastic energy. For infinite dt the branch contributes nothing.
 
-A symmetric tensor with the block structure of F (`physics.kinematics`) is stored as its entries (11, 22, 12, 33).
+A symmetric tensor with one principal direction normal to the section is stored as its entries (11, 22, 12, 33).
 """
 
 import math
@@ -33,24 +34,27 @@ from .tensors import IDENTITY, Entries, entries, inner, isochoric
 
 
 class RelaxingMaterial(Relaxing):
-    """Equilibrium energy and relaxing branches, for any law of the branches.
+    r"""Base class of materials with an equilibrium energy and relaxing branches; subclasses define the law of a branch.
 
-    Its constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2, ... Without times,
-    `strain_energy`, `shear_modulus` and `stress` give the instantaneous response, before any relaxation.
+    .. math:: W = W_{eq}(F) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(\bar C M_k) - 3\right]
+
+    The stress derives from W. The tensor M_k describes the elastic strain of branch k, see
+    `formingx.materials.relaxing`. The constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2,
+    and so on. Without times, `strain_energy`, `shear_modulus` and `stress` give the response before any relaxation.
 
     Args:
-        equilibrium: material that describes the relaxed state, or None.
+        equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
         shift: temperature dependence of the relaxation times: `WLF`, `Arrhenius`, or any function aT(T) of an array.
-            The taus, which must be numbers, are the values where aT = 1. None: no dependence.
+            The relaxation times are then aT(T) tau, with numbers tau. None: no dependence.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: an argument is not allowed.
     """
 
-    _tensor = ""                    # name of the branches' state
-    _stores_C = True                # C of the last state is a history variable too
-    _sign = 1                       # of the branches' state: see `Material.shapes`
+    _tensor = ""                    # name of the internal variable of a branch
+    _stores_C = True                # C of the last state is an internal variable too
+    _sign = 1                       # sign of the internal variable of a branch, see `Material.shapes`
 
     def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
         super().__init__(equilibrium)
@@ -78,38 +82,37 @@ class RelaxingMaterial(Relaxing):
 
     @property
     def branches(self) -> list[tuple[float, float]]:
-        """List of (mu, tau), stress and time."""
+        """Branches, as a list of (shear modulus mu, relaxation time tau), stress and time."""
         return [(mu, tau) for _, mu, tau in self._branches(self.parameters)]
 
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
-        """{name: value in the reference configuration} of the history variables, entries (11, 22, 12, 33) of tensors.
-        """
+        """Internal variables, {name: entries (11, 22, 12, 33) of the tensor in the reference configuration}."""
         return dict.fromkeys(self.shapes, IDENTITY)
 
     @property
     def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
-        """Signs of the tensors; see `Material`."""
+        """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
         branches = {f"{self._tensor}_{k}": self._sign for k, *_ in self._branches(self.parameters)}
         return {"C": 1} | branches if self._stores_C else branches
 
     @property
     def of_flow(self) -> tuple[str, ...]:
-        """Names of the relaxation times."""
+        """Names of the relaxation times of all branches, the constants that determine a rate of flow."""
         return tuple(f"tau_{k}" for k, *_ in self._branches(self.parameters))
 
     def elastic_stretches(self, F, internal, **constants):
-        r"""Return the largest principal elastic stretch of each branch.
+        r"""Return the largest principal elastic stretch of each branch in a state.
 
         .. math:: \sqrt{\max \mathrm{eig}(J^{-2/3} F M F^T)}, \qquad M = C_v^{-1} \text{ or } A
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL, shape (4,))}.
             constants: values of the constants by name.
 
         Returns:
-            List of stretches (UFL scalars).
+            List of stretches (UFL scalars), one for each branch.
         """
         scale = kinematics.volume_ratio(F) ** (-2 / 3)
         found = []
@@ -121,7 +124,9 @@ class RelaxingMaterial(Relaxing):
         return found
 
     def strain_energy(self, F, **constants):
-        """Return the instantaneous strain energy per reference volume, before any flow.
+        r"""Return the strain energy per reference volume for a sudden deformation of the undeformed body.
+
+        .. math:: W = W_{eq}(F) + \sum_k \frac{\mu_k}{2} (\mathrm{tr} \, \bar C - 3)
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -134,11 +139,11 @@ class RelaxingMaterial(Relaxing):
         return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
 
     def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the stored energy per reference volume for given internal variables.
+        """Return the recoverable energy per reference volume in a state, of the equilibrium and of all branches.
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL, shape (4,))}.
             constants: values of the constants by name.
 
         Returns:
@@ -150,11 +155,11 @@ class RelaxingMaterial(Relaxing):
             for k, mu, _ in self._branches(constants))
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the dissipated power per reference volume.
+        """Return the power per reference volume that the flow of all branches dissipates in a state.
 
         Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: internal variables in the same state.
+            F: deformation gradient in the state (UFL, shape (3, 3)).
+            internal: {name: internal variable in the state (UFL, shape (4,))}.
             constants: values of the constants by name.
 
         Returns:
@@ -165,16 +170,16 @@ class RelaxingMaterial(Relaxing):
                    for k, mu, tau in self._branches(constants))
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """Return the potential of a step: its derivative by F is the stress at the end of the step.
+        """Return the potential of a step in time, whose derivative by F is the nominal stress at the end of the step.
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: {name: entries, shape (4,)} at the beginning, names as in `internal`.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: internal variable at the beginning of the step (UFL, shape (4,))}.
             time_step: length of the step (UFL scalar, time), 0 or larger.
             constants: values of the constants by name.
 
         Returns:
-            Potential (UFL, stress).
+            Potential per reference volume (UFL, stress).
         """
         C = isochoric(F)
         past = self._past(internal, time_step)
@@ -183,18 +188,18 @@ class RelaxingMaterial(Relaxing):
             for k, mu, tau in self._branches(constants))
 
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
-        """Return the internal variables at the end of a step.
+        """Return the internal variables at the end of a step in time.
 
-        It must be called after steps of length 0 too, because the next step begins with the stored C.
+        They must be updated after steps of length 0 too, because the next step begins with the stored C.
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: {name: entries, shape (4,)} at the beginning.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: internal variable at the beginning of the step (UFL, shape (4,))}.
             time_step: length of the step (UFL scalar, time), 0 or larger.
             constants: values of the constants by name.
 
         Returns:
-            {name: entries, shape (4,)} (UFL).
+            {name: internal variable at the end of the step (UFL, shape (4,))}.
         """
         C = isochoric(F)
         past, after = self._past(internal, time_step), self._deformation_history(C, internal, time_step)
@@ -211,19 +216,20 @@ class RelaxingMaterial(Relaxing):
         """Return the nominal stress, force over reference area, in a homogeneous test.
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times "biaxial" too.
-            stretches: stretches, any shape without times, shape (n,) with times.
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times also "biaxial", see `Material.stress`.
+            stretches: stretches in the loaded direction, any shape without times, shape (n,) with times.
             times: times of the stretches, shape (n,), not descending. The first stretch is applied suddenly to a body
                 in the reference configuration; two stretches at the same time are a jump. None: every stretch is
-                applied suddenly.
+                applied suddenly to a body in the reference configuration.
             between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
             true: True for the true stress, force over current area.
 
         Returns:
-            Stress of the shape of `stretches`, in the unit of the constants.
+            Stress of the shape of `stretches`, stress.
 
         Raises:
-            InputError: as without times; descending times, or another number of times than of stretches.
+            InputError: an unknown mode, a stretch that is not positive, descending times, or numbers of times and
+                stretches that differ.
         """
         if times is None:
             return super().stress(mode, stretches, true=true)
@@ -235,32 +241,37 @@ class RelaxingMaterial(Relaxing):
     @classmethod
     def unit_stress(cls, mode: str, tau: Any, times: np.ndarray, stretches: np.ndarray,
                     between: str = "stretch", accuracy: float = 1e-10) -> np.ndarray:
-        """Return the nominal stress over mu of branches; see `branches.elastic_strains`.
+        r"""Return the nominal stress of branches over their shear modulus in a homogeneous test over time.
+
+        .. math:: \frac{P}{\mu} = \frac{e^{2 w_1} - e^{2 w_3}}{l}
+
+        Here w are the elastic logarithmic strains of a branch (`branches.elastic_strains`).
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial".
-            tau: relaxation times, shape (branches,), time.
-            times: times, shape (n,).
-            stretches: stretches at these times, shape (n,).
-            between: "stretch" or "strain".
-            accuracy: relative accuracy of a time step.
+            tau: relaxation times of the branches, shape (branches,), time.
+            times: times, shape (n,), not descending.
+            stretches: stretches l in the loaded direction at these times, shape (n,).
+            between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
+            accuracy: relative accuracy of a time step of the integration.
 
         Returns:
-            Stress over mu, shape (n, branches).
+            Stress P over the modulus mu, dimensionless, shape (n, branches).
         """
         w = tests.elastic_strains(cls._flow, tau, mode, times, stretches, between, accuracy)
         return (np.exp(2 * w[..., 0]) - np.exp(2 * w[..., 2])) / stretches[:, None]
 
     def plot(self, axes: Axes | None = None, stretches: ArrayLike | None = None, unit: str = "",
              mode: str = "uniaxial", rates: ArrayLike | None = None, unit_of_time: str = "s") -> Any:
-        """Draw nominal stress against stretch at constant Hencky rates, instantaneous and relaxed.
+        """Draw nominal stress against stretch at constant Hencky rates, for sudden stretches, and after relaxation.
 
         Args:
-            axes: matplotlib axes; default a new figure.
-            stretches: stretches above 1, shape (n,); default 1 to 6, or to 95 % of the limit.
+            axes: matplotlib axes; None: a new figure.
+            stretches: stretches above 1, shape (n,); None: from 1 to 6, or to 95 % of the largest stretch.
             unit: unit of stress of the constants, for the label.
-            mode: the test.
-            rates: rates, 1/time; default from 0.1 over the longest tau to 10 over the shortest, by decades.
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            rates: Hencky rates, 1/time; None: decades from 0.1 over the longest relaxation time to 10 over the
+                shortest.
             unit_of_time: unit of time of the constants, for labels.
 
         Returns:
@@ -284,7 +295,9 @@ class RelaxingMaterial(Relaxing):
         return drawn
 
     def coordinates(self):
-        """Return the variables of a fit: variables of the equilibrium energy, then the logarithms of mu and tau.
+        r"""Return the variables that a fit changes in place of the constants.
+
+        They are the variables of the equilibrium energy, then :math:`\ln \mu_k` and :math:`\ln \tau_k` of each branch.
 
         Returns:
             List of (value, lowest, highest).
@@ -299,45 +312,50 @@ class RelaxingMaterial(Relaxing):
         return [*rest.constants_at(coordinates[:n]), *np.exp(coordinates[n:])]
 
     def _branches(self, constants: dict[str, Any]) -> Iterator[tuple[int, Any, Any]]:
-        """Yield (number, mu, tau) of every branch."""
+        """Yield (number from 1, mu, tau) of every branch, for {name: value} of the constants."""
         k = 0
         while f"mu_{(k := k + 1)}" in constants and f"tau_{k}" in constants:
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the data of earlier states that a step of the branches needs, independent of tau."""
+        """Return the data of earlier states for a step of the branches: entries of the last C; None if not stored."""
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
-        """Return the history variables besides the states of the branches that the next step needs."""
+        """Return {name: value} of the internal variables, besides the tensors of the branches, for the next step.
+
+        `C` has the entries at the end of the present step, `internal` the variables at its beginning.
+        """
         return {"C": C} if self._stores_C else {}
 
-    # the law of a branch: energies over mu/2, times over tau, tensors as entries, C with det C = 1; `_metric` is M of
-    # the elastic strain F M F^T
+    # the law of a branch: A is its internal variable, C the isochoric right Cauchy-Green tensor, both as entries
 
     def _metric(self, A: Entries) -> Entries:
-        """Return M of the elastic strain F M F^T, as entries."""
+        """Return the entries of M of the elastic left Cauchy-Green tensor F M F^T, for the internal variable A."""
         raise NotImplementedError
 
     def _stored(self, C: Entries, A: Entries) -> Any:
-        """Return the stored energy over mu/2 for C with det C = 1."""
+        """Return the stored energy of a branch over mu/2, for the isochoric C and the internal variable A."""
         raise NotImplementedError
 
     def _dissipated(self, C: Entries, A: Entries) -> Any:
-        """Return the dissipated power over mu/(2 tau) for C with det C = 1."""
+        """Return the dissipated power of a branch over mu/(2 tau), for the isochoric C and the internal variable A."""
         raise NotImplementedError
 
-    def _step(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Any:
-        """Return the potential of a step of length x = dt/tau, over mu/2."""
+    def _step(self, C: Entries, before: Any, A: Entries, x: Any) -> Any:
+        """Return the potential of a branch over mu/2 for a step of length x = dt/tau.
+
+        C is isochoric at the end of the step, A the internal variable at its beginning, `before` the result of `_past`.
+        """
         raise NotImplementedError
 
-    def _advanced(self, C: Entries, before: Entries | None, A: Entries, x: Any) -> Entries:
-        """Return the state of a branch after a step of length x = dt/tau."""
+    def _advanced(self, C: Entries, before: Any, A: Entries, x: Any) -> Entries:
+        """Return the internal variable of a branch at the end of a step; arguments as in `_step`."""
         raise NotImplementedError
 
     @staticmethod
     def _flow(w: np.ndarray) -> np.ndarray:
-        """Return f of `branches` for elastic strains w, shapes (branches, 3)."""
+        """Return the flow f(w) of `branches` for elastic logarithmic strains w, shape (branches, 3) each."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -349,6 +367,6 @@ class RelaxingMaterial(Relaxing):
 
 
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
-    """Return the relaxation time aT(T) tau."""
+    """Return the relaxation time aT(T) tau as a function of the temperature; `shift` is the law aT."""
     shift, tau = checked_shift(name, shift), positive(name, tau)
     return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))

@@ -1,4 +1,4 @@
-"""Solidifying material: on cooling a glassy network forms, stress-free in the current shape of the body."""
+"""Solidifying material: on cooling a stiff network of chains forms, stress-free in the current shape of the body."""
 
 import copy
 from typing import Any
@@ -18,25 +18,27 @@ _BEFORE, _LAST, _GLASS, _FRACTION = "C_before", "C_last", "A_glass", "fraction"
 class Solidification(Material):
     r"""Material that solidifies when it cools, and softens when it is heated again.
 
-    Let phi(T) be the solidified fraction. The part added in a cooling step is stress-free in the shape at that time:
+    Let phi(T) be the solidified fraction at the temperature T. The material that solidifies in an increment of cooling
+    is stress-free in the current shape of the body. With the isochoric right Cauchy-Green tensor C and the energy of
+    the base material
 
     .. math::
         W = W_{base} + \frac{G}{2} \left[\mathrm{tr}(C A) - 3 \varphi\right], \qquad
         dA = C^{-1} d\varphi \;\; (d\varphi > 0), \qquad A \propto \varphi \;\; (d\varphi < 0)
 
-    This is the single-integral network with birth by temperature (Green and Tobolsky, J. Chem. Phys. 14 (1946) 80,
-    without relaxation). A modulus that only increases on cooling would pull a formed part back to its reference
+    This is the single-integral network of Green and Tobolsky (J. Chem. Phys. 14 (1946) 80) without relaxation, in which
+    chains form by cooling. A modulus that only increases on cooling would pull a formed part back to its reference
     configuration. Solidified material keeps its shape, except for the small strain at which it balances the base. The
     scene needs a temperature, and `heat=Cooling(...)` for changes of it.
 
     Args:
         base: any material, also one that relaxes.
-        modulus: shear modulus G of the solidified part, positive, stress.
-        between: two temperatures; phi is 1 at the lower, 0 at the higher, and linear between.
-        fraction: phi(T) instead, a `table` from 1 to 0; constant beyond its ends.
+        modulus: shear modulus G of the solidified material, positive, stress.
+        between: two temperatures; phi is 1 at the lower, 0 at the higher, and linear between them.
+        fraction: phi(T) as a `table` with values from 1 to 0, constant beyond its ends; in place of `between`.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: an argument is not allowed.
 
     >>> fx.Solidification(fx.NeoHookean(c10=0.4), modulus=800.0, between=(90.0, 110.0))
     Solidification(NeoHookean(c10=0.4), modulus=800.0, between=(90, 110))
@@ -59,19 +61,19 @@ class Solidification(Material):
 
     @property
     def base(self) -> Material:
-        """Material that has not solidified."""
+        """Material before any part of it has solidified."""
         base = copy.copy(self._base)
         base.parameters = self._of_base(self.parameters)
         return base
 
     def fraction(self, temperature: Any) -> Any:
-        """Return the solidified fraction phi.
+        """Return the solidified fraction phi(T) at given temperatures.
 
         Args:
-            temperature: temperatures, any shape.
+            temperature: temperatures T, any shape.
 
         Returns:
-            phi, the same shape.
+            phi between 0 and 1, the shape of `temperature`.
         """
         return self._phi(np.asarray(temperature, float))
 
@@ -87,27 +89,28 @@ class Solidification(Material):
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
-        """Variables of the base, C of the last two states, A, and the fraction phi that A includes.
+        """Internal variables, {name: value in the reference configuration}.
 
-        A includes the part that solidifies in a step from the beginning of the next step on, when the temperature at
-        its end is known.
+        They are the variables of the base material, C of the last two states, A, and the fraction phi that A includes.
+        A includes the material that solidifies in a step only from the beginning of the next step, when the temperature
+        at the end of the step is known.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
 
     @property
     def of_flow(self) -> tuple[str, ...]:
-        """Names of the base's constants that set a rate of flow, and the fraction at the middle of a step."""
+        """Names of the constants that a step takes at its middle: flow constants of the base, and the fraction."""
         return (*self._base.of_flow, "set_middle")
 
     @property
     def of_motion(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
-        """Names of the base's variables of motion."""
+        """Names of the internal variables of the base that describe the motion in the last step."""
         return self._base.of_motion
 
     @property
     def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
-        """Signs of the tensors of the base, and of C of the last two states; see `Material`."""
+        """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
         return {**self._base.shapes, _BEFORE: 1, _LAST: 1}
 
     @property
@@ -115,7 +118,9 @@ class Solidification(Material):
         return self.base.largest_I1
 
     def strain_energy(self, F, **constants):
-        """Return the strain energy of a body from the reference configuration.
+        r"""Return the strain energy per reference volume of a body that solidified in the reference configuration.
+
+        .. math:: W = W_{base}(F) + \frac{G \varphi}{2} (\mathrm{tr} \, C - 3)
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -129,19 +134,24 @@ class Solidification(Material):
             + constants["G_set"] / 2 * phi * (inner(isochoric(F), IDENTITY) - 3)
 
     def step_energy(self, F, internal, time_step, **constants):
-        """Return the potential of a step per reference volume.
+        r"""Return the potential of a step in time, whose derivative by F is the nominal stress at the end of the step.
 
-        Half of the part that solidifies in the step is stress-free in the shape at its beginning, half in the shape at
-        its end.
+        Half of the material that solidifies in the step is stress-free in the shape at its beginning, half in the shape
+        at its end. With the values n at the beginning of the step, n + 1 at its end, and r the remaining part of the
+        solidified material if the fraction decreases,
+
+        .. math:: W_{base} + \frac{G}{2} \left[\mathrm{tr}(C M) - \mathrm{tr} M\right], \qquad
+                  M = r A_n + \tfrac{1}{2} \max(\varphi_{n+1} - \varphi_n, 0) \, C_n^{-1}, \qquad
+                  r = \min(1, \varphi_{n+1} / \varphi_n)
 
         Args:
-            F: deformation gradient at the end (UFL, shape (3, 3)).
-            internal: internal variables at the beginning.
+            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
+            internal: {name: internal variable at the beginning of the step (UFL)}.
             time_step: length of the step (UFL scalar, time).
             constants: values of the constants by name.
 
         Returns:
-            Potential (UFL, stress).
+            Potential per reference volume (UFL, stress).
         """
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2
@@ -170,7 +180,7 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Return A and phi at the beginning of the step, and phi at its end."""
+        """Return A (entries) and phi at the beginning of a step, and phi at its end, from variables and constants."""
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))
@@ -180,11 +190,11 @@ class Solidification(Material):
         return A, begin, end
 
     def _of_base(self, constants: dict[str, Any]) -> dict[str, Any]:
-        """Return the constants of the base."""
+        """Return {name: value} of the constants of the base material, from all constants."""
         return {name: constants[name] for name in self._base.parameters if name in constants}
 
     def _of_base_internal(self, internal: dict[str, Any]) -> dict[str, Any]:
-        """Return the internal variables of the base."""
+        """Return {name: value} of the internal variables of the base material, from all variables."""
         return {name: value for name, value in internal.items() if name not in (_BEFORE, _LAST, _GLASS, _FRACTION)}
 
     def __repr__(self) -> str:
@@ -195,7 +205,7 @@ class Solidification(Material):
 
 
 class _Fraction:
-    """Solidified fraction phi(T): a table, constant beyond its ends, or linear between two temperatures."""
+    """Solidified fraction phi(T): linear from 1 at `low` to 0 at `high`, or a table, constant beyond these ends."""
 
     def __init__(self, low: float, high: float, table: Table | None = None):
         self._low, self._high, self._table = low, high, table
@@ -209,7 +219,10 @@ class _Fraction:
 
 
 def _fraction(between: Any, table: Any) -> _Fraction:
-    """Return the solidified fraction as a function; raise an InputError unless exactly one of both is given."""
+    """Return the solidified fraction as a function; raise an InputError unless one argument is given and allowed.
+
+    The arguments are `between` and `fraction` of `Solidification`.
+    """
     if (between is None) == (table is None):
         raise InputError(f"Solidification: between = {between!r}, fraction = {table!r}: give one of them: the"
                          f" temperatures between=(75, 85) at which all and nothing has solidified, or a table of the"
@@ -227,5 +240,5 @@ def _fraction(between: Any, table: Any) -> _Fraction:
 
 
 def _remaining(before: Any, after: Any) -> Any:
-    """Return the factor of the glassy network when the solidified fraction decreases; 1 when it increases."""
+    """Return the factor (UFL) of A when the solidified fraction goes from `before` to `after`; 1 when it increases."""
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

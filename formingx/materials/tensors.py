@@ -1,4 +1,4 @@
-"""Symmetric tensors with one principal direction normal to the plane, as entries 11, 22, 12, 33 (UFL or NumPy)."""
+"""Symmetric tensors with one principal direction normal to the section, as entries 11, 22, 12, 33 (UFL or NumPy)."""
 
 from typing import Any
 
@@ -14,34 +14,36 @@ def isochoric(F: Any) -> Entries:
     .. math:: \bar C = J^{-2/3} F^T F
 
     Args:
-        F: deformation gradient, shape (3, 3).
+        F: deformation gradient (UFL, shape (3, 3)).
 
     Returns:
-        Its entries.
+        Entries of the tensor.
     """
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
 
 
 def entries(vector: Any) -> Entries:
-    """Return the entries of a vector.
+    """Return the entries of a tensor that is stored as a vector.
 
     Args:
-        vector: vector, shape (4,).
+        vector: entries 11, 22, 12, 33, shape (4,).
 
     Returns:
-        Its entries.
+        The entries as a tuple.
     """
     return vector[0], vector[1], vector[2], vector[3]
 
 
 def plus(A: Entries, B: Entries, factor: Any) -> Entries:
-    """Return A + factor B.
+    r"""Return the sum of a tensor and a multiple of another tensor.
+
+    .. math:: A + c \, B
 
     Args:
-        A: entries of a tensor.
-        B: entries of a tensor.
-        factor: factor of B.
+        A: entries of the first tensor.
+        B: entries of the second tensor.
+        factor: factor c of the second tensor.
 
     Returns:
         Entries of the sum.
@@ -50,11 +52,13 @@ def plus(A: Entries, B: Entries, factor: Any) -> Entries:
 
 
 def inner(A: Entries, B: Entries) -> Any:
-    """Return A : B.
+    r"""Return the inner product of two symmetric tensors.
+
+    .. math:: A : B = \mathrm{tr}(A B) = A_{11} B_{11} + A_{22} B_{22} + 2 A_{12} B_{12} + A_{33} B_{33}
 
     Args:
-        A: entries of a tensor.
-        B: entries of a tensor.
+        A: entries of the first tensor.
+        B: entries of the second tensor.
 
     Returns:
         The inner product.
@@ -63,10 +67,12 @@ def inner(A: Entries, B: Entries) -> Any:
 
 
 def determinant(A: Entries) -> Any:
-    """Return the determinant of a tensor.
+    r"""Return the determinant of a tensor.
+
+    .. math:: \det A = A_{33} (A_{11} A_{22} - A_{12}^2)
 
     Args:
-        A: its entries.
+        A: entries of the tensor.
 
     Returns:
         The determinant.
@@ -75,10 +81,12 @@ def determinant(A: Entries) -> Any:
 
 
 def cofactor(A: Entries) -> Entries:
-    """Return the cofactor of a tensor, which is its inverse if its determinant is 1.
+    r"""Return the cofactor of a symmetric tensor, which equals its inverse if the determinant is 1.
+
+    .. math:: \mathrm{cof} \, A = \det(A) \, A^{-1}
 
     Args:
-        A: its entries.
+        A: entries of the tensor.
 
     Returns:
         Entries of the cofactor.
@@ -87,13 +95,13 @@ def cofactor(A: Entries) -> Entries:
 
 
 def deviator_squared(C: Entries, B: Entries) -> Any:
-    r"""Return the squared norm of the deviator of F B F^T.
+    r"""Return the squared norm of the deviator of F B F^T, for C = F^T F.
 
-    .. math:: \mathrm{tr}\,(C B)^2 - \tfrac{1}{3} (\mathrm{tr}\, C B)^2
+    .. math:: |\mathrm{dev}(F B F^T)|^2 = \mathrm{tr}\,(C B)^2 - \tfrac{1}{3} (\mathrm{tr}\, C B)^2
 
     Args:
         C: entries of the right Cauchy-Green tensor.
-        B: entries of a tensor.
+        B: entries of a symmetric tensor in the reference configuration.
 
     Returns:
         The squared norm.

@@ -1,4 +1,4 @@
-"""Finite viscoelasticity with Gaussian springs, and transient networks: two laws of relaxing branches."""
+"""Two laws of relaxing branches: finite viscoelasticity with Gaussian springs, and transient networks."""
 
 from typing import Any
 
@@ -18,36 +18,35 @@ class Viscoelastic(RelaxingMaterial):
         W = W_{eq}(C) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(C C_{v,k}^{-1}) - 3\right], \qquad
         \frac{dC_{v,k}}{dt} = \frac{1}{\tau_k} \left[C - \tfrac{1}{3} \mathrm{tr}(C C_{v,k}^{-1}) C_{v,k}\right],
 
-    with det Cv_k = 1, and Cv_k = I in the reference configuration: Leonov (1976), Simo and Miehe (1992), Le Tallec,
-    Rahier and Kaiss (1993), Reese and Govindjee (1998), Kumar and Lopez-Pamies (2016). The small-strain relaxation
-    modulus is
+    with det Cv_k = 1, and Cv_k = I in the reference configuration. C is the isochoric right Cauchy-Green tensor. The
+    law is known from Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and Govindjee
+    (1998), Kumar and Lopez-Pamies (2016). The small-strain relaxation modulus is
 
     .. math:: G(t) = G_{eq} + \sum_k \mu_k \exp(-t / \tau_k).
 
     In steady extension the stress of a branch is proportional to the rate, with the viscosity 3 mu tau.
 
-    A step of implicit Euler has a closed form (Shutov, Landgraf and Ihlemann 2013). Let G = Cv_n, x' = dt/tau, a = det
-    G and b = det(G + x' C). The new variable, and the potential, which is regular at dt = 0, are
+    A step of the implicit Euler method has a closed form (Shutov, Landgraf and Ihlemann 2013). Let G = Cv_n, x' =
+    dt/tau, a = det G and b = det(G + x' C). The new variable, and the potential, which is regular at dt = 0, are
 
     .. math::
         C_v = \frac{G + x' C}{b^{1/3}}, \qquad
         \frac{3 \mu}{2} \, \frac{\mathrm{cof}\, G : C + x' \, \mathrm{cof}\, C : G + x'^2 \det C}
         {b^{2/3} + (a b)^{1/3} + a^{2/3}}.
 
-    The same with
+    The step is of second order in time with
 
     .. math::
         G = C_{v,n} + \frac{x}{2} C_n, \qquad
         x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right],
         \qquad x = \frac{dt}{\tau}
 
-    is of second order in time.
-
     Args:
-        equilibrium: see `RelaxingMaterial`.
-        branches: see `RelaxingMaterial`.
+        equilibrium: material that describes the relaxed state; None if all stress relaxes.
+        branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
         order: order of a step in time, 2 or 1.
-        shift: see `RelaxingMaterial`.
+        shift: law aT(T) of the temperature, a factor of the relaxation times, see `RelaxingMaterial`; None: no
+            dependence.
 
     >>> melt = fx.Viscoelastic(fx.NeoHookean(c10=0.1), branches=[(0.6, 0.1), (0.3, 2.0)])
     >>> round(melt.shear_modulus, 12)
@@ -83,7 +82,7 @@ class Viscoelastic(RelaxingMaterial):
         return tuple(scale * g for g in grown)
 
     def _start(self, before, Cv, x):
-        """Return G and x' of the class."""
+        """Return G (entries) and x' of the docstring of the class, from C_n, Cv_n and x = dt/tau."""
         if before is None:
             return Cv, x
         return plus(Cv, before, x / 2), x / 2 * (1 + x / 3 * inner(before, cofactor(Cv)))
@@ -95,19 +94,19 @@ class Viscoelastic(RelaxingMaterial):
 
 
 class TransientNetwork(RelaxingMaterial):
-    r"""Networks whose chains break and reform stress-free: Green and Tobolsky (1946), the upper-convected Maxwell law.
+    r"""Networks whose chains break and form again stress-free, equal to the upper-convected Maxwell law.
 
-    The Kirchhoff stress of a branch, besides a pressure, is
+    The law is by Green and Tobolsky (1946). The Kirchhoff stress of a branch, besides a pressure, is
 
     .. math:: \tau_K = \mu F A F^T, \qquad \frac{dA}{dt} = \frac{C^{-1} - A}{\tau},
 
-    with A = I in the reference configuration. The law is linear in C^-1: in steady extension faster than 1/(2 tau) the
-    stress grows without bound. The stored energy is
+    with A = I in the reference configuration and the isochoric right Cauchy-Green tensor C. The law is linear in C^-1:
+    in steady extension faster than 1/(2 tau) the stress grows without bound. The stored energy is
 
     .. math:: \frac{\mu}{2} \left[\mathrm{tr}(C A) - 3 - \ln \det A\right].
 
-    A step is exact if C^-1 is a parabola in time, through its value at the end of the step and two earlier values. It
-    is therefore of third order in time, and of second order however small tau is. For dt >> tau the stress follows the
+    A step takes C^-1 as a parabola in time, through its value at the end of the step and two earlier values. It is
+    therefore of third order in time, and of second order however small tau is. For dt >> tau the stress follows the
     rate at the end of the step, by BDF2 with variable steps. With x = dt/tau, and the ratio s of the step to the
     previous one,
 
@@ -115,6 +114,12 @@ class TransientNetwork(RelaxingMaterial):
         W_{step} &= \frac{\mu}{2} \mathrm{tr}(C M), \qquad A = M + (1 - m - p) C^{-1}, \\
         M &= e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \\
         m &= \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}.
+
+    Args:
+        equilibrium: material that describes the relaxed state; None if all stress relaxes.
+        branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
+        shift: law aT(T) of the temperature, a factor of the relaxation times, see `RelaxingMaterial`; None: no
+            dependence.
 
     >>> fx.TransientNetwork(None, branches=[(0.05, 1.0)]).shear_modulus
     0.05
@@ -128,9 +133,9 @@ class TransientNetwork(RelaxingMaterial):
         return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
 
     def _past(self, internal, time_step):
-        """Return (C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)), see the class.
+        """Return (C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)) with the symbols of the docstring of the class.
 
-        The last two are 0 if the previous motion is unknown; the last is reduced where BDF2 would be unstable.
+        The last two are 0 if the previous motion is unknown; the last is reduced if BDF2 would be unstable.
         """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow by more leave BDF2 unstable
@@ -159,7 +164,7 @@ class TransientNetwork(RelaxingMaterial):
         return plus(self._kept(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _bulge(x))
 
     def _kept(self, past, A, x):
-        """Return M of the class."""
+        """Return M (entries) of the docstring of the class, for the result of `_past`, A_n and x = dt/tau."""
         before, change, share = past
         decay, p = ufl.exp(-x), share * _bulge(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
@@ -170,14 +175,14 @@ class TransientNetwork(RelaxingMaterial):
 
 
 def _mean_decay(x: Any) -> Any:
-    """Return (1 - e^-x)/x, by its series for small x."""
+    """Return (1 - e^-x)/x (UFL), by its series for small x."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
 
 
 def _bulge(x: Any) -> Any:
-    """Return [x - 2 + (x + 2) e^-x]/x^2, by its series for small x."""
+    """Return [x - 2 + (x + 2) e^-x]/x^2 (UFL), by its series for small x."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
