@@ -64,10 +64,10 @@ def test_distances_have_their_derivatives(tool):
     x = np.random.default_rng(1).uniform(-1.3, 1.3, (4000, 3))
     x = np.vstack([x, [(0.1, 0.0, 0.01), (0.2, 0.0, 0.01), (0.0, 0.0, -0.61), (0.0, 0.5, -0.61)]])
     x = x[np.abs(tool.signed_distance(x)) < 0.05]
-    found, e = tool.near(x), 1e-6
+    found, e = tool.distances(x), 1e-6
     np.testing.assert_allclose(found.distance, tool.signed_distance(x), atol=1e-14)
     for k, way in enumerate(e * np.eye(3)):
-        ahead, behind = tool.near(x + way), tool.near(x - way)
+        ahead, behind = tool.distances(x + way), tool.distances(x - way)
         np.testing.assert_allclose((ahead.distance - behind.distance) / (2 * e), found.normal[:, k], atol=1e-8)
         np.testing.assert_allclose((ahead.normal - behind.normal) / (2 * e), found.hessian[:, :, k], atol=1e-7)
 
@@ -173,7 +173,7 @@ def test_work_of_the_plug_is_strain_energy_and_friction(rough_ball):
             limit = face.rule.area * 0.3 * face.law.pressure(face.history)
         if before is not None:
             way = x - before[0]
-            normal = face.law.tool.near(x).normal
+            normal = face.law.tool.distances(x).normal
             way -= np.einsum("ni,ni->n", way, normal)[:, None] * normal
             lost += (np.where(before[1] > 0, limit + before[1], 0.0) / 2) @ np.linalg.norm(way, axis=1)
         before = x, limit

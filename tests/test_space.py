@@ -12,7 +12,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.__main__ import main
-from formingx.extensions.space.part import _beyond
+from formingx.extensions.space.part import _positive_share
 from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
@@ -195,7 +195,7 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
 def test_trim_and_printed_squares_are_exact():
     """Cut triangles count by the part that is beyond the plane; at rest the squares are where they were printed."""
     d = np.array([(1, -1, -1), (-1, 1, 1), (3, -1, 3), (0, 1, 1), (1, 1, 1), (-1, 0, 0), (-1, -1, -1)], dtype=float)
-    np.testing.assert_allclose(_beyond(d), [1 / 4, 3 / 4, 15 / 16, 1, 1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(_positive_share(d), [1 / 4, 3 / 4, 15 / 16, 1, 1, 0, 0], atol=1e-15)
     path = fx.solve(disc(), to=0.001, increments=1)
     wall, z = path.wall(), path.wall().now[:, 2]
     low, high = (path.part(trim=share * z[np.argmax(np.abs(z))]) for share in (0.2, 0.6))

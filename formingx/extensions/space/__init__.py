@@ -7,12 +7,13 @@ from ...physics.kinematics import ThreeD
 from . import scene_checks
 from .reader import SheetReader
 from .sheet import circle, rectangle, sheet
-from .solid_tool import SolidTool, Swept, box, extruded, revolved, solid
+from .solid_tool import SolidTool, Swept, box, extruded, revolved
 from .surface import Surface
+from .triangulated import solid
 
 
 class _OfFile(SolidTool):
-    """Tool from a file, of which a checkpoint stores only the name."""
+    """Stand-in for a tool that was read from an STL file: a checkpoint stores only the name of the file."""
 
     def __init__(self, name: str):
         self.name = name
@@ -22,7 +23,7 @@ class _OfFile(SolidTool):
 
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
-    """Return the tool that a checkpoint describes."""
+    """Return the tool for its description in a checkpoint, {name of an attribute: value}."""
     if "profile" not in shape:
         return _OfFile(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])

@@ -1,7 +1,8 @@
-"""Bodies of a closed surface of triangles: connected triangles, and groups of bodies that do not overlap.
+"""Division of a closed surface of triangles into bodies, and of the bodies into groups that do not overlap.
 
-The distance to faces inside another body is meaningless. The distance of a union of bodies is the largest of their
-distances (positive inside), exact outside. Bodies that may overlap therefore belong to different groups.
+A body is a set of triangles connected by edges. The signed distance to a face that lies inside another body is
+meaningless. The signed distance to a union of bodies is the largest of their signed distances (positive inside), which
+is exact outside. Bodies whose bounding boxes overlap therefore belong to different groups.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from ...errors import InputError
 from ...io.stl import volume
 
 
-def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Divide a closed surface into groups of bodies whose boxes do not overlap.
+def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
+    """Divide a closed surface of triangles into groups of bodies whose bounding boxes do not overlap.
 
     Args:
         points: vertices, shape (n, 3), length.
@@ -21,10 +22,10 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
         caller: name of the caller, for messages.
 
     Returns:
-        Triangle numbers of each group; a body includes its hollows.
+        Triangles of each group as vertex numbers, shape (k, 3). The surface of a cavity belongs to the body around it.
 
     Raises:
-        InputError: a body is inside out: a hollow that lies in no other body.
+        InputError: a body is inside out, and is no cavity of another body.
     """
     bodies = [triangles[part] for part in _parts(points, triangles)]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
@@ -34,8 +35,8 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
     for k in np.flatnonzero(volumes <= 0):
         around = [i for i in full if (boxes[i, 0] <= boxes[k, 0]).all() and (boxes[k, 1] <= boxes[i, 1]).all()]
         if not around:
-            at = "(" + ", ".join(f"{x:.6g}" for x in boxes[k].mean(0)) + ")"
-            raise InputError(f"{caller} has a body around {at} that is inside out: its triangles look inward: turn"
+            place = "(" + ", ".join(f"{x:.6g}" for x in boxes[k].mean(0)) + ")"
+            raise InputError(f"{caller} has a body around {place} that is inside out: its triangles look inward: turn"
                              f" them in"
                              f" the program that wrote the file")
         whole[around[-1]].append(bodies[k])                        # the smallest
@@ -49,8 +50,28 @@ def apart(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.nda
     return [np.concatenate([part for k in group for part in whole[k]]) for group in groups]
 
 
+def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+
+    Returns:
+        Distinct vertices, shape (k, 3), length; vertex numbers of the remaining triangles, shape (l, 3).
+    """
+    size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
+    _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
+    triangles = same.ravel()[triangles]
+    a, b, c = triangles.T
+    return points[first], triangles[(a != b) & (b != c) & (c != a)]
+
+
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
-    """Return the triangle numbers of each body: triangles connected by edges; at an edge, the triangles of one wedge.
+    """Return, for each body, the numbers of its triangles, shape (k,).
+
+    A body is a set of triangles connected by edges. At an edge of more than two triangles, only the two triangles with
+    the solid between them are connected (see `_wedges`).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -69,11 +90,17 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
-    """Return pairs of triangles at an edge, shape (m, 3), between which the solid lies.
+    """Return the pairs of triangles at a common edge with the solid between them, as indices of `triangles`.
 
-    Around the edge, from edge[0] to edge[1], the solid begins at a triangle with the edge backward. It ends at the next
-    triangle with the edge forward. Where two wedges meet in a face, the wedge that ends there comes first. `directed`:
-    the edge as each triangle has it.
+    In the sense of rotation about the edge, from vertex edge[0] to edge[1], the solid begins at a triangle that
+    contains the edge reversed. It ends at the next triangle that contains the edge forward. Where two wedges of solid
+    meet in a face, the wedge that ends there comes first.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers of the m triangles at the edge, shape (m, 3).
+        directed: vertex numbers of the edge in the order of each triangle, shape (m, 2).
+        edge: vertex numbers of the edge in ascending order, shape (2,).
     """
     forward = directed[:, 0] == edge[0]
     along = points[edge[1]] - points[edge[0]]
@@ -89,5 +116,5 @@ def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edg
 
 
 def _overlap(box: np.ndarray, other: np.ndarray) -> bool:
-    """Return True if two boxes, (lowest, highest) coordinates, overlap."""
+    """Return True if two bounding boxes overlap; each is the lowest and highest coordinates, shape (2, 3), length."""
     return bool((box[0] <= other[1]).all() and (other[0] <= box[1]).all())

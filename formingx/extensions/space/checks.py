@@ -8,20 +8,20 @@ import numpy as np
 from ...findings import Finding, register
 from ...physics.supports import NAMES, Symmetry
 from ...scene.contact_checks import OTHER_UNIT
-from .solid_tool import Triangulated
+from .triangulated import Triangulated
 
-_SHARE = 1e-3              # of the sheet's area in compression
+_SHARE = 1e-3              # share of the sheet's area in compression from which on a finding is made
 
 
 @register("end")
 def compressed(path: Any) -> Iterator[Finding]:
-    """Warn of a membrane in compression whose material has no relaxed energy (tension field); collective.
+    """Find a membrane with compression in the last state that has no relaxed energy (tension field); collective.
 
     Args:
         path: the computed `Path`.
 
     Yields:
-        A finding if there is compression.
+        A finding if 0.1 % of the reference area or more is in compression.
     """
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
@@ -29,18 +29,18 @@ def compressed(path: Any) -> Iterator[Finding]:
     wall = path.wall()
     share = float(wall.area_at_rest[wall.wrinkled].sum() / wall.area_at_rest.sum())
     if share >= _SHARE:
-        at = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
+        place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
-                      f" one place at (x, y, z) = ({at}): it wrinkles there, and its wall depends on the mesh: use"
+                      f" one place at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"
                       f" Membrane(wrinkles=0.01), and look at path.wall().wrinkled.")
 
 
 @register("start")
 def too_large(body: Any) -> Iterator[Finding]:
-    """Find tools from files that are many times as wide as the sheet: a file has no unit of length.
+    """Find tools from STL files that are more than 4 times as wide as the sheet: a file states no unit of length.
 
     Args:
-        body: the examined body.
+        body: the examined body, whose `scene` has the contacts.
 
     Yields:
         A finding for each such tool.

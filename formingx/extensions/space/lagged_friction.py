@@ -1,20 +1,22 @@
-"""Friction in three dimensions, and sliding without it, lagged by a step: points in contact stay on the surface of its
-tool.
+"""Sliding contact in three dimensions, with or without friction, in which points open and close only between steps.
 
-Which points touch is lagged as in `lagged_stick`. The traction of a point that touches, per unit reference area, is
+A point whose gap closed in a step is in contact from the next step on (as in `lagged_stick`), and then stays on the
+surface of the tool. Its traction per unit reference area is
 
 .. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,
 
-where d is its signed distance to the tool, n = grad d, and g the elastic slip (Wriggers, Computational Contact
-Mechanics, 2006, chapter 5.2). The slip is its value at the last accepted state plus the motion since then in the
-present tangent plane, limited to g_s (return mapping). N_0 is constant during Newton iterations, which therefore
-converge. It is first the pressure at the last accepted state, extrapolated along the tangent of the path. Then it is
-the pressure of the state found with it, until both agree (`StepLimits.behind`). It is 0 for a point that has touched
-since the last state: steps are
-short enough for the pressure to change little in each (`StepLimits.lag`).
+with the penalty k, the coefficient of friction mu and the elastic slip g (Wriggers, Computational Contact Mechanics,
+2006, chapter 5.2). The signed distance d of the point from the tool is positive inside, and n = grad d. The slip is the
+slip of the last accepted state plus the motion since then in the present tangent plane. Return mapping limits it to
+g_s.
 
-In a step a point pulls as well as it pushes, so that Newton's method meets no kink; at its end points in tension
-separate.
+The pressure N_0 is constant during the Newton iterations of a step, which therefore converge. At first N_0 is the
+pressure at the last accepted state, extrapolated along the tangent of the path. Then the step is solved again with the
+pressure that was found, until both agree (`StepLimits.behind`). N_0 is 0 for a point whose gap has closed since the
+last accepted state. Steps are short, so that the pressure changes little in each of them (`StepLimits.lag`).
+
+Within a step a point in contact carries tension as well as pressure, so that Newton's method meets no kink. Points in
+tension separate at the end of the step.
 """
 
 from __future__ import annotations
@@ -26,18 +28,18 @@ import numpy as np
 from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
 from .lagged_stick import SMALL_GAP, LaggedStick
 
-_LEAST = 0.1               # pressure that limits friction, over the pressure at the last state, at least
-_MOST = 10.0               # and at most
-_SLIDES_ON = 1 + 1e-9      # kept slip of sliding points, over g_s: it goes on sliding, in spite of round-off
+_LEAST = 0.1               # lower bound of the pressure that limits friction, over the pressure at the last state
+_MOST = 10.0               # its upper bound, in the same unit
+_SLIDES_ON = 1 + 1e-9      # stored slip of sliding points, over g_s: they continue to slide in spite of round-off
 
 
-class Near(NamedTuple):
-    """Distances, normals and Hessians of n points relative to a tool in three dimensions.
+class Distances(NamedTuple):
+    """Signed distances of n points from a tool in three dimensions, with their first and second derivatives.
 
     Attributes:
-        distance: to its surface, positive inside the tool, shape (n,), length.
-        normal: gradient of the distance, shape (n, 3).
-        hessian: second derivatives of the distance, shape (n, 3, 3), 1/length.
+        distance: signed distances from the surface of the tool, positive inside, shape (n,), length.
+        normal: gradients of the distance by the position, shape (n, 3).
+        hessian: second derivatives of the distance by the position, shape (n, 3, 3), 1/length.
     """
 
     distance: np.ndarray
@@ -46,18 +48,18 @@ class Near(NamedTuple):
 
 
 class LaggedFriction(LaggedStick):
-    """The `ContactLaw` of this module.
+    """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
 
-    Its history variables (`ContactHistory`): `position` is the position at the last accepted state, and `slip` the
-    elastic slip g, shape (n, 3), length. Of points in contact, `distance` is the pressure there over k, and
-    the depth of `arrival` is N_0/k.
+    The history variables (`ContactHistory`) have this meaning: `position` is the position at the last accepted state,
+    and `slip` the elastic slip, shape (n, 3), length. For a point in contact `distance` is the pressure at that state
+    over k. The depth of the point `arrival` in the tool is N_0/k, with the pressure N_0 that limits friction.
 
     Args:
-        tool: gives its distance with first and second derivatives (`near`).
+        tool: tool with a method `distances`, which returns distances with first and second derivatives.
         mu: coefficient of friction, 0 for none.
         k: penalty, stress/length.
-        theta: distance from which on a point counts as touching, length.
-        elastic_slip: g_s, length.
+        theta: a point is in contact where its signed distance exceeds -theta, length.
+        elastic_slip: elastic slip at which a point begins to slide, length.
     """
 
     tool: Any
@@ -66,95 +68,99 @@ class LaggedFriction(LaggedStick):
     def __init__(self, tool: Any, mu: float, k: Any, theta: float, elastic_slip: float):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
-        self._last: tuple[np.ndarray, Near] | None = None
+        self._last: tuple[np.ndarray, Distances] | None = None
         self._ahead: tuple[ContactHistory, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
-        """Return the law of some of the points.
+        """Return the contact law of some of the points.
 
         Args:
-            points: numbers of the points, or a slice.
+            points: numbers of the points, shape (m,), or a slice.
 
         Returns:
-            The law.
+            Contact law of these points.
         """
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
     def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of points in contact that are in tension, that is outside the tool.
+        """Return the mask of the points in contact that are in tension, because they lie outside the tool.
 
         Args:
-            x: positions, shape (n, 3), length.
-            old: history variables.
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
 
         Returns:
             Mask, shape (n,).
         """
-        return self.held(old) & (self.distance(x) < -SMALL_GAP * self.theta)
+        return self.in_contact(old) & (self.distance(x) < -SMALL_GAP * self.theta)
 
     def start(self, x: np.ndarray) -> ContactHistory:
+        """Return the history variables of points that begin at positions x, shape (n, 3), length, without slip."""
         return super().start(x)._replace(slip=np.zeros_like(x))
 
     def pressure(self, history: ContactHistory) -> np.ndarray:
-        """Return the contact pressure of a state.
+        """Return the contact pressure of an accepted state.
 
         Args:
-            history: history variables.
+            history: history variables of the state.
 
         Returns:
-            Pressure N, shape (n,), stress.
+            Contact pressure of each point, shape (n,), stress; 0 for open points.
         """
         return np.asarray(self.k * np.maximum(history.distance, 0.0))
 
     def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
-        """Return the pressure that limits friction in the next step.
+        """Return the constant contact pressure that limits friction during the next step.
 
         Args:
-            old: history variables.
+            old: history variables of the last accepted state, with the predicted positions `ContactHistory.arrival`.
 
         Returns:
-            Pressure N_0, shape (n,), stress.
+            Pressure of each point, shape (n,), stress.
         """
         if self._ahead is None or self._ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.arrival - old.position
-            depth = now + np.einsum("ni,ni->n", self.tool.near(old.position).normal, change) if change.any() else now
+            depth = now
+            if change.any():
+                depth = now + np.einsum("ni,ni->n", self.tool.distances(old.position).normal, change)
             self._ahead = old, self.k * np.clip(depth, _LEAST * now, _MOST * now)
         return self._ahead[1]
 
     def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
-        """Return positions of gap closure for which `pressure_ahead` returns a given pressure.
+        """Return the predicted positions `ContactHistory.arrival` for which `pressure_ahead` returns a given pressure.
 
         Args:
-            old: history variables.
-            pressure: the pressure, shape (n,), stress.
+            old: history variables of the last accepted state.
+            pressure: pressure of each point that is to limit friction, shape (n,), stress.
 
         Returns:
-            `ContactHistory.arrival`, shape (n, 3), length.
+            Predicted positions, shape (n, 3), length.
         """
         change = pressure / self.k - np.maximum(old.distance, 0.0)
-        return np.asarray(old.position + change[:, None] * self.tool.near(old.position).normal)
+        return np.asarray(old.position + change[:, None] * self.tool.distances(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions, linearised at the predicted positions; see `ContactLaw`.
+        """Compute the contact tractions, linearised at the positions that the previous Newton iteration predicted.
 
-        A point that reverses against the `sense` of the last iteration sticks for one iteration. Otherwise Newton's
+        A point that slid in the previous iteration and now moves backwards sticks for one iteration. Otherwise Newton's
         method would oscillate over the narrow range of elastic slip.
 
         Args:
-            x: positions, shape (n, 3), length.
-            old: history variables.
-            sense: angle of sliding in the previous iteration, shape (n,), or None.
-            expected: positions predicted by the previous iteration, or None.
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
+            sense: direction of sliding in the previous iteration, shape (n,): angle in the tangent plane, 0 for a point
+                that did not slide. None in the first iteration.
+            expected: predicted positions, with distances; None: linearised at x.
 
         Returns:
-            Tractions.
+            Tractions with their stiffness and the new history variables.
         """
         assert old is not None
-        at, zero = x if expected is None else expected.position, np.zeros(len(x))
-        rows, near = self.near(at, old)
-        d, n = near.distance, near.normal
-        moved = old.slip[rows] + at[rows] - old.position[rows]
+        positions, zero = x if expected is None else expected.position, np.zeros(len(x))
+        rows, distances = self.contact_distances(positions, old)
+        d, n = distances.distance, distances.normal
+        moved = old.slip[rows] + positions[rows] - old.position[rows]
         along = np.einsum("ni,ni->n", n, moved)
         g = moved - along[:, None] * n
         size, basis = np.linalg.norm(g, axis=1), _basis(n)
@@ -166,17 +172,18 @@ class LaggedFriction(LaggedStick):
         stiff = self.mu * self.pressure_ahead(old)[rows] / np.where(slides, size, self.elastic_slip)
 
         def stiffness() -> np.ndarray:
-            """Return the stiffness, shape (n, 3, 3), stress/length."""
-            bends = outer(n, np.einsum("nij,nj->ni", near.hessian, moved)) + along[:, None, None] * near.hessian
+            """Return the derivative of the tractions by the positions, shape (n, 3, 3), stress/length."""
+            hessian = distances.hessian
+            bends = outer(n, np.einsum("nij,nj->ni", hessian, moved)) + along[:, None, None] * hessian
             dg = np.eye(3) - outer(n, n) - bends
             dg -= outer(way, np.einsum("ni,nij->nj", way, dg))
             depth = d if expected is None else expected.distance[rows]
             found = np.zeros((*x.shape, 3))
-            found[rows] = self.k * (outer(n, n) + depth[:, None, None] * near.hessian) + stiff[:, None, None] * dg
+            found[rows] = self.k * (outer(n, n) + depth[:, None, None] * hessian) + stiff[:, None, None] * dg
             return found
 
         def history() -> ContactHistory:
-            """Return the new history variables."""
+            """Return the history variables of the state after it is accepted."""
             slip = np.zeros_like(x)
             slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
             depth = self.distance(x)
@@ -189,39 +196,40 @@ class LaggedFriction(LaggedStick):
         angle = np.arctan2(*(np.einsum("ni,ni->n", way, e) for e in basis[::-1]))
         sliding[rows] = np.where(slides, np.where(angle == 0, 2 * np.pi, angle), 0.0)
         found = _Tractions(force, normal, tangential, sliding, stiffness, history)
-        if at is not x:
-            found.force = force + np.einsum("nij,nj->ni", found.stiffness, x - at)
+        if positions is not x:
+            found.force = force + np.einsum("nij,nj->ni", found.stiffness, x - positions)
         return found
 
-    def near(self, x: np.ndarray, old: ContactHistory) -> tuple[np.ndarray, Near]:
-        """Return the points in contact and their geometry relative to the tool.
+    def contact_distances(self, x: np.ndarray, old: ContactHistory) -> tuple[np.ndarray, Distances]:
+        """Return the points in contact, and their distances from the tool with derivatives.
 
         Args:
-            x: positions, shape (n, 3), length.
-            old: history variables.
+            x: positions of all n points relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
 
         Returns:
-            Numbers of the m points in contact, shape (m,), and their geometry.
+            Numbers of the m points in contact, shape (m,); their distances, normals and Hessians (`Distances`).
         """
-        rows = np.flatnonzero(self.held(old))
-        return rows, self._near(x[rows])
+        rows = np.flatnonzero(self.in_contact(old))
+        return rows, self._distances(x[rows])
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
+        """Return distances and normals at positions x, shape (n, 3); 0 for open points."""
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
-        rows, near = self.near(x, old)
-        d[rows], n[rows] = near.distance, near.normal
+        rows, distances = self.contact_distances(x, old)
+        d[rows], n[rows] = distances.distance, distances.normal
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 
-    def _near(self, x: np.ndarray) -> Near:
-        """Return the geometry of points relative to the tool; the last result is kept."""
+    def _distances(self, x: np.ndarray) -> Distances:
+        """Return distances, normals and Hessians of points x, shape (n, 3); the last result is stored."""
         if self._last is None or not np.array_equal(self._last[0], x):
-            self._last = x.copy(), self.tool.near(x)
+            self._last = x.copy(), self.tool.distances(x)
         return self._last[1]
 
 
 class _Tractions(Tractions):
-    """`Tractions` whose `sense` is the angle of sliding in the tangent plane, 0 at points that do not slide."""
+    """Contact tractions whose `sense` is the direction of sliding: an angle in the tangent plane, 0 without sliding."""
 
     @property
     def status(self) -> np.ndarray:
@@ -230,7 +238,7 @@ class _Tractions(Tractions):
 
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two unit vectors normal to unit vectors, shape (n, 3) each: the basis of the angles of sliding."""
+    """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each, for unit normals, shape (n, 3)."""
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

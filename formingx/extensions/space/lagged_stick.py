@@ -1,15 +1,16 @@
-"""Contact in three dimensions, lagged by a step: a point that crossed a tool sticks there from the next step on.
+"""Sticking contact in three dimensions, in which points stick or separate only between steps.
 
 A point whose straight path between two accepted states leads into the tool sticks in the following steps. An isotropic
-penalty constrains it to the position where the path crossed the surface (compare the user's guide of Polyflow).
-Within a step nothing changes: the law is linear, and Newton's method meets no kink, no normal and no curvature, nor
-asks the tool. The error is of first order in the motion of points in the step of their gap closure. With 1 % of the
-points per step, walls are within 0.1 % of the walls of exact stick. The tool must give its signed distance alone.
+penalty constrains it to the position where the path crossed the surface (compare the user's guide of Polyflow). Within
+a step the set of sticking points is constant, so the law is linear: Newton's method meets no kink, and evaluates no
+distance, normal or curvature of the tool. The error is of first order in the motion of a point in the step of its gap
+closure. With 1 % of the points per step, walls are within 0.1 % of the walls of exact stick. The tool only has to give
+its signed distance.
 
-Points in contact stick until a stage leaves the tool out. With `separates=True`, points in tension separate at the end
-of each step, at constant control, until none is left. A body that snaps off reaches equilibrium by a jump. Tests prove
-this for elastic sheets. Relaxing sheets are refused: slack under the plug, their points separate and touch again in
-each step, and the run makes no progress.
+Points stick until a stage makes the tool inactive. With `separates=True`, points in tension separate at the end of each
+step, at constant control, until no point is in tension. A body that snaps off reaches equilibrium by a jump. Tests
+prove this for elastic sheets. Relaxing sheets are refused: under a plug they become slack, their points separate and
+touch again in each step, and the run makes no progress.
 """
 
 from __future__ import annotations
@@ -25,23 +26,25 @@ _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
 
 _PULLS = 0.01
 """Distance outside the tool, over the distance from the sticking position, above which a point is in tension.
-(A point that is sheared along a facet leaves the tool at its edges.)"""
+
+A point that is sheared along a facet leaves the tool at the edges of the facet, without tension.
+"""
 
 SMALL_GAP = 1e-3
-"""Distance outside the tool, over theta, that is negligible."""
+"""Distance outside the tool, over `LaggedStick.theta`, up to which a point is not in tension."""
 
 
 class LaggedStick(ContactLaw):
-    """Contact law of this module.
+    """Contact law of points that stick where they crossed a tool in three dimensions.
 
-    For a sticking point, `ContactHistory.position` is the sticking position, and `distance` is 0. For a free point they
-    are its position at the last accepted state and its distance, below -theta.
+    The history variables (`ContactHistory`) of a sticking point are its sticking position and the distance 0. Of an
+    open point they are its position at the last accepted state, and its signed distance there, below -theta.
 
     Args:
         tool: tool with a signed distance.
         k: penalty, stress/length.
-        theta: distance above which a point counts as closed, length.
-        separates: True if points in tension separate, see `pulling`.
+        theta: a point sticks where its signed distance exceeds -theta, length.
+        separates: True if points in tension separate at the end of a step, see `pulling`.
     """
 
     remembers = pulls = sticks = True
@@ -52,21 +55,21 @@ class LaggedStick(ContactLaw):
         self._found: list[tuple[np.ndarray, np.ndarray]] = []           # distances asked for last, and where
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
-        """Return the law of some of the points.
+        """Return the contact law of some of the points.
 
         Args:
-            points: numbers of the points, or a slice.
+            points: numbers of the points, shape (m,), or a slice.
 
         Returns:
-            The law.
+            Contact law of these points.
         """
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
-    def held(self, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the sticking points.
+    def in_contact(self, old: ContactHistory) -> np.ndarray:
+        """Return the mask of the points that are in contact during the next step.
 
         Args:
-            old: history variables.
+            old: history variables of the last accepted state.
 
         Returns:
             Mask, shape (n,).
@@ -74,33 +77,33 @@ class LaggedStick(ContactLaw):
         return old.distance > -self.theta
 
     def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of sticking points that are in tension, that is outside the tool, and may separate.
+        """Return the mask of the sticking points in tension, which lie outside the tool and may separate.
 
         Args:
-            x: positions, shape (n, 3), length.
-            old: history variables.
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
 
         Returns:
             Mask, shape (n,).
         """
-        away = np.linalg.norm(x - old.position, axis=1)
-        most = np.maximum(_PULLS * away, SMALL_GAP * self.theta)
-        return self.separates & self.held(old) & (-self.distance(x) > most)
+        travel = np.linalg.norm(x - old.position, axis=1)
+        limit = np.maximum(_PULLS * travel, SMALL_GAP * self.theta)
+        return self.separates & self.in_contact(old) & (-self.distance(x) > limit)
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
-        return np.zeros(len(x), dtype=bool) if old is None else self.held(old)
+        return np.zeros(len(x), dtype=bool) if old is None else self.in_contact(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances; results of the last few states are kept.
+        """Return the signed distances of points from the tool; the last three results are stored.
 
         Args:
-            x: positions, shape (n, 3), length.
+            x: positions relative to the tool, shape (n, 3), or m positions of each point, shape (m, n, 3), length.
 
         Returns:
-            Distances, positive inside the tool, shape (n,), length.
+            Signed distances, positive inside the tool, shape (n,) or (m, n), length.
         """
-        for at, found in self._found:
-            if np.array_equal(at, x):
+        for positions, found in self._found:
+            if np.array_equal(positions, x):
                 return found
         found = self.tool.signed_distance(x.reshape(-1, x.shape[-1])).reshape(x.shape[:-1])
         if x.ndim == 2:
@@ -108,46 +111,56 @@ class LaggedStick(ContactLaw):
         return found
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the initial history variables; points inside the tool at the start stick there.
+        """Return the history variables of points at the start of a run; points inside the tool stick where they are.
 
         Args:
-            x: positions, shape (n, 3), length.
+            x: positions relative to the tool, shape (n, 3), length.
 
         Returns:
-            The history variables.
+            History variables of the n points.
         """
         d = self.distance(x)
-        held = d > -self.theta
-        return ContactHistory(x.copy(), np.where(held, 0.0, d), np.zeros(len(x)), x.copy())
+        sticking = d > -self.theta
+        return ContactHistory(x.copy(), np.where(sticking, 0.0, d), np.zeros(len(x)), x.copy())
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions of the sticking points; their `normal` is 1, as no normals are computed.
+        """Compute the tractions by which the penalty keeps sticking points at their sticking positions.
+
+        The law computes no normals: the normal traction (`Tractions.normal`) is 1 for a sticking point, 0 for an open
+        one.
 
         Args:
-            x: positions, shape (n, 3), length.
-            old: history variables.
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
             sense: not used.
             expected: not used.
 
         Returns:
-            Tractions.
+            Tractions with their stiffness and the new history variables.
         """
         assert old is not None
-        held, zero, force = self.held(old), np.zeros(len(x)), np.zeros_like(x)
-        force[held] = self.k * (x[held] - old.position[held])
+        sticking, zero, force = self.in_contact(old), np.zeros(len(x)), np.zeros_like(x)
+        force[sticking] = self.k * (x[sticking] - old.position[sticking])
 
         def stiffness() -> np.ndarray:
+            """Return the derivative of the tractions by the positions, shape (n, 3, 3), stress/length."""
             found = np.zeros((*x.shape, x.shape[1]))
-            found[held] = self.k * np.eye(x.shape[1])
+            found[sticking] = self.k * np.eye(x.shape[1])
             return found
-        return Tractions(force, held.astype(float), zero, zero, stiffness, lambda: self._history(x, old, held))
+        return Tractions(force, sticking.astype(float), zero, zero, stiffness, lambda: self._history(x, old, sticking))
 
-    def _history(self, x: np.ndarray, old: ContactHistory, held: np.ndarray) -> ContactHistory:
-        """Return the history variables of an accepted state."""
+    def _history(self, x: np.ndarray, old: ContactHistory, sticking: np.ndarray) -> ContactHistory:
+        """Return the history variables after a state with positions x is accepted: new points stick where they crossed.
+
+        Args:
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the state before.
+            sticking: mask of the points that stick already, shape (n,).
+        """
         d = self.distance(x)
-        new = ~held & (d > -self.theta)
-        position = np.where(held[:, None], old.position, x)
+        new = ~sticking & (d > -self.theta)
+        position = np.where(sticking[:, None], old.position, x)
         rows = np.flatnonzero(new)
         if len(rows):
             a, b = old.position[rows], x[rows]
@@ -159,4 +172,4 @@ class LaggedStick(ContactLaw):
                 low, high = np.where(inside, low, middle), np.where(inside, middle, high)
             position[rows] = a + high[:, None] * (b - a)
         free = np.minimum(d, -2 * self.theta)
-        return ContactHistory(position, np.where(held | new, 0.0, free), np.zeros(len(x)), x.copy())
+        return ContactHistory(position, np.where(sticking | new, 0.0, free), np.zeros(len(x)), x.copy())

@@ -1,4 +1,4 @@
-"""Formed part in three dimensions as numbers, and its filling of a tool."""
+"""Numbers of a formed part in three dimensions, and the filling of a tool by the sheet."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from .wall import WallInSpace
 
 @dataclass(frozen=True, repr=False)
 class PartInSpace(PartNumbers):
-    """Whole part, also where a half or a quarter is modelled.
+    """Numbers of a formed part in three dimensions, of the whole part also where a half or a quarter is modelled.
 
     Attributes:
         volume: volume, length^3.
         area: deformed area of the surface, length^2.
         draw_ratio: deformed over reference area.
-        mean_wall: volume/area, length.
-        min_wall: minimum wall, length.
+        mean_wall: mean wall thickness, volume over area, length.
+        min_wall: minimum wall thickness, length.
         min_wall_at: deformed position (x, y, z) of the minimum wall, length.
-        min_wall_reference: its position (X, Y) on the flat sheet, length.
-        uniformity: minimum over mean wall.
-        variation: standard deviation of the wall over the surface, over its mean.
-        weight: grams if a density in g/cm3 was given; else None.
-        scrap: volume beyond the trim over the volume of the sheet.
+        min_wall_reference: position (X, Y) of the minimum wall on the flat sheet, length.
+        uniformity: minimum over mean wall thickness.
+        variation: standard deviation of the wall thickness over the surface, over its mean.
+        weight: weight in grams if a density in g/cm3 was given; else None.
+        scrap: volume that is trimmed off over the volume of the sheet.
         wrinkled: part of the reference area that is in compression.
-        basis: basis of volume, area and weight as text; "" for a part that was modelled as a whole.
+        basis: text that says of which part volume, area and weight are, such as the whole of a modelled quarter; "" if
+            the part was modelled as a whole.
         units: units of the labels.
     """
 
@@ -54,29 +55,31 @@ class PartInSpace(PartNumbers):
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """Rows of a table: (name, value with its unit)."""
-        at, rest = (", ".join(f"{v:.4g}" for v in where) for where in (self.min_wall_at, self.min_wall_reference))
-        return self._rows(f"(x, y, z) = ({at}), from (X, Y) = ({rest})", []) + (
+        """Rows of a table of the part: (name of a number, its value with unit as text)."""
+        deformed, reference = (", ".join(f"{v:.4g}" for v in position) for position in (
+            self.min_wall_at, self.min_wall_reference))
+        return self._rows(f"(x, y, z) = ({deformed}), from (X, Y) = ({reference})", []) + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
 def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units,
          planes: MirrorPlanes) -> PartInSpace:
-    """Return the part of a state as numbers; see `Path.part`.
+    """Return the numbers of the formed part in a state.
 
     Args:
-        wall: wall of the state.
+        wall: wall of the sheet in the state.
         density: density in g/cm3, or None.
-        trim: z of the plane beyond which, seen from the flat sheet, the part lies; or None.
-        heights: not available in three dimensions.
+        trim: z of the plane at which the sheet is cut, length; the side away from the flat sheet is the part. None: no
+            cut.
+        heights: must be empty: in three dimensions `WallInSpace.section` gives the wall along a cut.
         units: units of the labels.
-        planes: mirror planes of the body.
+        planes: mirror planes at which the modelled body ends.
 
     Returns:
-        The part.
+        Numbers of the whole part.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: heights are given, a trim that the part does not pass, or a density that is not positive.
     """
     if len(tuple(heights)):
         raise InputError("part: heights: in space use path.wall().section(point, normal)")
@@ -86,7 +89,7 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
         if not z.min() < level < z.max():
             raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
                              f" {z.max():.6g}")
-        share = _beyond((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+        share = _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
     kept = share > 0
     h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.area_at_rest * share)[kept]
     volume, images = float((h * area).sum()), planes.factor
@@ -101,8 +104,12 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
                        planes.basis(None), units)
 
 
-def _beyond(d: np.ndarray) -> np.ndarray:
-    """Return the part of each triangle's area, shape (m,), where a linear field with corner values d is positive."""
+def _positive_share(d: np.ndarray) -> np.ndarray:
+    """Return the share of each triangle's area on which a linear field is positive, shape (m,).
+
+    Args:
+        d: values of the field at the corners of m triangles, shape (m, 3).
+    """
     alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
     a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,11 +119,11 @@ def _beyond(d: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, repr=False)
 class FillingInSpace(Sheet):
-    """Filling of a tool in each of n states.
+    """Filling of a tool by a sheet in each of the n states of a run.
 
     Attributes:
-        control: name and values of the first column of the run, shape (n,).
-        touching: part of the reference area that is in contact, or nearer to the tool than a tenth of the thickness,
+        control: name of the first column of the run, such as "pressure", and its values, shape (n,).
+        touching: share of the reference area that is in contact, or nearer to the tool than a tenth of the thickness,
             shape (n,).
         gap: largest distance of the sheet from the tool, shape (n,), length.
         comm: MPI communicator of the run.
@@ -129,26 +136,27 @@ class FillingInSpace(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
+        """Columns of the written file, with a row for each state: {name: values, shape (n,)}."""
         return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
 
 
 def filling(path: Any, contact: Any) -> FillingInSpace:
-    """Return the filling of a tool; see `Path.filling`.
+    """Return the filling of a tool by the sheet in all states of a run; collective.
 
     Args:
         path: the computed `Path`.
-        contact: the `FaceContact`.
+        contact: contact of the sheet with the tool, a `FaceContact`.
 
     Returns:
-        The filling.
+        Share of the area in contact, and largest gap, in each state.
     """
     rows, comm = [], path.problem.comm
     for state in path.states:
         with path.problem.state_context(state) as problem:
             d = contact.contact.tool.signed_distance(contact.positions(problem.x.array_r, state.control))
-            held = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
+            closed = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
         area = contact.rule.area
-        parts = comm.allgather((float(area[held].sum()), float(area.sum()), float((-d).max(initial=0.0))))
+        parts = comm.allgather((float(area[closed].sum()), float(area.sum()), float((-d).max(initial=0.0))))
         touching, whole, gap = (list(column) for column in zip(*parts))
         rows.append((sum(touching) / sum(whole), max(gap)))
     name = path.columns[0]

@@ -1,4 +1,4 @@
-"""Results of a sheet in three dimensions: its wall, the part, pictures, files and reports."""
+"""Results of a run of a sheet in three dimensions: wall, part, filling, pictures, files and reports."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .wall import WallInSpace, wall_of
 
 
 class SheetReader:
-    """Reader of a sheet in three dimensions (`formingx.results.reader.Reader`).
+    """Results of a run of a sheet in three dimensions, for the methods of `Path` (`formingx.results.reader.Reader`).
 
     Args:
         path: the computed `Path`.
@@ -28,73 +28,74 @@ class SheetReader:
         self._path = path
 
     def wall(self, state: State) -> WallInSpace:
-        """Return the wall of a state for each triangle.
+        """Return the wall thickness of each triangle in a state; collective.
 
         Args:
             state: a `State` of the path.
 
         Returns:
-            The wall.
+            Wall of the sheet with the reference and deformed positions of its nodes.
         """
         return wall_of(self._path, state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:
-        """Return the whole part of a state as numbers.
+        """Return numbers of the whole formed part in a state: volume, walls, weight; collective.
 
         Args:
             state: a `State` of the path.
             density: density in g/cm3, or None.
-            trim: see `Path.part`.
-            heights: see `Path.part`.
+            trim: z of the plane at which the sheet is cut, length, or None.
+            heights: must be empty in three dimensions.
             units: units of the labels.
 
         Returns:
-            The part.
+            Numbers of the part.
         """
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
     def filling(self, contact: FaceContact) -> FillingInSpace:
-        """Return the gaps between the sheet and a tool.
+        """Return the filling of a tool in all states: share of the area in contact, and largest gap; collective.
 
         Args:
-            contact: the `FaceContact`.
+            contact: contact of the sheet with the tool.
 
         Returns:
-            The filling.
+            The filling in each state.
         """
         return parts.filling(self._path, contact)
 
     def view(self, file: Any, state: State, grid: float | None) -> None:
-        """Draw the whole part, with the squares of a grid printed on the flat sheet.
+        """Draw the whole part in a state as PNG, coloured by its wall thickness (rank 0 draws).
 
         Args:
             file: path of the PNG file.
             state: a `State` of the path.
-            grid: size of the squares, length, or None.
+            grid: size of the squares of a grid that is printed on the flat sheet, length; None: no grid.
         """
         show.view(self._path, state, file, grid)
 
     def solid(self, state: State) -> tuple:
-        """Return the surface of the whole part with its wall.
+        """Return the closed surface of the whole part in a state, with its wall thickness as distance of both sides.
 
         Args:
             state: a `State` of the path.
 
         Returns:
-            Points, triangles and wall ratios, see `show.solid`.
+            Points, shape (n, 3), length; triangles that look outward, shape (m, 3); deformed over reference wall
+            thickness at the points, shape (n,).
         """
         return show.solid(self._path, state)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-        """Write the report of the run.
+        """Write the report of the run as an HTML page (rank 0 writes).
 
         Args:
-            file: path of the file.
+            file: path of the HTML file.
             title: heading of the page.
-            failure: failure of the run, or None.
+            failure: the error that ended the run, or None.
             units: units of the labels.
             density: density in g/cm3, or None.
-            trim: see `Path.part`.
+            trim: z of the plane at which the sheet is cut, length, or None.
 
         Returns:
             Path of the file.
@@ -104,12 +105,16 @@ class SheetReader:
 
 @method_of(Path)
 def shell_model(path: Path, file: Any, state: State | None = None) -> None:
-    """Write a part in three dimensions as shells with their wall, for a structural code (.inp; rank 0 writes).
+    """Write a formed part in three dimensions as shell elements with their wall thickness, for a structural code.
+
+    The file is an input file for Abaqus or CalculiX (rank 0 writes). It contains the modelled part: a half or a quarter
+    must be constrained at its planes of symmetry. Each triangle is an S3 element whose section thickness is its wall.
+    The material must be added.
 
     Args:
-        path: the path of a sheet in three dimensions.
+        path: the computed `Path` of a sheet in three dimensions.
         file: path of the file, ending in .inp.
-        state: the state; default the last.
+        state: a state of the path; default the last.
 
     Raises:
         InputError: the body is a section.

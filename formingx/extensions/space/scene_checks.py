@@ -1,4 +1,4 @@
-"""Checks of a scene in three dimensions; unproven combinations are refused."""
+"""Checks of a scene in three dimensions. Combinations that no test has verified are refused."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -14,21 +14,25 @@ from .sheet import Sheet
 from .solid_tool import Swept
 
 _LARGER = 9.0
-"""Ratio of the sizes of sheet and tool that indicates another unit of length; the sheet may be a quarter."""
+"""Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
+
+The sheet may be a quarter of the whole.
+"""
 
 
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
-    """Return the thicknesses of the layers as functions; collective.
+    """Return the reference thickness of each layer of a sheet as a function of position; collective.
 
     Args:
         scene: the `Scene`.
-        given: a length, a function of arrays (x, y), or {layer: either}.
+        given: the argument `thickness` of the scene: a length, a function of arrays (x, y) that returns lengths, or
+            {layer: length or function}.
 
     Returns:
         {layer: function of arrays (x, y)}, positive at all nodes.
 
     Raises:
-        InputError: a missing layer, or a thickness that is not positive.
+        InputError: the mesh is no `Sheet`, a layer has no thickness, or a thickness is not positive.
     """
     mesh = scene.mesh
     if not isinstance(mesh, Sheet):
@@ -57,7 +61,7 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
 
 
 class _Constant:
-    """Constant thickness."""
+    """Constant thickness as a function of arrays (x, y)."""
 
     def __init__(self, value: float):
         self.value = value
@@ -67,7 +71,13 @@ class _Constant:
 
 
 def _check(name: str, function: Callable, X: np.ndarray) -> None:
-    """Raise an InputError unless a thickness is positive at all nodes."""
+    """Raise an InputError unless the thickness of a layer is positive at all nodes.
+
+    Args:
+        name: name of the layer.
+        function: thickness as a function of arrays (x, y).
+        X: reference positions of the nodes, shape (n, 3), length.
+    """
     found = values(f"Scene: thickness of {name!r}", function, {"x": X[:, 0], "y": X[:, 1]})
     if len(found) and found.min() <= 0:
         k = int(np.argmin(found))
@@ -76,14 +86,15 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """Raise an InputError for combinations that are not proven in three dimensions.
+    """Raise an InputError for models, heat, loads and supports that are not available in three dimensions.
 
     Args:
         scene: the `Scene`.
-        heat: the `Cooling`, or None.
+        heat: the heat conduction of the scene, or None.
 
     Raises:
-        InputError: such a combination.
+        InputError: a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, or a
+            pinned node.
     """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
@@ -102,14 +113,15 @@ def refuse(scene: Any, heat: Any) -> None:
 
 
 def check_contact(scene: Any, contact: Any) -> None:
-    """Check that the sheet starts outside the tool, in the same unit of length; collective.
+    """Check a contact of a sheet: its options, the size of its tool, and that the sheet starts outside it; collective.
 
     Args:
-        scene: the `Scene`.
-        contact: the `Contact`.
+        scene: the `Scene` of the sheet.
+        contact: a `Contact` of the scene.
 
     Raises:
-        InputError: the sheet starts inside the tool, or the sizes indicate different units.
+        InputError: an option that is not available in three dimensions, sizes that indicate different units of length,
+            or a sheet that starts inside the tool.
     """
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
@@ -141,6 +153,6 @@ def check_contact(scene: Any, contact: Any) -> None:
     k = int(np.argmax(depth))
     finite(f"{contact!r}: distance to the tool", float(depth[k]))
     if depth[k] > 1e-6 * length:
-        at = ", ".join(f"{v:.6g}" for v in points[k])
-        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({at}):"
+        place = ", ".join(f"{v:.6g}" for v in points[k])
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({place}):"
                          f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")

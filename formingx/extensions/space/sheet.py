@@ -1,4 +1,4 @@
-"""Flat sheets in three dimensions, z = 0: triangles within an outline, by gmsh."""
+"""Meshes of flat sheets in three dimensions, in the plane z = 0: triangles within an outline, by gmsh."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ _PARTS = ("whole", "half", "quarter")
 
 @dataclass(frozen=True)
 class Sheet(Mesh):
-    """Sheet in three dimensions: plane triangles in the reference configuration, coordinates (x, y, z).
+    """Mesh of a sheet in three dimensions: triangles in the plane z = 0 in the reference configuration.
 
     Each layer covers the whole sheet. Besides the boundaries of its outline a sheet has the faces "bottom" and "top"
-    (towards +z); as boundaries both consist of all edges. A membrane has one surface only, so the face on which a
-    pressure acts determines its direction.
+    (towards +z). A membrane has one surface only, so the face on which a pressure acts determines the direction of the
+    pressure. As boundaries of the mesh both faces contain all edges.
 
     Attributes:
-        of_size: function that returns the same sheet with triangles of another size (or function of x and y).
+        of_size: function that returns a mesh of the same sheet with another edge length of triangles, a number or a
+            function of (x, y).
     """
 
     of_size: Callable[[Any], Sheet] | None = None
@@ -42,6 +43,7 @@ class Sheet(Mesh):
                           f"layers: {', '.join(self.layers)}", f"boundaries: {', '.join(self.boundaries)}"])
 
     def facets_of(self, boundary: str) -> np.ndarray:
+        """Return the local numbers of the edges on a boundary; all local edges for the faces "bottom" and "top"."""
         if boundary in ("bottom", "top"):
             edges = self.domain.topology
             edges.create_entities(1)
@@ -50,13 +52,13 @@ class Sheet(Mesh):
 
 
 class Edge(NamedTuple):
-    """Piece of an outline.
+    """Straight piece or circular arc of the outline of a sheet.
 
     Attributes:
-        start: its start (x, y), length.
-        end: its end (x, y), length.
-        centre: centre of an arc (x, y), length, or None for a straight piece.
-        name: name of its boundary.
+        start: start (x, y) of the piece, length.
+        end: end (x, y) of the piece, length.
+        centre: centre (x, y) of the arc, length, or None for a straight piece.
+        name: name of the boundary to which the piece belongs.
     """
 
     start: tuple[float, float]
@@ -66,19 +68,21 @@ class Edge(NamedTuple):
 
 
 def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "whole") -> list[Edge]:
-    """Return the outline of a rectangle centred at (0, 0), for `sheet`.
+    """Return the outline of a rectangle with rounded corners centred at (0, 0), for `sheet`.
 
     Args:
-        width: width of the whole along x, length.
-        height: height of the whole along y, length.
-        corner: radius of its corners, length.
-        part: "whole"; "half" with x > 0; "quarter" with x > 0 and y > 0. The cuts are named "x0" and "y0".
+        width: width of the whole rectangle along x, length.
+        height: height of the whole rectangle along y, length.
+        corner: radius of the corners, length.
+        part: modelled part: "whole"; "half" with x > 0; "quarter" with x > 0 and y > 0. The cuts are the boundaries
+            "x0" (on x = 0) and "y0" (on y = 0), the rest is "rim".
 
     Returns:
-        The pieces of the outline.
+        The pieces of the outline, counter-clockwise.
 
     Raises:
-        InputError: a size that is not allowed, or an unknown part.
+        InputError: a width or height that is not positive, a corner radius above half the shorter side, or an unknown
+            part.
 
     >>> [edge.name for edge in fx.mesh.rectangle(200.0, 100.0, part="quarter")]
     ['rim', 'rim', 'x0', 'y0']
@@ -92,7 +96,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
     def to(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
-        """Add a piece from the last point."""
+        """Add a piece from the last point to `point`, an arc if it has a centre, unless both points coincide."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -118,14 +122,14 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
 
 
 def circle(radius: float, *, part: str = "whole") -> list[Edge]:
-    """Return the outline of a circle centred at (0, 0), for `sheet`; see `rectangle`.
+    """Return the outline of a circle centred at (0, 0), for `sheet`.
 
     Args:
-        radius: radius, length.
-        part: "whole", "half" or "quarter".
+        radius: radius of the circle, length.
+        part: modelled part: "whole", "half" or "quarter", with the boundaries of `rectangle`.
 
     Returns:
-        The pieces of the outline.
+        The pieces of the outline, counter-clockwise.
 
     >>> fx.mesh.circle(100.0, part="quarter")[0].name
     'rim'
@@ -135,23 +139,24 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
           layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
-    """Return a flat sheet of triangles within an outline, by gmsh.
+    """Mesh a flat sheet in the plane z = 0 with triangles within an outline, by gmsh.
 
     Args:
         outline: `rectangle(...)`, `circle(...)`, or the corners (x, y) of a polygon, length.
-        size: length of the edges of triangles, or a function of (x, y).
-        names: names of the edges of a polygon, from the first corner on; default "rim".
+        size: edge length of the triangles: a length, or a function of (x, y) that returns lengths.
+        names: name of the boundary of each piece of the outline; of a polygon, the first piece leads from the first
+            corner to the second. Default: the names in the outline, "rim" for a polygon.
         layers: names of the layers; `Scene(thickness=...)` gives their thickness.
         reflected: names of straight boundaries at which the mesh and its mirror image are joined. The mesh of a quarter
             with ["y0"] becomes a symmetric mesh of the half.
         comm: MPI communicator.
 
     Returns:
-        The sheet.
+        Mesh of the sheet.
 
     Raises:
         InputError: an outline that intersects itself, a size that is not positive, or more than 500,000 triangles. Also
-            a reflected boundary that is not straight, or that the sheet crosses.
+            a reflected boundary that is not straight, or whose line the sheet meets elsewhere.
 
     >>> quarter = fx.mesh.rectangle(300, 200, corner=20, part="quarter")
     >>> print(fx.mesh.sheet(quarter, size=40))
@@ -178,8 +183,8 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
         if instance("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
             raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
     x = _chords(edges)
-    asked = _Size(size)
-    areas, sizes = asked.over(x)
+    edge_length = _Size(size)
+    areas, sizes = edge_length.sampled(x)
     lines = several("sheet: reflected", reflected, "names")
     for k, name in enumerate(lines):
         known("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
@@ -189,17 +194,18 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     words = several("sheet: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
-    plain = to_mesh(lambda: reduce(_reflected, lines, _grid(edges, asked)), comm, "sheet")
+    plain = to_mesh(lambda: reduce(_reflected, lines, _grid(edges, edge_length)), comm, "sheet")
     return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
                     "boundaries": plain.boundaries | {"bottom": (), "top": ()},
                     "of_size": lambda size: sheet(edges, size, layers=words, reflected=lines, comm=comm)})
 
 
 def _chords(edges: list[Edge]) -> np.ndarray:
-    """Return the corners of the outline, arcs as chords, shape (n, 2).
+    """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
 
     Raises:
-        InputError: the outline crosses or touches itself; gmsh might not end.
+        InputError: two equal corners in succession, or an outline that crosses or touches itself, for which gmsh might
+            not end.
     """
     points = []
     for edge in edges:
@@ -218,14 +224,19 @@ def _chords(edges: list[Edge]) -> np.ndarray:
 
 
 class _Size:
-    """User's size as a function for gmsh, which ignores errors: the first error is kept in `refused`."""
+    """Edge length of triangles as a function for gmsh. As gmsh ignores errors, `refused` stores the first one.
+
+    Args:
+        size: edge length, a number or a function of (x, y).
+    """
 
     def __init__(self, size: Any):
         self._size = size
-        self.everywhere = None if callable(size) else positive("sheet: size", size)
+        self.constant = None if callable(size) else positive("sheet: size", size)
         self.refused: InputError | None = None
 
     def __call__(self, x: float, y: float) -> float:
+        """Return the edge length at a point (x, y); raise an InputError if it is not positive or cannot be computed."""
         where = f"sheet: size at ({x:.6g}, {y:.6g})"
         try:
             return positive(where, float(self._size(x, y)))
@@ -234,20 +245,24 @@ class _Size:
         except Exception as error:
             raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
 
-    def kept(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
-        """Return the size at a point for gmsh."""
+    def callback(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
+        """Return the edge length at a point (x, y), for gmsh; 1e22 where the user's function fails."""
         try:
             return self(x, y)
         except InputError as error:
             self.refused = self.refused or error
             return 1e22
 
-    def over(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return areas that cover the outline with corners x, and the sizes there, shape (m,) each."""
+    def sampled(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return areas that together cover an outline, and the edge length in each of them, shape (m,) each.
+
+        Args:
+            x: corners of the outline, shape (n, 2), length.
+        """
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
-        if self.everywhere:
-            return np.array([area]), np.array([self.everywhere])
+        if self.constant:
+            return np.array([area]), np.array([self.constant])
         low, high = x.min(0), x.max(0)
         p = np.stack(np.meshgrid(*(a + (b - a) * (np.arange(40) + 0.5) / 40 for a, b in zip(low, high))), -1)
         p = p.reshape(-1, 1, 2)
@@ -259,18 +274,24 @@ class _Size:
 
 
 def _grid(edges: list[Edge], size: _Size) -> Grid:
-    """Return the triangles, on one rank."""
+    """Return the triangles within an outline, by gmsh on one rank.
+
+    Args:
+        edges: pieces of the outline, in order.
+        size: edge length of the triangles.
+    """
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeExtendFromBoundary": 0.0}
-    if size.everywhere:
-        options |= {"Mesh.MeshSizeMin": size.everywhere, "Mesh.MeshSizeMax": size.everywhere}
+    if size.constant:
+        options |= {"Mesh.MeshSizeMin": size.constant, "Mesh.MeshSizeMax": size.constant}
     with with_gmsh.model("sheet", options) as gmsh:
         geo, points = gmsh.model.geo, {}
         span = max(abs(v) for e in edges for v in e.start)
 
-        def point(at: tuple[float, float]) -> int:
-            key = tuple(np.round(np.array(at) / span, 12))
+        def point(position: tuple[float, float]) -> int:
+            """Return gmsh's number of the point at (x, y); equal points have one number."""
+            key = tuple(np.round(np.array(position) / span, 12))
             if key not in points:
-                points[key] = geo.addPoint(*at, 0.0)
+                points[key] = geo.addPoint(*position, 0.0)
             return points[key]
         tags = [geo.addLine(point(e.start), point(e.end)) if e.centre is None
                 else geo.addCircleArc(point(e.start), point(e.centre), point(e.end)) for e in edges]
@@ -279,8 +300,8 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
         for name in dict.fromkeys(e.name for e in edges):
             group = gmsh.model.addPhysicalGroup(1, [t for t, e in zip(tags, edges) if e.name == name])
             gmsh.model.setPhysicalName(1, group, name)
-        if not size.everywhere:
-            gmsh.model.mesh.setSizeCallback(size.kept)
+        if not size.constant:
+            gmsh.model.mesh.setSizeCallback(size.callback)
         try:
             gmsh.model.mesh.generate(2)
         except Exception as error:
@@ -304,7 +325,15 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
 
 
 def _reflected(grid: Grid, name: str) -> Grid:
-    """Return the triangles and their mirror image about a straight boundary, joined there."""
+    """Return the triangles of a sheet together with their mirror image about a straight boundary, joined there.
+
+    Args:
+        grid: triangles of the sheet.
+        name: name of the boundary, which the result does not have.
+
+    Raises:
+        InputError: the boundary is not straight, or the sheet meets its line elsewhere too.
+    """
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])
     middle, size = X[line].mean(0), 1e-9 * float(np.ptp(X, axis=0).max())

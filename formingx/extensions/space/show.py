@@ -1,4 +1,4 @@
-"""Parts in three dimensions as pictures, solids for other programs, and a report."""
+"""Pictures, closed surfaces, shell models and reports of parts in three dimensions."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from ...units import Units
 from .wall import wall_of
 
 _DRAWN, _FRAMES = 200_000, (10, 100)
-"""Nodes of all drawn states of a report together; and the smallest and the most states."""
+"""Largest number of nodes of all drawn states of a report together; smallest and largest number of drawn states."""
 
 _LARGEST_TOOL = 20_000
-"""Triangles of a tool that is drawn in a report."""
+"""Largest number of triangles of a tool that a report draws."""
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
-    """Draw the part at a state, completed by mirror images and coloured by wall thickness, as PNG (rank 0 draws).
+    """Draw the whole part in a state as PNG, completed by mirror images and coloured by wall thickness (rank 0 draws).
 
     Args:
         path: the computed `Path`.
         state: a `State` of the path.
         file: path of the PNG file.
-        grid: size of the squares of a grid printed on the flat sheet, length, or None.
+        grid: size of the squares of a grid that is printed on the flat sheet, length; None: no grid.
 
     Raises:
         InputError: neither a screen nor Xvfb is available.
@@ -46,7 +46,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     images = path.scene.symmetry.images(3)
 
     def draw():
-        """Draw the picture."""
+        """Draw the part and the grid, on rank 0."""
         pyvista = figures.pyvista()
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
@@ -66,16 +66,17 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
 
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the surface of the whole part with its wall.
+    """Return the closed surface of the whole part in a state, completed by mirror images.
 
-    Half of the wall lies on each side of the mid-surface, along the normals at the nodes.
+    Half of the wall thickness lies on each side of the mid-surface, along the normals at the nodes.
 
     Args:
         path: the computed `Path`.
         state: a `State` of the path.
 
     Returns:
-        Points, shape (n, 3), length; triangles that look outward, shape (m, 3); wall ratios at the points, shape (n,).
+        Points, shape (n, 3), length; triangles that look outward, shape (m, 3); deformed over reference wall thickness
+        at the points, shape (n,).
     """
     wall, planes = wall_of(path, state), path.scene.symmetry
     on = [np.abs(wall.rest[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
@@ -105,20 +106,20 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def shell_model(path: Any, file: Any, state: Any = None) -> None:
-    """Write the part as shells with their thickness, as an input file (.inp) for Abaqus or CalculiX (rank 0 writes).
+    """Write the modelled part as shell elements in an input file for Abaqus or CalculiX (rank 0 writes).
 
-    The modelled part is written: a half or a quarter must be constrained at its planes of symmetry. Each triangle is an
-    S3 with its wall as section thickness; the material must be added.
+    A half or a quarter must be constrained at its planes of symmetry. Each triangle is an S3 element whose section
+    thickness is its wall. The material must be added.
 
     Args:
         path: the computed `Path`.
-        file: path of the file.
-        state: the state; default the last.
+        file: path of the file, ending in .inp.
+        state: a state of the path; default the last.
     """
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
 
     def write(stream):
-        """Write the file."""
+        """Write nodes, elements and shell sections to an open text file."""
         stream.write("** formed part: shells with the wall of each element\n*NODE\n")
         stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.now, 1))
         stream.write("*ELEMENT, TYPE=S3, ELSET=PART\n")
@@ -129,16 +130,16 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-    """Write the report of a run in three dimensions; see `Path.report`.
+    """Write the report of a run in three dimensions as an HTML page (rank 0 writes).
 
     Args:
         path: the computed `Path`.
-        file: path of the file.
+        file: path of the HTML file.
         title: heading of the page.
-        failure: failure of the run, or None.
+        failure: the error that ended the run, or None.
         units: units of the labels.
         density: density in g/cm3, or None.
-        trim: see `Path.part`.
+        trim: z of the plane at which the sheet is cut, length, or None.
 
     Returns:
         Path of the file.
@@ -180,7 +181,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
 
     def make() -> None:
-        """Write the page."""
+        """Write the HTML page, on rank 0."""
         text = page.page(title or "Report of a run", body, scripts(drawn))
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
@@ -188,7 +189,13 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """Return the triangles of the sheet in each drawn state, and the tools, for `report.js`."""
+    """Return data for the script `report.js` of a report: the sheet in each drawn state, and the tools.
+
+    Args:
+        path: the computed `Path`.
+        record: record of the path, with the numbers of the drawn states and the travels of the tools.
+        units: units of the labels.
+    """
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}

@@ -1,66 +1,77 @@
-"""Rigid tools in three dimensions: profiles swept about an axis, along a line or round a box, and closed surfaces of
-triangles.
+"""Rigid tools in three dimensions that are made of profiles: tools of revolution, extruded tools and boxes.
 
-Distances to swept profiles are exact where the profile's are, off the edges at which a profile ends.
+A profile is swept about an axis, along a line, or round a rectangle. The distance to such a tool is as exact as the
+distance to its profile in the plane, except near the edges at which an extruded profile ends.
 """
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, as_points, direction, instance, known, non_negative, pair, place, positive, triple
+from ...errors import InputError, as_points, instance, known, non_negative, pair, positive, triple
 from ...io.stl import volume, write_stl
 from ...physics.contact import Contact
 from ...physics.contact_law import ContactLaw
 from ...tools.profile import Tool
-from .bodies import apart
-from .lagged_friction import LaggedFriction, Near
+from .bodies import merged
+from .lagged_friction import Distances, LaggedFriction
 from .lagged_stick import LaggedStick
 
-_ON_AXIS = 1e-9             # distance from the axis, over the size of a profile, that counts as 0
+_ON_AXIS = 1e-9            # distance from the axis, over the size of a profile, that counts as 0
 _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
-    """Rigid tool in three dimensions: `signed_distance` (positive inside), `bounds`, `surface`, `moved` (by `shift`).
+    """Rigid tool in three dimensions.
+
+    Attributes:
+        components: number of coordinates, 3.
+        sized: False for a plane, whose drawing has no size.
+        shift: displacement (x, y, z) from the initial position, length, see `moved`.
     """
 
     components = 3
     sized = True
-    """False for a plane, whose drawing has no size."""
     shift: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distance of points from the surface, positive inside the tool.
+        """Return the signed distances of points from the surface of the tool, positive inside.
+
+        Args:
+            x: positions, shape (n, 3), length.
 
         Returns:
-            Distances, shape (n,), length.
+            Signed distances, shape (n,), length.
         """
         return self._distance(as_points("signed_distance: x", x, 3) - self.shift)
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest coordinates of the triangles of `surface`, shape (2, 3), length."""
+        """Lowest and highest coordinates of the vertices of `surface`, shape (2, 3), length."""
         points = self.surface()[0]
         return np.array([points.min(0), points.max(0)])
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the surface as triangles, for drawing.
+        """Return the surface of the tool as triangles, for drawing.
 
         Returns:
-            Points, shape (n, 3), length, and triangles, shape (m, 3).
+            Vertices, shape (n, 3), length; vertex numbers of the triangles, shape (m, 3).
         """
         points, triangles = self._surface()
         return points + self.shift, triangles
 
     def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        """Return the tool displaced by (x, y, z), length.
+        """Return a copy of the tool that is displaced by (x, y, z).
+
+        Args:
+            x: displacement along x, length.
+            y: displacement along y, length.
+            z: displacement along z, length.
 
         Returns:
-            The tool.
+            The displaced tool.
         """
         import copy
         found = copy.copy(self)
@@ -71,12 +82,12 @@ class SolidTool:
         """Return the contact law of a sheet on this tool.
 
         Args:
-            contact: its friction and regularisation.
-            k: penalty, stress/length, shape () or (n,).
-            thickness: of the sheet, length.
+            contact: the `Contact`, with its friction and regularisation.
+            k: penalty, stress/length, a number or one for each of n points, shape (n,).
+            thickness: thickness of the sheet, length, which scales the regularisation.
 
         Returns:
-            The law.
+            Contact law: sticking or sliding, lagged by a step.
         """
         theta = contact.ramp * thickness
         if contact.sticks:
@@ -84,21 +95,27 @@ class SolidTool:
         return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
+        """Return the signed distances of points x, shape (n, 3), from the unmoved tool, shape (n,), length."""
         raise NotImplementedError
 
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return points and triangles of the unmoved tool."""
+        """Return vertices, shape (n, 3), and triangles, shape (m, 3), of the unmoved tool."""
         raise NotImplementedError
 
 
 class Swept(SolidTool):
-    """A profile (r, z) swept along a curve in the plane of x and y, to which r is a distance.
+    """Rigid tool whose profile (r, z) is swept along a curve in the plane of x and y.
+
+    The kind of the tool determines the coordinate r of a position. Of a revolved tool r is the distance from the axis
+    x = y = 0. Of a tool extruded along y it is x, along x it is y. Of a box it is min(half) on the outline of a rounded
+    rectangle and 0 on its middle line, and curves of constant r are parallel to the outline.
 
     Args:
-        profile: the solid to its left; kind: "revolved" (r from the axis x = y = 0), "extruded" (r = x, or y: `along`)
-            or "box" (r from the middle line of a rounded rectangle of half widths `half`, across, the corners' radius
-            at the widest `corner`).
+        profile: profile in the plane (r, z), with the solid to its left.
+        kind: "revolved", "extruded" or "box".
+        half: half widths of the rectangle along x and y, length, for "box".
+        corner: radius of its corners, length, for "box".
+        along: axis along which the profile is extruded, "x" or "y", for "extruded".
     """
 
     def __init__(self, profile: Tool, kind: str, half: tuple[float, float] = (0.0, 0.0), corner: float = 0.0,
@@ -106,18 +123,21 @@ class Swept(SolidTool):
         self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
         self.sized = len(profile.pieces) > 1
 
-    def near(self, x: np.ndarray) -> Near:
-        """Return the distance of positions x, shape (n, 3), with its first and second derivatives, exactly.
+    def distances(self, x: np.ndarray) -> Distances:
+        """Return the signed distances of points from the tool, with exact first and second derivatives.
+
+        Args:
+            x: positions, shape (n, 3), length.
 
         Returns:
-            The geometry relative to the tool.
+            Distances, normals and Hessians at the n points.
 
-        >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).near([[0.0, 0.0, -8.0]])
+        >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).distances([[0.0, 0.0, -8.0]])
         >>> found.distance.tolist(), found.normal.tolist()
         ([2.0], [[0.0, 0.0, 1.0]])
         """
-        x = as_points("near: x", x, 3) - self.shift
-        r, way, bend = self._across(x)
+        x = as_points("distances: x", x, 3) - self.shift
+        r, way, bend = self._profile_coordinate(x)
         found = self.profile.nearest(np.column_stack([r, x[:, 2]]))
         normal, tangent = (v[:, :1] * way + v[:, 1:] * [0.0, 0.0, 1.0] for v in (found.normal, found.tangent))
         hessian = found.curvature[:, None, None] * tangent[:, :, None] * tangent[:, None]
@@ -125,14 +145,19 @@ class Swept(SolidTool):
         turn = found.normal[:, 0] * bend
         if self.kind == "revolved":                          # on the axis both curvatures are one
             turn = np.where(r > _ON_AXIS * self._size, turn, found.curvature)
-        return Near(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
+        return Distances(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
-        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
-        return self.profile.signed_distance(np.column_stack([self._across(x)[0], x[:, 2]]))
+        """Return the signed distances of points x, shape (n, 3), from the unmoved tool, shape (n,), length."""
+        return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
 
-    def _across(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return r of points, its gradient, shape (n, 3), and the curvature of the curve of constant r, shape (n,)."""
+    def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the coordinate r of points x, shape (n, 3), that the profile is drawn over, with its derivatives.
+
+        Returns:
+            r, shape (n,), length; its gradient by x, shape (n, 3); curvature of the curve of constant r, shape (n,),
+            1/length.
+        """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
             axis = "yx".index(self.along)
@@ -150,24 +175,22 @@ class Swept(SolidTool):
 
     @property
     def _size(self) -> float:
-        """Size of the profile, length."""
+        """Largest extent of the profile, length; 1 for a plane."""
         return float(np.ptp(self.profile.bounds, axis=0).max()) if self.sized else 1.0
 
     def _surface(self):
-        """Return points and triangles of the unmoved tool."""
+        """Return vertices, shape (n, 3), and triangles, shape (m, 3), of the unmoved tool."""
         return self._swept(self.profile.outline())
 
     def to_stl(self, file: Any, wall: float) -> None:
-        """Write the tool as a closed solid, binary STL: a mould with a wall below its lowest point.
-
-        An extruded tool cannot be written.
+        """Write the tool as a closed solid in a binary STL file, with a flat bottom below its lowest point.
 
         Args:
-            file: path of the file.
-            wall: thickness of the mould below its lowest point, length.
+            file: path of the STL file.
+            wall: distance of the flat bottom from the lowest point of the profile, length.
 
         Raises:
-            InputError: the profile is not open, from r > 0 to r = 0.
+            InputError: the tool is extruded, or its profile does not lead from r > 0 to r = 0.
         """
         outline, wall = self.profile.outline(), positive("to_stl: wall", wall)
         if self.kind == "extruded" or outline[-1, 0] != 0 or outline[0, 0] <= 0:
@@ -179,7 +202,14 @@ class Swept(SolidTool):
         write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the surface over points (r, z) of a profile."""
+        """Return vertices and triangles of the surface that a polyline sweeps.
+
+        Args:
+            outline: points (r, z) of the polyline, shape (k, 2), length.
+
+        Returns:
+            Vertices, shape (n, 3), length; vertex numbers of the triangles, shape (m, 3).
+        """
         rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]
         row = np.arange(m * n).reshape(m, n)
@@ -187,7 +217,7 @@ class Swept(SolidTool):
         return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
 
     def _ring(self, r: float) -> np.ndarray:
-        """Return the curve at r, shape (n, 2)."""
+        """Return the curve of constant r in the plane of x and y as a polyline, shape (n, 2), length."""
         turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2
@@ -208,82 +238,17 @@ class Swept(SolidTool):
         return f"{self.kind}({self.profile!r}{options})"
 
 
-class Triangulated(SolidTool):
-    """Closed surface of triangles that look outward; the distance is VTK's exact one, its sign from the normals.
+def revolved(profile: Tool) -> Swept:
+    """Return the rigid tool that a profile forms by revolution about the axis x = y = 0.
 
     Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        name: name of its file.
-
-    Attributes:
-        name: name of its file.
-        triangles: number of triangles.
-        volume: volume of its bodies, length^3; a volume that two bodies share counts twice.
-        middle: mean of its points, shape (3,), length.
-    """
-
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
-        self._points, self._triangles, self.name = points, triangles, name
-        self._groups = apart(points, triangles, f"solid: {name!r}")
-        self._implicit: list[Any] = []
-        self.triangles, self.volume = len(triangles), round(volume(points, triangles), 12)
-        self.middle = points.mean(0)
-
-    def _distance(self, x):
-        """Return the signed distance of points x from the tool in its initial position, shape (n,), length."""
-        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkDoubleArray
-        if not self._implicit:
-            self._implicit = [_implicit(self._points, group) for group in self._groups]
-        if not len(x):
-            return np.zeros(0)
-        given, found = numpy_to_vtk(np.ascontiguousarray(x), deep=True), np.full(len(x), -np.inf)
-        for implicit in self._implicit:
-            out = vtkDoubleArray()
-            implicit.FunctionValue(given, out)
-            np.maximum(found, -vtk_to_numpy(out), out=found)
-        return found
-
-    def _surface(self):
-        """Return points and triangles of the unmoved tool."""
-        return self._points, self._triangles
-
-    def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
-        """Compute undercuts and draft of a mould along a direction.
-
-        Faces that look into the hull of the tool, and lie in no other of its bodies, are examined.
-
-        Args:
-            along: the direction, shape (3,).
-
-        Returns:
-            {"undercut_area": area of faces that look against the direction, length^2, "least_draft": smallest angle of
-            the others to it, degrees (90 for a floor)}.
-        """
-        from scipy.spatial import ConvexHull
-        way = direction("undercuts: along", along)
-        corners = self._points[self._triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1) / 2
-        hull = ConvexHull(self._points).equations
-        depth = -(corners.mean(1) @ hull[:, :3].T + hull[:, 3]).max(1)
-        near = 1e-6 * np.ptp(self._points, axis=0).max()
-        inner = (depth > near) & (self._distance(corners.mean(1) + near * normal / (2 * area[:, None])) <= 0)
-        draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
-        under = inner & (draft < -0.01)
-        return {"undercut_area": float(area[under].sum()),
-                "least_draft": float(draft[inner & ~under].min(initial=90.0))}
-
-    def __repr__(self) -> str:
-        return f"solid({self.name!r})"
-
-
-def revolved(profile: Tool) -> Swept:
-    """Return the tool of revolution of a profile about the axis x = y = 0.
+        profile: profile in the plane (r, z), such as `fx.tools.sphere(...)`.
 
     Returns:
         The tool.
+
+    Raises:
+        InputError: the profile is no tool of the plane.
 
     >>> ball = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=0.0))
     >>> ball.bounds.round(6).tolist()
@@ -293,10 +258,17 @@ def revolved(profile: Tool) -> Swept:
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
-    """Return the tool of a profile (r, z) extruded along y, with r = x, or along x, with r = y.
+    """Return the rigid tool that a profile forms by extrusion along y or x.
+
+    Args:
+        profile: profile in the plane (r, z), such as `fx.tools.sphere(...)`.
+        along: "y": r of the profile is x; "x": r is y.
 
     Returns:
         The tool.
+
+    Raises:
+        InputError: the profile is no tool of the plane, or `along` is another axis.
 
     >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
     [-1.0]
@@ -344,106 +316,3 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
         return Swept(Tool([*points[:1:-1], (r, mouth), (r, mouth + depth)], [0.0, fillet, 0.0, 0.0]), "box", (a, b),
                      corner)
     return Swept(Tool(points, [0.0, non_negative("box: lip", lip), fillet, 0.0]), "box", (a, b), corner)
-
-
-def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False) -> Triangulated:
-    """Return a tool from an STL file, binary or text, with one or more closed surfaces.
-
-    Args:
-        file: path of the file.
-        scale: file's unit of length over the sheet's: 25.4 for a file in inches and a sheet in mm.
-        inverted: True if the triangles look inward.
-
-    Returns:
-        The tool.
-
-    Raises:
-        InputError: the file cannot be read, or is no closed surface whose triangles look outward; the message says
-            where it is open.
-
-    >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
-    >>> cup.to_stl("mould.stl", wall=5.0)
-    >>> mould = fx.tools.solid("mould.stl")
-    >>> mould.triangles, round(mould.undercuts()["least_draft"], 1)
-    (768, 5.0)
-    """
-    name = os.fspath(place("solid: file", file))
-    points, triangles = merged(*_read(name))
-    points = points * positive("solid: scale", scale)
-    _check_closed(points, triangles, f"solid: {name!r}")
-    if instance("solid: inverted", inverted, bool, "True or False"):
-        triangles = triangles[:, ::-1]
-    if volume(points, triangles) <= 0:
-        raise InputError(f"solid: {name!r} is inside out: its triangles look inward: use inverted={not inverted}")
-    return Triangulated(points, triangles, os.path.basename(name))
-
-
-def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate.
-
-    Returns:
-        Points and triangles.
-    """
-    size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
-    _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
-    triangles = same.ravel()[triangles]
-    a, b, c = triangles.T
-    return points[first], triangles[(a != b) & (b != c) & (c != a)]
-
-
-def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return points and triangles of an STL file."""
-    try:
-        with open(name, "rb") as stream:
-            data = stream.read()
-    except OSError as error:
-        raise InputError(f"solid: {name!r} cannot be read: {error}") from None
-    n = int(np.frombuffer(data[80:84], "<u4")[0]) if len(data) >= 84 else -1
-    if len(data) == 84 + 50 * n:
-        rows = np.frombuffer(data[84:], dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-        points = rows["corners"].astype(float).reshape(-1, 3)
-    else:
-        words = data.split()
-        at = [k for k, word in enumerate(words) if word.lower() == b"vertex"]
-        try:
-            points = np.array([[float(w) for w in words[k + 1:k + 4]] for k in at]).reshape(-1, 3)
-        except ValueError:
-            raise InputError(f"solid: {name!r} is no STL file: a vertex is not three numbers") from None
-    if len(points) < 12 or len(points) % 3 or not np.isfinite(points).all():
-        raise InputError(f"solid: {name!r} is no STL file of a solid: it has {len(points)} corners of triangles, which"
-                         f" must be finite and at least 12")
-    return points, np.arange(len(points)).reshape(-1, 3)
-
-
-def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """Raise an InputError unless each edge belongs to two triangles with opposite directions."""
-    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    sense = np.zeros(len(edges))
-    np.add.at(sense, which.ravel(), np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
-    for bad, words in ((times == 1, "is open: {n} edges have a triangle on one side only, one at {at}: close the holes"
-                                    " where it was drawn"),
-                       (times % 2 == 1, "has {n} edges with an odd number of triangles, one at {at}: it crosses itself,"
-                                        " or holds a sheet without thickness"),
-                       (sense != 0, "has triangles that look the other way than their neighbours, at {n} edges, one at"
-                                    " {at}: let the program that wrote it unify its normals")):
-        if bad.any():
-            x = points[edges[np.argmax(bad)]].mean(0)
-            at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
-            raise InputError(f"{caller} {words.format(n=int(bad.sum()), at=at)}")
-
-
-def _implicit(points: np.ndarray, triangles: np.ndarray) -> Any:
-    """Return VTK's distance from the surface, negative inside."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
-    where, cells, surface, found = vtkPoints(), vtkCellArray(), vtkPolyData(), vtkImplicitPolyDataDistance()
-    where.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    rows = np.column_stack([np.full(len(triangles), 3), triangles]).astype(np.int64).ravel()
-    cells.SetCells(len(triangles), numpy_to_vtkIdTypeArray(rows, deep=True))
-    surface.SetPoints(where)
-    surface.SetPolys(cells)
-    found.SetInput(surface)
-    return found

@@ -1,22 +1,24 @@
-r"""Scene in three dimensions as a membrane: triangles of a flat sheet that deform, with the thickness as data.
+r"""Forms of a membrane in three dimensions: a flat sheet of triangles that deforms, with its thickness as data.
 
-With the columns f1 and f2 of the deformation gradient of the sheet, the deformation gradient of the incompressible
-material is, up to a rotation,
+With the columns f1 and f2 of the deformation gradient of the mid-surface, shape (3, 2), the deformation gradient of the
+incompressible material is, up to a rotation,
 
 .. math::
     F = \begin{pmatrix} |f_1| & f_1 \cdot f_2 / |f_1| & 0 \\ 0 & J / |f_1| & 0 \\ 0 & 0 & 1 / J \end{pmatrix},
     \qquad J = |f_1 \times f_2|
 
-It has the block structure of a section, so every material accepts it. Displacements are linear in each triangle: P2
-gains nothing on a polygonal rim, and lumps no area to vertices. A flat unstretched membrane has no stiffness normal to
-itself. A very small stiffness of the displacement gradient keeps the tangent regular there.
+It has the block structure of a two-dimensional section, so every material accepts it. Displacements are linear in each
+triangle. Quadratic elements gain nothing at a polygonal rim, and give vertices no tributary area. A flat unstretched
+membrane has no stiffness normal to itself. A very small stiffness of the displacement gradient keeps its tangent
+regular.
 
 In compression a membrane wrinkles. With `Membrane(wrinkles=c)` its energy is
 
 .. math:: c W + (1 - c) W_r
 
-with the relaxed energy W_r of tension-field theory (Pipkin, IMA J. Appl. Math. 36 (1986) 85). Where l2 is below the
-stretch l1^(-1/2) of simple tension, W_r is the energy at that stretch; where l1 < 1 it is 0.
+with the energy W of the material and the relaxed energy W_r of tension-field theory (Pipkin, IMA J. Appl. Math. 36
+(1986) 85). The principal stretches in the surface are l1 >= l2. Where l2 is below the stretch l1^(-1/2) of simple
+tension, W_r is the energy at that stretch; where l1 < 1 it is 0.
 """
 
 from __future__ import annotations
@@ -39,24 +41,24 @@ _REGULAR = 1e-7
 
 
 class Surface(Formulation):
-    """Forms of a sheet in three dimensions; the only field is its displacement.
+    """Residual forms of a membrane in three dimensions; the only unknown field is the displacement.
 
     Attributes:
-        thicknesses: {layer: reference thickness (`Function`, length)}.
+        thicknesses: {layer: reference thickness as a `Function`, length}.
     """
 
     slack_at_rest = True
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the reference normal of a face and the measure of the surface.
+        """Return the reference normal of a face of the sheet, and the UFL measure of integrals over the sheet.
 
         Args:
             name: "top", towards +z, or "bottom", towards -z.
-            quadrature_degree: not used.
+            quadrature_degree: not used; the degree is 1.
 
         Returns:
-            Normal (UFL, shape (3,)) and measure.
+            Normal (UFL, shape (3,)), and the measure over the reference area.
         """
         return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
 
@@ -97,25 +99,25 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return a check that always holds, since a surface has J > 0.
+        """Return the check of the volume ratio in a step, which a membrane always passes since J > 0.
 
         Returns:
-            The check.
+            A check that holds in every state.
         """
         return _Always()
 
     def set_stiff(self) -> None:
-        """Set a small stretch in all directions: its tension makes the tangent regular, see `Formulation.set_stiff`."""
+        """Set the unknowns to a small stretch in all directions, whose tension makes the tangent regular."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
-        """Return the linear form of the tributary areas of the nodes.
+        """Return the linear form whose assembly gives the tributary areas of the nodes.
 
         Args:
-            deformed: True for deformed areas.
+            deformed: True for deformed areas, False for reference areas.
 
         Returns:
-            Linear form (UFL, rank 1); its entry at the first component of a node is the tributary area, length^2.
+            Linear form (UFL); its entry at the first component of a node is the tributary area, length^2.
         """
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
@@ -135,7 +137,7 @@ class Surface(Formulation):
         return sum(self.thicknesses.values())
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient in a basis of the tangent plane."""
+        """Return the deformation gradient of the incompressible membrane up to a rotation (UFL, shape (3, 3))."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (ufl.as_vector([F[i, k] for i in range(3)]) for k in (0, 1))
         n = ufl.cross(f1, f2)
@@ -160,20 +162,25 @@ class Surface(Formulation):
 
 
 class _Always:
-    """Replacement of `Admissible` for a membrane."""
+    """Check of the volume ratio that always holds, in place of `Admissible`: a membrane has J > 0."""
 
     def holds(self) -> bool:
+        """Return True."""
         return True
 
     def furthest_volume_ratio(self) -> None:
+        """Return None: the volume of a membrane is constant."""
         return None
 
 
 def relaxed(F: Any) -> Any:
-    """Return the deformation gradient whose energy is the relaxed one, in principal axes where the membrane wrinkles.
+    """Return the deformation gradient whose energy is the relaxed energy of tension-field theory.
+
+    It is F where the membrane is taut, else simple tension in principal axes, or no deformation under compression in
+    both directions.
 
     Args:
-        F: deformation gradient of `Surface` (UFL, shape (3, 3)).
+        F: deformation gradient of a membrane up to a rotation (UFL, shape (3, 3)), see `Surface`.
 
     Returns:
         Deformation gradient (UFL, shape (3, 3)).
@@ -181,27 +188,27 @@ def relaxed(F: Any) -> Any:
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
     squared = ((C11 - C22) / 2) ** 2 + C12**2
-    apart = ufl.sqrt(ufl.conditional(ufl.lt(squared, 1e-24), 1e-24, squared))       # finite where stretches coincide
-    largest = (C11 + C22) / 2 + apart                                               # l1^2
+    half = ufl.sqrt(ufl.conditional(ufl.lt(squared, 1e-24), 1e-24, squared))       # finite where stretches coincide
+    largest = (C11 + C22) / 2 + half                                               # l1^2
     taut = ufl.Or(ufl.gt(J**2, ufl.sqrt(largest)), ufl.lt(squared, 1e-24))          # l2 > l1^(-1/2)
     taut = ufl.And(taut, ufl.gt(largest, 1))
     l1 = ufl.sqrt(ufl.conditional(ufl.gt(largest, 1), largest, 1))
     l2 = 1 / ufl.sqrt(l1)
 
     def either(a: Any, b: Any) -> Any:
-        """Return a where the membrane is taut, else b."""
+        """Return expression a where the membrane is taut, else expression b."""
         return ufl.conditional(taut, a, b)
     return ufl.as_tensor([[either(F[0, 0], l1), either(F[0, 1], 0), 0], [0, either(F[1, 1], l2), 0],
                           [0, 0, either(F[2, 2], l2)]])
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of compression of a membrane.
+    """Return the mask of the points at which a membrane is in compression, and therefore wrinkles.
 
     Args:
-        stretches: principal stretches, the larger first, shape (n, 2).
+        stretches: principal stretches l1, l2 in the surface at n points, the larger first, shape (n, 2).
 
     Returns:
-        Mask, shape (n,).
+        Mask, shape (n,), True where l2 < l1^(-1/2) or l1 < 1.
     """
     return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)

@@ -1,4 +1,4 @@
-"""Wall of a part in three dimensions for each triangle, along a cut, and the deformation of a printed grid."""
+"""Wall thickness of a part in three dimensions in each triangle and along a cut, and a grid printed on the sheet."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .surface import wrinkled
 
 @dataclass(frozen=True, repr=False)
 class WallInSpace(Sheet):
-    """Wall of m triangles in one state, the same on all ranks.
+    """Wall thickness of a sheet of m triangles and n nodes in one state of a run; the same on all ranks.
 
     Attributes:
         rest: reference positions of the n nodes, shape (n, 3), length.
         now: deformed positions of the nodes, shape (n, 3), length.
         triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
-        layers: {name: reference thickness in the middle of each triangle, shape (m,)}.
+        layers: {layer: reference thickness in the middle of each triangle, shape (m,), length}.
         comm: MPI communicator of the run.
     """
 
@@ -46,12 +46,15 @@ class WallInSpace(Sheet):
 
     @property
     def thickness_at_rest(self) -> np.ndarray:
-        """Reference thickness of all layers, shape (m,), length."""
+        """Reference thickness of all layers together in each triangle, shape (m,), length."""
         return np.sum(list(self.layers.values()), axis=0)
 
     @property
     def ratio(self) -> np.ndarray:
-        """Deformed over reference thickness, shape (m,): reference over deformed area, as the volume is constant."""
+        """Deformed over reference thickness of each triangle, shape (m,).
+
+        It equals the reference area over the deformed area, as the volume is constant.
+        """
         return self.area_at_rest / self.area
 
     @property
@@ -61,12 +64,12 @@ class WallInSpace(Sheet):
 
     @cached_property
     def middle(self) -> np.ndarray:
-        """Deformed position of the middle of each triangle, shape (m, 3), length."""
+        """Deformed position of the centroid of each triangle, shape (m, 3), length."""
         return self.now[self.triangles].mean(1)
 
     @cached_property
     def stretches(self) -> np.ndarray:
-        """Principal stretches in the surface, the larger first, shape (m, 2)."""
+        """Principal stretches of each triangle in the surface, the larger first, shape (m, 2)."""
         a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
         inverse = np.linalg.inv(a[..., :COORDINATES])  # the sheet is flat in the reference configuration
         F = np.einsum("mij,mjk->mki", inverse, b)
@@ -74,17 +77,17 @@ class WallInSpace(Sheet):
 
     @property
     def wrinkled(self) -> np.ndarray:
-        """Mask of triangles in compression, shape (m,): a membrane wrinkles there."""
+        """Mask of the triangles in compression, in which a membrane wrinkles, shape (m,)."""
         return wrinkled(self.stretches)
 
     @cached_property
     def at_nodes(self) -> np.ndarray:
-        """The wall at the nodes, shape (n,), length: of the triangles around each, by their areas."""
+        """Wall thickness at the nodes, shape (n,), length: mean of the adjacent triangles, see `to_nodes`."""
         return self.to_nodes(self.wall)
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the files: {name: values, shape (m,)}."""
+        """Columns of the written file, with a row for each triangle: {name: values, shape (m,)}."""
         X, x = self.rest[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
         return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
@@ -93,27 +96,27 @@ class WallInSpace(Sheet):
                 **(each if len(each) > 1 else {})}
 
     def at(self, x: float, y: float) -> float:
-        """Return the wall at the node nearest to a position of the flat sheet.
+        """Return the wall thickness at the node nearest to a position on the flat sheet.
 
         Args:
-            x: reference position, length.
-            y: reference position, length.
+            x: coordinate X on the flat sheet, length.
+            y: coordinate Y on the flat sheet, length.
 
         Returns:
-            Wall, length.
+            Deformed wall thickness, length.
         """
         away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
     def around(self, point: tuple[float, float, float], radius: float) -> float:
-        """Return the mean wall ratio around a point of the part.
+        """Return the mean ratio of deformed to reference thickness around a point of the part.
 
-        The mean is weighted with the reference areas of the triangles whose middle lies within the radius. If there is
-        none, the nearest triangle counts.
+        It is the mean over the triangles whose middle lies within a radius of the point, weighted with their reference
+        areas. If there is no such triangle, the nearest one counts.
 
         Args:
-            point: deformed position (x, y, z), length.
-            radius: radius, length.
+            point: position (x, y, z) on the deformed part, length.
+            radius: largest distance of the middle of a triangle from the point, length.
 
         Returns:
             Deformed over reference thickness.
@@ -125,16 +128,17 @@ class WallInSpace(Sheet):
         return float(np.average(self.ratio[near], weights=self.area_at_rest[near]))
 
     def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
-        """Return the wall along a plane cut, from end to end.
+        """Return the wall thickness along the curve in which a plane cuts the deformed part.
 
-        Where the cut has several pieces, their arc lengths follow one another.
+        A cut may consist of several curves. The arc length of each then continues from the end of the curve before.
 
         Args:
-            point: a point of the plane (x, y, z), length.
+            point: a point (x, y, z) of the plane, length.
             normal: normal of the plane, shape (3,).
 
         Returns:
-            {"arc_length", "x", "y", "z", "wall"}, shape (k,) each, length.
+            {"arc_length", "x", "y", "z", "wall"}: arc length, deformed positions and wall thickness at the k points of
+            the cut, shape (k,) each, length.
 
         Raises:
             InputError: the plane does not meet the part.
@@ -171,15 +175,16 @@ class WallInSpace(Sheet):
         return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
 
     def printed(self, size: float) -> list[np.ndarray]:
-        """Return the deformed lines of a square grid printed on the flat sheet.
+        """Return the deformed lines of a square grid that is printed on the flat sheet.
 
-        The lines are x = i size and y = j size, with nodes where they cross edges of triangles.
+        On the flat sheet the lines are X = i size and Y = j size, with integers i and j. Each is a polyline with a
+        point where the line crosses an edge of a triangle.
 
         Args:
-            size: size of the squares, length.
+            size: edge length of the squares, length.
 
         Returns:
-            Lines, shape (k, 3) each, length.
+            Deformed polylines, shape (k, 3) each, length.
         """
         size, found = positive("printed: size", size), []
         edges = np.unique(np.sort(np.concatenate([self.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))]), 1),
@@ -202,10 +207,10 @@ class WallInSpace(Sheet):
         """Average values of triangles to nodes, weighted with the reference areas of the adjacent triangles.
 
         Args:
-            values: values of the triangles, shape (m,).
+            values: values of the m triangles, shape (m,).
 
         Returns:
-            Values at the nodes, shape (n,).
+            Values at the n nodes, shape (n,).
         """
         total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
         np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
@@ -214,14 +219,16 @@ class WallInSpace(Sheet):
 
 
 def wall_of(path: Any, state: Any) -> WallInSpace:
-    """Return the wall in a state, in an order of nodes and triangles that does not depend on ranks; collective.
+    """Return the wall thickness of a sheet in a state; collective.
+
+    The order of nodes and triangles does not depend on the number of ranks.
 
     Args:
         path: the computed `Path`.
         state: a `State` of the path.
 
     Returns:
-        The wall.
+        Wall thickness of each triangle, with the positions of the nodes.
     """
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
@@ -246,5 +253,5 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:
-    """Return half the cross product of two edges of triangles, shape (m, 3, 3): shape (m, 3)."""
+    """Return the area vectors of m triangles, shape (m, 3), length^2, for their corners, shape (m, 3, 3)."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
