@@ -64,7 +64,7 @@ def test_a_fit_finds_what_the_wall_tells(truth):
     wall, by = answer.best.derivative(part.of_path)
     J, left = by / part.wall[:, None], wall / part.wall - 1
     assert sure.covariance == pytest.approx(left @ left / 12 * np.linalg.inv(J.T @ J), rel=1e-6)
-    assert 0.004 < np.sqrt(left @ left / 12) < 0.02 and sure.not_told == sure.not_told_apart == []
+    assert 0.004 < np.sqrt(left @ left / 12) < 0.02 and sure.undetermined == sure.indistinguishable == []
     assert "deviation, rms" in str(answer) and "thickness" in str(sure)
     assert "measured" in [line.get_label() for line in answer.plot_wall().lines]
 
@@ -73,11 +73,11 @@ def test_what_the_wall_does_not_tell(truth):
     """Blown to a height, stiffness has no effect; two thicknesses that only their sum changes cannot be told apart."""
     part = noisy(truth, 0.01)
     sure = fx.Design(cap, RANGES | {"scale": (1.0, 0.5, 2.0)}).fit(wall=part, start=TRUE, runs=1).confidence
-    assert sure.not_told == ["scale"] and "does not tell scale" in str(sure)
+    assert sure.undetermined == ["scale"] and "does not tell scale" in str(sure)
     apart = fx.Design(lambda sheet, film, height: cap(sheet + film, height), {
         "sheet": (0.45, 0.1, 0.8), "film": (0.1, 0.05, 0.2), "height": (7.0, 4.0, 9.0)}).fit(
             wall=part, runs=1).confidence
-    (a, b, correlation), = apart.not_told_apart
+    (a, b, correlation), = apart.indistinguishable
     assert {a, b} == {"sheet", "film"} and correlation == pytest.approx(-1, abs=1e-6)
 
 

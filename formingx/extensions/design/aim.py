@@ -1,4 +1,4 @@
-"""Target of a search for a wall thickness, and the deviation of its result from the target."""
+"""Least-squares targets of a search for a wall thickness, and the reasons why a search missed them."""
 
 from __future__ import annotations
 
@@ -13,76 +13,79 @@ from .run import DesignRun
 
 @dataclass(frozen=True)
 class Search:
-    """Weights of searches and their stopping criteria.
+    """Weights, damping and stopping criteria of the searches for design parameters.
 
     Attributes:
-        held: weight of a prescribed volume, relative to relative wall thicknesses.
-        spare: relative reduction of the target of a prescribed volume, so that round-off does not exceed it.
-        kept: relative deviation of the volume or the minimum wall above which it is reported.
-        reached: relative deviation of the wall below which the wanted wall is reached.
-        less: a bound or the volume is reported as the reason for the end of a search by this criterion. Without it the
-            deviation would decrease below this part.
-        damped: Levenberg damping over the largest singular value of the sensitivities. Smaller effects are ignored.
-        damped_measured: Levenberg damping for the fit to a measured wall, which contains scatter.
-        worth: the search ends after two runs that each lower the sum of squares by less than this part.
-        shortest: smallest part of a step to which it is halved if the result is no better.
+        volume_weight: weight of the relative deviation of a prescribed volume; deviations of the wall have weight 1.
+        volume_margin: relative reduction of the first run's volume as a target, so that round-off does not exceed it.
+        tolerance: relative deviation of the volume or the minimum wall above which the result reports it.
+        wall_tolerance: largest relative deviation of the wall up to which the wanted wall counts as reached.
+        limiting_share: a bound or the prescribed volume is named as the reason for a deviation if the deviation would
+            be below this share without it.
+        damping: Levenberg damping over the largest singular value of the sensitivities.
+        damping_measured: the same for the fit to a measured wall, which contains scatter.
+        min_improvement: the search ends after two runs that each lower the cost by less than this part.
+        shortest_step: smallest part of a step that is tried, after halving a step that brought no improvement.
     """
 
-    held: float = 1e2
-    spare: float = 1e-6
-    kept: float = 5e-3
-    reached: float = 0.01
-    less: float = 0.8
-    damped: float = 1e-6
-    damped_measured: float = 1e-2
-    worth: float = 0.02
-    shortest: float = 1 / 64
+    volume_weight: float = 1e2
+    volume_margin: float = 1e-6
+    tolerance: float = 5e-3
+    wall_tolerance: float = 0.01
+    limiting_share: float = 0.8
+    damping: float = 1e-6
+    damping_measured: float = 1e-2
+    min_improvement: float = 0.02
+    shortest_step: float = 1 / 64
 
 
 SEARCH = Search()
 
 
 def lack(what: str, requested: float | None, found: float) -> str:
-    """Return a missed target and the value found, as text.
+    """Return a text that reports a missed target.
 
     Args:
-        what: name of the quantity.
-        requested: its target, or None.
-        found: the value found.
+        what: name of the quantity, such as "volume".
+        requested: target of the quantity, or None.
+        found: value of the quantity in the best run.
 
     Returns:
-        The text; "" if the target was met.
+        Text with the target and the value found; "" if they agree to 0.5 %, or there is no target.
     """
-    if requested is None or abs(found / requested - 1) < SEARCH.kept:
+    if requested is None or abs(found / requested - 1) < SEARCH.tolerance:
         return ""
     return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
 
 
 class WallTarget:
-    """Least-squares target of a wall: relative deviations of the wall, and of a prescribed volume.
+    """Least-squares target of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
+
+    The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
+    length of a node is its distance from the axis along the middle line of the undeformed body.
 
     Args:
-        run: the first run.
+        run: first run of the search, with k nodes on its bottom face.
         wall: wanted thickness, length: a number, a function of the reference length, or None for an even wall.
-        within: reference lengths that count, (low, high); None for all.
-        held: prescribed volume, length^3, or None.
+        within: lowest and highest reference length of the nodes that count, length; None for all.
+        volume: prescribed reference volume, length^3, or None.
 
     Attributes:
-        inside: mask of the nodes of the wall that count, shape (k,).
-        held: prescribed volume, length^3, or None.
-        wanted: wanted wall at the m nodes that count, shape (m,), length; None for an even or a measured wall.
-        measured: the `MeasuredWall`, or None.
-        damped: Levenberg damping, see `Search`.
+        inside: mask of the nodes that count, shape (k,).
+        volume: prescribed reference volume, length^3, or None.
+        wanted: wanted thickness at the m nodes that count, shape (m,), length; None for an even or a measured wall.
+        measured: the `MeasuredWall` of a fit, or None.
+        damping: Levenberg damping over the largest singular value of the sensitivities.
 
     Raises:
-        InputError: a wanted wall that is not positive at all reference lengths.
+        InputError: a wanted thickness that is not positive, or fewer than two nodes count.
     """
 
     measured: Any = None
-    damped = SEARCH.damped
+    damping = SEARCH.damping
 
-    def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, held: float | None):
-        self.inside, self.held = inside_of(run, within), held
+    def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, volume: float | None):
+        self.inside, self.volume = inside_of(run, within), volume
         self.wanted: np.ndarray | None = None
         if wall is not None:
             s = run.profile.reference_length[self.inside]
@@ -92,13 +95,19 @@ class WallTarget:
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals and their derivatives by the parameters.
+        """Return the residuals of a run and their derivatives by the n parameters.
+
+        The residuals are the relative deviations of the thickness at the m nodes that count from the wanted thickness,
+        or from the mean for an even wall. A prescribed volume appends its weighted relative deviation.
 
         Args:
-            run: the run.
+            run: a run of the search.
 
         Returns:
-            Residuals, shape (m,), and derivatives, shape (m, n).
+            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
+
+        Raises:
+            InputError: the run has no derivative.
         """
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
@@ -109,72 +118,81 @@ class WallTarget:
             slopes -= np.outer(wall / target**2, jacobian.mean(0))
         return self._with_volume(run, residual, slopes)
 
-    def _with_volume(self, run: DesignRun, left: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append the weighted residual of a prescribed volume and its derivatives."""
-        if self.held is not None:
-            grows = run.derivative("volume")[1][0] / self.held
-            weight = SEARCH.held * np.sqrt(len(left))
-            left = np.append(left, weight * (run.volume / self.held - 1))
+    def _with_volume(self, run: DesignRun, residual: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Append the weighted residual of a prescribed volume and its derivatives.
+
+        Args:
+            run: a run of the search.
+            residual: residuals of the wall, shape (m,).
+            slopes: their derivatives by the n parameters, shape (m, n).
+        """
+        if self.volume is not None:
+            grows = run.derivative("volume")[1][0] / self.volume
+            weight = SEARCH.volume_weight * np.sqrt(len(residual))
+            residual = np.append(residual, weight * (run.volume / self.volume - 1))
             slopes = np.vstack([slopes, weight * grows])
-        return left, slopes
+        return residual, slopes
 
     def cost(self, run: DesignRun) -> float:
-        """Return the cost of a run.
+        """Return the cost by which runs of a search are compared.
 
-        It is the mean square of the relative deviations of the wall, plus the square of the volume's relative
-        deviation.
+        It is the mean square of the relative deviations of the wall, plus the square of the relative deviation of a
+        prescribed volume.
 
         Args:
-            run: the run.
+            run: a run of the search.
 
         Returns:
-            The cost.
+            Cost, dimensionless; the best run has the lowest.
         """
         wall = run.wall[self.inside]
-        left = np.mean((wall / (wall.mean() if self.wanted is None else self.wanted) - 1) ** 2)
-        return float(left + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
+        residual = np.mean((wall / (wall.mean() if self.wanted is None else self.wanted) - 1) ** 2)
+        return float(residual + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return the deviation of the best run from the wanted wall, and the reason for the end of the search.
+        """Return a text that reports the deviation of the best run from the wanted wall, and its reason.
 
         Args:
-            run: the best run.
+            run: best run of the search.
 
         Returns:
-            The text; "" if the wall was reached.
+            The text; "" if all deviations are below 1 %, or no wall was wanted.
         """
         if self.wanted is None:
             return ""
         wall = run.wall[self.inside]
         deviation = wall / self.wanted - 1
         worst = int(np.argmax(np.abs(deviation)))
-        if abs(deviation[worst]) < SEARCH.reached:
+        if abs(deviation[worst]) < SEARCH.wall_tolerance:
             return ""
         s = run.profile.reference_length[self.inside]
         return (f"the wanted wall was not reached: wanted {_range(self.wanted)}, reached {_range(wall)}; the largest"
                 f" deviation is {100 * deviation[worst]:+.3g} %, at reference length {s[worst]:.4g}."
-                f" {self._stop(run)}.")
+                f" {self._limits(run)}.")
 
-    def _stop(self, run: DesignRun) -> str:
-        """Return the bounds or the prescribed volume that prevent the wanted wall, predicted by the derivatives."""
+    def _limits(self, run: DesignRun) -> str:
+        """Return a sentence that names the bounds or the prescribed volume that prevent the wanted wall.
+
+        The derivatives of the run predict the deviation without them.
+        """
         try:
-            left, sensitivity = self.residual(run)
+            residual, jacobian = self.residual(run)
         except InputError as error:
             return f"No further step is known: {error}"
         p = run.parameters
         low, high = (p.low - run.vector) / p.size - 1e-12, (p.high - run.vector) / p.size + 1e-12
-        m = len(self.wanted) if self.wanted is not None else len(left)
+        m = len(self.wanted) if self.wanted is not None else len(residual)
         far = np.full(len(p.size), np.inf)
-        now, step = _deviation(left, sensitivity * p.size, m, low, high)
-        free = _deviation(left[:m], sensitivity[:m] * p.size, m, low, high)[0] if self.held is not None else now
-        unbounded = _deviation(left, sensitivity * p.size, m, -far, far)[0]
+        now, step = _deviation(residual, jacobian * p.size, m, low, high)
+        free = _deviation(residual[:m], jacobian[:m] * p.size, m, low, high)[0] if self.volume is not None else now
+        unbounded = _deviation(residual, jacobian * p.size, m, -far, far)[0]
         met = np.minimum(step - low, high - step) <= 1e-6 * (high - low)
         names = ", ".join(name for name, at_bound in zip(p.names, met) if at_bound)
         stops = []
-        if free < SEARCH.less * now and self.held is not None:
-            stops.append(f"the volume, which is held at {self.held:.5g} (volume=None would leave {100 * free:.2g} % of"
-                         f" deviation on the mean)")
-        if unbounded < SEARCH.less * now and names:
+        if free < SEARCH.limiting_share * now and self.volume is not None:
+            stops.append(f"the volume, which is held at {self.volume:.5g} (volume=None would leave {100 * free:.2g} %"
+                         f" of deviation on the mean)")
+        if unbounded < SEARCH.limiting_share * now and names:
             stops.append(f"bounds: {names} (wider ones would leave {100 * unbounded:.2g} %)")
         if stops:
             return f"It is stopped by {'; '.join(stops)}; now it is {100 * now:.2g} %"
@@ -182,74 +200,93 @@ class WallTarget:
 
 
 class MeasuredWallTarget(WallTarget):
-    """Least-squares target of a measured wall: relative deviations at the measured points of the part.
+    """Least-squares target of a search whose runs are fitted to a measured wall, and possibly to a prescribed volume.
+
+    The residuals are the relative deviations of the wall at the measured points of the part.
 
     Args:
-        run: the first run.
-        measured: a `MeasuredWall`.
-        held: prescribed volume, length^3, or None.
+        run: first run of the search.
+        measured: a `MeasuredWall` with m points.
+        volume: prescribed reference volume, length^3, or None.
     """
 
-    damped = SEARCH.damped_measured
+    damping = SEARCH.damping_measured
 
-    def __init__(self, run: DesignRun, measured: Any, held: float | None):
-        super().__init__(run, None, None, held)
+    def __init__(self, run: DesignRun, measured: Any, volume: float | None):
+        super().__init__(run, None, None, volume)
         self.measured = measured
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals and their derivatives by the parameters.
+        """Return the residuals of a run and their derivatives by the n parameters.
+
+        The residuals are the relative deviations of the wall from the measured wall at the m points. A prescribed
+        volume appends its weighted relative deviation.
 
         Args:
-            run: the run.
+            run: a run of the search.
 
         Returns:
-            Residuals, shape (m,), and derivatives, shape (m, n).
+            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
+
+        Raises:
+            InputError: the run has no derivative.
         """
         wall, jacobian = run.derivative(self.measured.of_path)
         return self._with_volume(run, wall / self.measured.wall - 1, jacobian / self.measured.wall[:, None])
 
     def cost(self, run: DesignRun) -> float:
-        """Return the cost of a run.
+        """Return the cost by which runs of a search are compared.
 
-        It is the mean square of the relative deviations of the wall, plus the square of the volume's relative
-        deviation.
+        It is the mean square of the relative deviations from the measured wall, plus the square of the relative
+        deviation of a prescribed volume.
 
         Args:
-            run: the run.
+            run: a run of the search.
 
         Returns:
-            The cost.
+            Cost, dimensionless; the best run has the lowest.
         """
-        left = self.measured.of_path(run.path) / self.measured.wall - 1
-        return float(np.mean(left**2) + (0.0 if self.held is None else (run.volume / self.held - 1) ** 2))
+        residual = self.measured.of_path(run.path) / self.measured.wall - 1
+        return float(np.mean(residual**2) + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
 
 def _deviation(residual: np.ndarray, jacobian: np.ndarray, m: int, low: np.ndarray,
                high: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the root mean square of the first m residuals after the best step within bounds, and that step."""
+    """Return the smallest deviation that a linearised step within bounds can reach, and the step.
+
+    Args:
+        residual: residuals before the step, shape (k,).
+        jacobian: their derivatives by the n scaled parameters, shape (k, n).
+        m: number of residuals that belong to the wall.
+        low: lower bounds of the step, shape (n,).
+        high: upper bounds of the step, shape (n,).
+
+    Returns:
+        Root mean square of the first m residuals after the step; the step, shape (n,).
+    """
     from scipy.optimize import lsq_linear
     step = lsq_linear(jacobian, -residual, bounds=(low, high)).x
     return float(np.sqrt(np.mean((residual + jacobian @ step)[:m] ** 2))), step
 
 
 def _range(values: np.ndarray) -> str:
-    """Return the mean of values as text, with their range if they differ."""
+    """Return the mean of wall thicknesses as text, with the lowest and the highest if they differ."""
     low, high = values.min(), values.max()
     return f"{values.mean():.4g}" + (f" on the mean ({low:.4g} to {high:.4g})" if high - low > 1e-9 * high else "")
 
 
 def inside_of(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    """Return the mask of the nodes of the wall that count.
+    """Return the mask of the nodes of the bottom face whose reference lengths lie in a range.
 
     Args:
-        run: the run.
-        within: reference lengths (low, high), or None for all.
+        run: a run with k nodes on its bottom face.
+        within: lowest and highest reference length, length; None for all nodes.
 
     Returns:
         Mask, shape (k,).
 
     Raises:
-        InputError: fewer than two nodes count.
+        InputError: fewer than two nodes lie in the range.
     """
     s = run.profile.reference_length
     if within is None:

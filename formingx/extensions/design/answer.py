@@ -1,4 +1,4 @@
-"""Result of a design search: the first and the best run, and the confidence of the parameters."""
+"""Result of a search for design parameters: the first and the best run, and the confidence of the parameters."""
 
 from __future__ import annotations
 
@@ -20,32 +20,34 @@ _SCATTER = 6e-5
 
 
 def unevenness(wall: np.ndarray) -> float:
-    """Return the standard deviation of the wall over its mean.
+    """Return the standard deviation of wall thicknesses over their mean.
 
     Args:
-        wall: thicknesses, shape (k,), length.
+        wall: thicknesses at k nodes, shape (k,), length.
 
     Returns:
-        The ratio.
+        The ratio, dimensionless; 0 for an even wall.
     """
     return float(wall.std() / wall.mean())
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Result of a design search; print it.
+    """Result of a search for design parameters (`Design.fit`, `Design.minimum_weight`); its text is a report.
+
+    Walls are thicknesses at the k nodes of the bottom face.
 
     Attributes:
-        before: the first `DesignRun`.
-        best: the best `DesignRun`.
+        before: the first `DesignRun` of the search.
+        best: the best `DesignRun` of the search.
         runs: all successful runs, in order.
-        failed: error messages of the other runs.
-        inside: mask of the nodes of the wall that count, shape (k,).
+        failed: error messages of the failed runs.
+        inside: mask of the nodes that count in the search, shape (k,).
         why: reason for the end of the search, as text.
-        predicted: wall of the best run as predicted by the run before it, shape (k,), length.
-        lack: targets that were missed (volume, wall or minimum wall) and the reason, as text, or "".
-        wanted: wanted wall at the m nodes that count, shape (m,), length, or None.
-        measured: the `MeasuredWall` of the fit, or None.
+        predicted: wall of the best run as predicted by the derivatives of the run before it, shape (k,), length.
+        lack: text that names the missed targets (volume, wall or minimum wall) and the reason; "" if all were met.
+        wanted: wanted wall at the m nodes that count, shape (m,), length; None if no wall was wanted.
+        measured: the `MeasuredWall` of a fit, or None.
     """
 
     before: DesignRun
@@ -61,7 +63,7 @@ class Answer:
 
     @cached_property
     def confidence(self) -> Confidence:
-        """Confidence of the parameters after a fit to a measured wall.
+        """Standard errors and covariance of the parameters after a fit to a measured wall.
 
         Raises:
             InputError: the fit used no measured wall, or a wall with no more points than parameters.
@@ -72,24 +74,24 @@ class Answer:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Values of the parameters, by name."""
+        """Values of the parameters in the best run: {parameter: number or `Knots`}."""
         return self.best.values
 
     @property
     def paths(self) -> int:
-        """Number of runs, including the failed ones."""
+        """Number of runs that the search took, including the failed ones."""
         return len(self.runs) + len(self.failed)
 
     @property
     def cv(self) -> tuple[float, float]:
-        """Standard deviation over mean of the wall, (before, after)."""
+        """Standard deviation over mean of the wall at the nodes that count, in the first and in the best run."""
         return unevenness(self.before.wall[self.inside]), unevenness(self.best.wall[self.inside])
 
     def at_bounds(self) -> list[str]:
-        """Return the parameters that lie on a bound, as text.
+        """Return the parameters of the best run that lie on a bound.
 
         Returns:
-            A text for each such parameter.
+            A text for each such parameter, with its name, the bound and the value.
         """
         p, v = self.best.parameters, self.best.vector
         near = 1e-6 * p.size
@@ -97,24 +99,25 @@ class Answer:
                 for name, x, a, b, h in zip(p.names, v, p.low, p.high, near) if x <= a + h or x >= b - h]
 
     def without_effect(self) -> list[str]:
-        """Return the names of the parameters without effect.
+        """Return the names of the parameters without effect on the wall.
 
-        Their whole range changes the wall, as predicted by the derivatives, by less than its scatter.
+        By the derivatives of the first run, the whole range of such a parameter changes the wall by less than 6e-5 of
+        its mean. Walls of runs with different steps scatter by as much.
 
         Returns:
-            The names.
+            Names of the parameters.
         """
         jacobian = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
         return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < _SCATTER]
 
     def attainable(self) -> float:
-        """Return the lowest unevenness that the parameters can reach within their bounds, for any volume.
+        """Return the lowest unevenness of the wall that the parameters can reach within their bounds, for any volume.
 
         The derivatives of the best run predict it.
 
         Returns:
-            Standard deviation of the wall over its mean.
+            Standard deviation over mean of the wall at the nodes that count.
         """
         from scipy.optimize import lsq_linear
         p, v, (wall, jacobian) = self.best.parameters, self.best.vector, self.best.derivative("wall")
@@ -125,7 +128,7 @@ class Answer:
 
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
-        off = abs(self.predicted - self.best.wall)[self.inside].max() / after.mean()
+        deviation = abs(self.predicted - self.best.wall)[self.inside].max() / after.mean()
         lines = [f"{self.paths} runs" + f", of which {len(self.failed)} failed" * bool(self.failed) + f"; {self.why}",
                  f"{'':24}{'before':>12}{'after':>12}",
                  f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",
@@ -141,7 +144,7 @@ class Answer:
             lines.insert(2, f"{'deviation, rms, %':24}{a:12.4g}{b:12.4g}")
         p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
-        lines += [f"the run before predicted the wall to {100 * off:.2g} %"]
+        lines += [f"the run before predicted the wall to {100 * deviation:.2g} %"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(absent)}" for absent in [self.without_effect()] if absent]
         lines += [f"the best run: {found.text}" for found in alarming(self.best.path.findings())]
@@ -150,7 +153,7 @@ class Answer:
     __repr__ = __str__
 
     def plot_wall(self, axes: Any = None) -> Any:
-        """Draw the first, the best and the wanted wall over the reference length.
+        """Draw the walls of the first and the best run, and the wanted or measured wall, over the reference length.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -178,14 +181,15 @@ class Answer:
                units: Units | None = None) -> FilePath:
         """Write an HTML report of the search (rank 0 writes).
 
-        It shows the walls before and after, the profiles, the confidence, and the effect of each parameter on the wall.
+        It shows the part, the walls and the profiles of the first and the best run, and the effect of each parameter on
+        the wall.
 
         Args:
-            file: path of the file.
+            file: path of the HTML file.
             title: heading of the page.
-            deviations: as in `DesignRun.spread`. Adds the standard deviation to the wall, and a table with the standard
-                deviations of wall, volume, pressures and forces.
-            units: a `formingx.Units`, for the labels.
+            deviations: standard deviations of the parameters, as in `DesignRun.spread`. They add the standard deviation
+                to the wall, and a table with the standard deviations of wall, volume, pressures and forces.
+            units: a `formingx.Units`, for the labels; default without units.
 
         Returns:
             Path of the file.

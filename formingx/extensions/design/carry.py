@@ -1,15 +1,16 @@
-"""Transfer of perturbed runs from state to state along the base run, to its last state.
+"""Transfer of perturbed runs along the base run to its last state, for derivatives by design parameters.
 
-Without history variables the last state depends on its own equations alone, and on the end of earlier stages. With
-history variables a perturbed run stores its own states.
+The base run is the run whose derivatives are computed. A perturbed run is the same run with one parameter slightly
+changed. Without history variables only the ends of the stages are solved for. With history variables a perturbed run is
+solved at every state of the base run, and has its own history variables.
 
-The sticking position of a node depends on the time of its gap closure, which changes with the parameter. So the
-perturbed node is moved along the velocity of the base run onto its own tool, independently of the step. With the steps
-of the base run instead, derivatives were wrong by up to a factor of three.
+The sticking position of a node depends on the time of its gap closure, which changes with the parameter. So the node of
+the perturbed run is moved along the velocity of the base run onto the tool of the perturbed run, independently of the
+step. With the steps of the base run instead, derivatives were wrong by up to a factor of three.
 
-A perturbed state is compared at the same event as the state of the base run. If a gap closure ends the step and turns
-the path, the perturbed gap is closed too. At a target the perturbed run meets its own target. Elsewhere the perturbed
-state lies in the plane normal to the path of the base run.
+A perturbed state is compared with the state of the base run at the same event. If a gap closure ends the step and turns
+the path, the gap of the perturbed run is closed too. At a target the perturbed run meets its own target. Elsewhere the
+perturbed state lies in the plane normal to the path of the base run.
 """
 
 from __future__ import annotations
@@ -27,45 +28,59 @@ from ...solve.newton import Failure, fixed
 from ...solve.process import driving, end_of, next_knot, straight
 from ...solve.stage import Plan, plan
 from ...solve.state import State
-from .neighbours import PerturbedRun, settle
+from .perturbed_runs import PerturbedRun, settle
 
 
-def carry(path: Path, end: Any, neighbours: Sequence[PerturbedRun]) -> None:
-    """Solve for all perturbed runs at the last state of the base run.
+def carry(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
+    """Solve for all perturbed runs at the last state of the base run; collective.
 
     Args:
-        path: the base run.
+        path: the `Path` of the base run.
         end: the `Target` of a run with one control, or the stages of a process.
-        neighbours: the perturbed runs; their states are updated in place.
+        perturbed: the perturbed runs; their states are updated in place.
 
     Raises:
-        Failure: the run has no derivative; its text is the reason.
+        Failure: the base run has no derivative; the text of the failure is the reason.
     """
-    _StateTransfer(path, end, neighbours).run()
+    _StateTransfer(path, end, perturbed).run()
 
 
 class _StateTransfer:
-    """Transfer of the perturbed runs along the base run."""
-    def __init__(self, path: Path, end: Any, neighbours: Sequence[PerturbedRun]):
+    """Transfer of the perturbed runs along the base run.
+
+    Args:
+        path: the `Path` of the base run.
+        end: the `Target` of a run with one control, or the stages of a process.
+        perturbed: the perturbed runs; their states are updated in place.
+
+    Raises:
+        Failure: a remeshed body, contact in three dimensions, or a parameter that changes controls or tables of stages.
+    """
+
+    def __init__(self, path: Path, end: Any, perturbed: Sequence[PerturbedRun]):
         if len(path.segments) > 1:
             raise Failure("the body was remeshed", [])
         if path.ended:
             raise Failure(path.ended, [])
         if any(face.contact.lagged for face in path.problem.contacts):
             raise Failure("there is no derivative of contact in space yet", [])
-        self.path, self.neighbours = path, neighbours
+        self.path, self.runs = path, perturbed
         self.problem, self.curve = path.problem, path.record.curve
         self._single = isinstance(end, Target)
         self._plans = [] if self._single else [plan(self.problem.scene, stage) for stage in end]
         self._end = end
         self._until: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
-        for entry in neighbours:
-            entry.plans = [] if self._single else [plan(entry.problem.scene, stage) for stage in entry.end]
-            if [_kind(p) for p in entry.plans] != [_kind(p) for p in self._plans]:
-                raise Failure(f"parameter {entry.name} changes what the stages drive or how they end", [])
+        for run in perturbed:
+            run.plans = [] if self._single else [plan(run.problem.scene, stage) for stage in run.end]
+            if [_kind(p) for p in run.plans] != [_kind(p) for p in self._plans]:
+                raise Failure(f"parameter {run.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
-        """Repeat the steps of the base run with each parameter slightly changed, from its first state to its last."""
+        """Solve for the perturbed runs at the states of the base run, from its first state to its last.
+
+        Raises:
+            Failure: the base run has no derivative; the text of the failure is the reason.
+        """
         states = self.path.states
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):
@@ -80,187 +95,223 @@ class _StateTransfer:
             last = k == len(states) - 1 or states[k + 1].setting != state.setting
             begins = before is None or state.setting != before.setting
             if begins and not self._single:
-                self._enter(StepData(**state.setting))
+                self._begin_stage(StepData(**state.setting))
             if before is None:
-                self._begin(state)
+                self._start(state)
             elif state.kind == "start":
-                self._beside = state
+                self._solved = state
             elif last or history:
                 self._settle(state, before, last)
             if history:
-                for entry in self.neighbours:
-                    entry.problem.advance(entry.x, entry.control)
-                self._put_on_tools(state)
+                for run in self.runs:
+                    run.problem.advance(run.x, run.control)
+                self._copy_contact_status(state)
             before = state
         if states[-1].met is None:
             raise Failure("it did not reach its target", [])
 
-    def _begin(self, state: State) -> None:
-        """Set up the first state: the undeformed body, or the body in equilibrium with its loads."""
-        for entry in self.neighbours:
-            entry.x, entry.control = state.x.copy(), state.control
-        self._late: list[np.ndarray] = []
-        self._beside = state
+    def _start(self, state: State) -> None:
+        """Set the perturbed runs to the first state of the base run: undeformed, or in equilibrium with its loads."""
+        for run in self.runs:
+            run.x, run.control = state.x.copy(), state.control
+        self._closing: list[np.ndarray] = []
+        self._solved = state
         if np.any(state.x):
             with self.problem.state_context(replace(state, memory=state.before)):
                 constraint = fixed(state.control)
-                settle(self.curve, state, self.neighbours, constraint, [constraint] * len(self.neighbours))
+                settle(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
 
-    def _enter(self, setting: StepData) -> None:
-        """Begin a stage in each perturbed run from its current state."""
-        for entry in self.neighbours:
-            problem, p = entry.problem, entry.plans[setting.stage]
+    def _begin_stage(self, setting: StepData) -> None:
+        """Begin a stage, or a piece of a stage between two rows of its tables, in each perturbed run.
+
+        Args:
+            setting: step data of the stage in the base run.
+        """
+        for run in self.runs:
+            problem, p = run.problem, run.plans[setting.stage]
             now = problem.setting
-            started = entry.x is not None
+            started = run.x is not None
             amplitudes = [0.0] * len(now.base) if not started else [
-                *now.amplitudes(entry.control)[:-1], problem.time_at(entry.control)]
-            x = entry.x if started else np.zeros(problem.x.getLocalSize())
+                *now.amplitudes(run.control)[:-1], problem.time_at(run.control)]
+            x = run.x if started else np.zeros(problem.x.getLocalSize())
             if started:
                 for number in set(now.inactive) - set(setting.inactive):
-                    problem.bring_in(number, x, entry.control)
+                    problem.bring_in(number, x, run.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
-                time = now.base[-1] + now.rate[-1] * entry.control if started else 0.0
-                then = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
-                base, rate = straight(amplitudes, problem.scales, p.tables, time, then)
-                entry.then, control = then, 0.0
+                time = now.base[-1] + now.rate[-1] * run.control if started else 0.0
+                piece_end = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
+                base, rate = straight(amplitudes, problem.scales, p.tables, time, piece_end)
+                run.piece_end, control = piece_end, 0.0
             else:
                 base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=not p.in_flow)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
-            entry.control = control
+            run.control = control
 
     def _settle(self, state: State, before: State, last: bool) -> None:
-        """Solve for the perturbed runs at a converged state of the base run."""
+        """Solve for the perturbed runs at an accepted state of the base run.
+
+        Args:
+            state: the state of the base run.
+            before: the state of the base run before it.
+            last: True if a stage or a piece of a stage ends at the state.
+        """
         with self.problem.state_context(replace(state, memory=state.before)):
-            self._late = []
+            self._closing = []
             for number, face in enumerate(self.problem.contacts):
-                self._late.append(self._arrivals(number, face, state, before))
-            self._leave_out(state)
-            for entry in self.neighbours:                      # the perturbed runs keep the events of the base run
-                entry.x = state.x + (entry.x - self._beside.x)
-                entry.control = state.control + (entry.control - self._beside.control)
+                self._closing.append(self._arrivals(number, face, state, before))
+            self._keep_open(state)
+            for run in self.runs:                              # the perturbed runs keep the events of the base run
+                run.x = state.x + (run.x - self._solved.x)
+                run.control = state.control + (run.control - self._solved.control)
             equation, equations = self._equations(state, last)
-            left_over = settle(self.curve, state, self.neighbours, equation, equations)
-            for entry in self.neighbours if state is self.path.last else []:
-                entry.balance(left_over)
-            self._beside = state
+            residual = settle(self.curve, state, self.runs, equation, equations)
+            for run in self.runs if state is self.path.last else []:
+                run.balance(residual)
+            self._solved = state
             b = self.curve.newton.b.array_r
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
 
-    def _leave_out(self, state: State) -> None:
-        """Keep points open in the perturbed runs that are open in the base run at the end of the step."""
+    def _keep_open(self, state: State) -> None:
+        """Keep those contact points of the perturbed runs open that are open in the base run at a state."""
         n = self.problem.n_owned
-        for face, late, *others in zip(self.problem.contacts, self._late,
-                                       *(entry.problem.contacts for entry in self.neighbours)):
+        for face, closing, *others in zip(self.problem.contacts, self._closing,
+                                          *(run.problem.contacts for run in self.runs)):
             if face.present:
-                face.leave_out(late)
+                face.leave_out(closing)
                 free = ~face.law.touching(face.positions(state.x[:n], state.control), face.history)
-                for mine in others:
-                    mine.leave_out(free | late)
+                for perturbed in others:
+                    perturbed.leave_out(free | closing)
 
     def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
-        """Place the perturbed points whose gap closes in a step; return the mask of closures at its end, shape (n,)."""
+        """Move the points of the perturbed runs whose gap closes within a step to their positions of gap closure.
+
+        Args:
+            number: number of the contact face.
+            face: the contact face of the base run, with n points.
+            state: state of the base run at the end of the step.
+            before: state of the base run at the start of the step.
+
+        Returns:
+            Mask of the points whose gap closes at the end of the step, shape (n,).
+        """
         history, law, n = face.history, face.law, self.problem.n_owned
         zero = np.zeros(len(face.points), dtype=bool)
         if history is None or not law.has_friction or not face.present:
             return zero
         distance = law.distance(face.positions(state.x[:n], state.control))
         arrived = (history.distance <= -law.theta) & (distance > -law.theta)
-        late = arrived & (np.isnan(history.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
+        closing = arrived & (np.isnan(history.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
         velocity = face.moved(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
-        early = np.flatnonzero(arrived & ~late)
-        if len(early):
-            gap = law.part(early).distance(history.arrival[early])
-        for entry in self.neighbours:
-            mine, arrival = entry.problem.contacts[number], history.arrival.copy()
-            if len(early):
-                guess = mine.positions(entry.x[:n], entry.control)[early] + history.arrival[early] - start[early]
-                arrival[early] = _onto(mine.law.part(early), guess, velocity[early], gap)
-            mine.expect_arrivals(arrival)
-        return late
+        inside = np.flatnonzero(arrived & ~closing)
+        if len(inside):
+            gap = law.part(inside).distance(history.arrival[inside])
+        for run in self.runs:
+            perturbed, arrival = run.problem.contacts[number], history.arrival.copy()
+            if len(inside):
+                guess = perturbed.positions(run.x[:n], run.control)[inside] + history.arrival[inside] - start[inside]
+                arrival[inside] = _moved_to(perturbed.law.part(inside), guess, velocity[inside], gap)
+            perturbed.expect_arrivals(arrival)
+        return closing
 
-    def _put_on_tools(self, state: State) -> None:
-        """Copy the contact status of the base run to the perturbed runs.
+    def _copy_contact_status(self, state: State) -> None:
+        """Copy the contact status of the base run at a state to the perturbed runs.
 
-        Points whose gap closed at the end of the step are projected onto the tool along the velocity of the base run.
+        Points whose gap closed at the end of the step are projected onto the tool of the perturbed run, along the
+        velocity of the base run.
         """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
             if not face.law.remembers or not face.present:
                 continue
-            run = state.memory[self.problem.histories.index(face)]
-            free = run.history.distance <= -face.law.theta
-            late = np.flatnonzero(self._late[number] if self._late else 0 * free)
-            free[late] = True
-            for entry in self.neighbours:
-                mine = entry.problem.contacts[number]
-                memory = mine.get()
+            base = state.memory[self.problem.histories.index(face)]
+            free = base.history.distance <= -face.law.theta
+            closing = np.flatnonzero(self._closing[number] if self._closing else 0 * free)
+            free[closing] = True
+            for run in self.runs:
+                perturbed = run.problem.contacts[number]
+                memory = perturbed.get()
                 assert memory is not None
-                history = memory.history._replace(distance=run.history.distance,
-                                              slip=np.where(free, run.history.slip, memory.history.slip))
-                if len(late):
+                history = memory.history._replace(distance=base.history.distance,
+                                              slip=np.where(free, base.history.slip, memory.history.slip))
+                if len(closing):
                     history = history._replace(position=history.position.copy())
-                    history.position[late] = _onto(
-                        mine.law.part(late), mine.positions(entry.x[:n], entry.control)[late],
-                        self._velocity[number][late],
-                        run.history.distance[late])
-                mine.put(memory._replace(history=history, arrived=run.arrived))
-        for entry in self.neighbours:
-            entry.memory = entry.problem.memory
-        self._late = []
+                    history.position[closing] = _moved_to(
+                        perturbed.law.part(closing), perturbed.positions(run.x[:n], run.control)[closing],
+                        self._velocity[number][closing], base.history.distance[closing])
+                perturbed.put(memory._replace(history=history, arrived=base.arrived))
+        for run in self.runs:
+            run.memory = run.problem.memory
+        self._closing = []
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
-        """Return the constraints of the base run and of the perturbed runs; None for the plane normal to the path."""
+        """Return the constraints that determine at which point of its path each run is compared.
+
+        Args:
+            state: state of the base run.
+            last: True if a stage or a piece of a stage ends at the state.
+
+        Returns:
+            Constraint of the base run, or None for the plane normal to its path; constraints of the perturbed runs.
+        """
         setting = self.problem.setting
         if not last:
             timed = setting.rate[-1] and self.problem.relaxes
             hold = fixed(state.control)
-            return (hold, [hold] * len(self.neighbours)) if timed else self._gaps()
+            return (hold, [hold] * len(self.runs)) if timed else self._gaps()
         if setting.piece == 0 and not self._single:          # the stage change ends at control 1
-            return fixed(1.0), [fixed(1.0)] * len(self.neighbours)
+            return fixed(1.0), [fixed(1.0)] * len(self.runs)
         key = (setting.stage, setting.piece)
         p = None if self._single else self._plans[setting.stage]
         if p is not None and p.by_time and not p.stage.waits:
-            return fixed(state.control), [fixed((entry.then - entry.problem.setting.base[-1])
-                                                / entry.problem.setting.rate[-1]) for entry in self.neighbours]
+            return fixed(state.control), [fixed((run.piece_end - run.problem.setting.base[-1])
+                                                / run.problem.setting.rate[-1]) for run in self.runs]
         if p is not None and p.in_flow:
             raise Failure("there is none yet for a stage that follows or holds a measure", [])
         if key not in self._until:
             targets = [(self.problem, self._end if p is None else p.stage.until),
-                       *((entry.problem, entry.end if p is None else entry.plans[setting.stage].stage.until)
-                         for entry in self.neighbours)]
-            mine, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
-            self._until[key] = mine, others
+                       *((run.problem, run.end if p is None else run.plans[setting.stage].stage.until)
+                         for run in self.runs)]
+            base, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
+            self._until[key] = base, others
         target = self._end if p is None else p.stage.until
         if state.met is None or state.met[:2] != target[:2]:
             raise Failure(f"it did not reach its target {target}", [])
         return self._until[key]
 
     def _gaps(self) -> tuple[Any, list[Any]]:
-        """Return the gap of a point that closes at the end of the step and turns the path, or None."""
-        for number, late in enumerate(self._late):
+        """Return constraints by which a gap that closes at the end of the step is closed in each run.
+
+        Returns:
+            Constraint of the base run, or None without such a gap; constraints of the perturbed runs.
+        """
+        for number, closing in enumerate(self._closing):
             face = self.problem.contacts[number]
-            size = np.where(late, abs(face.rule.area), 0.0)
+            size = np.where(closing, abs(face.rule.area), 0.0)
             most = self.problem.comm.allgather(float(size.max(initial=0.0)))
             if max(most) > 0:
                 mine = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
                 return _gap(self.problem, face, mine, True), [
-                    _gap(entry.problem, entry.problem.contacts[number], mine, False) for entry in self.neighbours]
+                    _gap(run.problem, run.problem.contacts[number], mine, False) for run in self.runs]
         return None, []
 
 
 def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
-    """Return a constraint: the gap of a point of a face, with its gradient if `sloped`.
+    """Return the signed distance of a contact point from its tool as a constraint, a function (x, control, gradient).
 
-    `point` is the local number of the point on its owner rank, and None on other ranks.
+    Args:
+        problem: problem of the run.
+        face: contact face of the point.
+        point: local number of the point on the rank that owns it, None on other ranks.
+        sloped: True if the function also computes its gradient and its derivative by the control.
     """
     mine = np.array([] if point is None else [point], dtype=int)
     law = face.law.part(mine)
 
     def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
-        """Return the gap and its derivative by the control; set its gradient."""
+        """Return the distance and its derivative by the control; set the vector `gradient` to its derivative by x."""
         near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[mine])
         found, rate = float(near.distance.sum()), 0.0
         if sloped:
@@ -274,12 +325,26 @@ def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
 
 
 def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """Return the controls of a stage, its tables and their lengths, and its inactive items."""
+    """Return the properties of a stage that no parameter may change.
+
+    Returns:
+        Numbers of the controlled loads; (load, length) of each table of an amplitude; numbers of the inactive items.
+    """
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 
 
-def _onto(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Return points x moved along a velocity until their distance from a tool is `gap`, shape (n, 2)."""
+def _moved_to(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """Move points along their velocities until they have given signed distances from a tool, to first order.
+
+    Args:
+        law: contact law of the points, which gives distances from the tool.
+        x: positions relative to the tool, shape (n, 2), length.
+        velocity: velocities of the points, shape (n, 2). A point with a velocity along the tool does not move.
+        gap: wanted signed distances, shape (n,), length.
+
+    Returns:
+        New positions, shape (n, 2), length.
+    """
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
     sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)

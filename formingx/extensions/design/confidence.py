@@ -17,13 +17,15 @@ _ALIKE = 0.9
 
 @dataclass(frozen=True)
 class Confidence:
-    """Uncertainty of the best design of a fit to a measured wall, to first order; print it.
+    """Uncertainty of design parameters that were fitted to a measured wall, to first order; its text is a report.
+
+    A parameter that is a profile counts as several parameters, one for each knot.
 
     Attributes:
-        names: names of the n numbers of the design.
-        values: values of the best design, shape (n,).
-        covariance: their covariance, shape (n, n).
-        sizes: ranges of the parameters, shape (n,).
+        names: names of the n parameters.
+        values: fitted values, shape (n,).
+        covariance: covariance of the values, shape (n, n).
+        sizes: ranges of the parameters between their bounds, shape (n,).
         points: number of measured points.
     """
 
@@ -35,12 +37,12 @@ class Confidence:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Standard error of each parameter, by name."""
+        """Standard errors: {parameter: standard error}."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist()))
 
     @property
     def correlation(self) -> np.ndarray:
-        """Correlations of the parameters, shape (n, n)."""
+        """Correlation matrix of the n parameters, shape (n, n)."""
         size = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(size, size)
 
@@ -64,14 +66,14 @@ class Confidence:
                 for value, (name, error) in zip(self.values.tolist(), self.errors.items())}
 
     @property
-    def not_told(self) -> list[str]:
-        """Parameters that the wall leaves undetermined: the standard error exceeds a quarter of the range."""
+    def undetermined(self) -> list[str]:
+        """Names of the parameters that the wall does not determine: standard error above a quarter of the range."""
         return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _OPEN * size]
 
     @property
-    def not_told_apart(self) -> list[tuple[str, str, float]]:
-        """Pairs of undetermined parameters with like effects on the wall: (parameter, parameter, correlation)."""
-        n, C, open_ = len(self.names), self.correlation, self.not_told
+    def indistinguishable(self) -> list[tuple[str, str, float]]:
+        """Pairs of undetermined parameters with similar effects on the wall: (name, name, correlation above 0.9)."""
+        n, C, open_ = len(self.names), self.correlation, self.undetermined
         return [(self.names[i], self.names[j], float(C[i, j])) for i in range(n) for j in range(i)
                 if abs(C[i, j]) > _ALIKE and {self.names[i], self.names[j]} <= {*open_}]
 
@@ -79,35 +81,33 @@ class Confidence:
         lines = [f"{'':16}{'value':>10}{'error':>10}{'95 % from':>12}{'to':>10}"]
         lines += [f"{name:16}{value:10.4g}{error:10.2g}{low:12.4g}{high:10.4g}" for value, (name, error), (low, high)
                   in zip(self.values, self.errors.items(), self.intervals().values())]
-        lines += [f"the measured wall does not tell {name}" for name in self.not_told]
-        lines += [f"{a} and {b} cannot be told apart: correlation {c:.2f}" for a, b, c in self.not_told_apart]
+        lines += [f"the measured wall does not tell {name}" for name in self.undetermined]
+        lines += [f"{a} and {b} cannot be told apart: correlation {c:.2f}" for a, b, c in self.indistinguishable]
         return "\n".join(lines)
 
     __repr__ = __str__
 
 
 def confidence(run: Any, measured: Any) -> Confidence:
-    r"""Return the confidence of a run fitted to a measured wall, from its derivatives.
+    r"""Return the uncertainty of design parameters that were fitted to a measured wall.
 
-    With the m measured walls w and the n parameters p:
+    With the computed walls h and the measured walls w at m points, and the n parameters p, the covariance is
 
-    .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial w_i}{\partial p_j}, \quad
-        s^2 = \frac{1}{m - n} \sum_i r_i^2
-
-    where r are the relative deviations of the walls.
+    .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial h_i}{\partial p_j}, \quad
+        s^2 = \frac{1}{m - n} \sum_i \residual(\frac{h_i}{w_i} - 1\right)^2
 
     Args:
-        run: the run.
+        run: the run with the fitted parameters.
         measured: the `MeasuredWall`.
 
     Returns:
-        The confidence.
+        Standard errors and covariance of the parameters.
 
     Raises:
-        InputError: the wall has no more points than there are parameters.
+        InputError: the measured wall has no more points than there are parameters, or the run has no derivative.
     """
     wall, jacobian = run.derivative(measured.of_path)
-    left, size = wall / measured.wall - 1, run.parameters.size
+    residual, size = wall / measured.wall - 1, run.parameters.size
     J = jacobian / measured.wall[:, None] * run.parameters.size
     m, n = J.shape
     if m <= n:
@@ -115,4 +115,4 @@ def confidence(run: Any, measured: Any) -> Confidence:
                          f" points than there are parameters")
     _, s, V = np.linalg.svd(J, full_matrices=False)
     half = V / np.maximum(s, 1e-12 * max(s.max(), 1e-300))[:, None] * size
-    return Confidence(run.parameters.names, run.vector, float(left @ left) / (m - n) * (half.T @ half), size, m)
+    return Confidence(run.parameters.names, run.vector, float(residual @ residual) / (m - n) * (half.T @ half), size, m)

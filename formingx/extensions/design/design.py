@@ -1,4 +1,4 @@
-"""Search for design parameters by exact derivatives of runs: an even or a wanted wall, or the minimum weight."""
+"""Search for the parameters of a run that give an even, a wanted or a measured wall, or the minimum weight."""
 
 from __future__ import annotations
 
@@ -26,19 +26,25 @@ log = logging.getLogger("formingx")
 
 
 class Design:
-    """Parameters of a run, and the search for their best values.
+    """Design of a part: a scene that depends on parameters, its runs, and the search for the best parameters.
 
     Args:
-        build: function of the parameters, by name. It returns (scene, target) or (scene, stages) for `trace` or
-            `Process.run`. It is also called at perturbed parameters, for derivatives. Only the positions of the nodes
-            of its mesh may differ. A contact without `nodes_per_step` takes one node a step, so that the gap closures
-            have exact derivatives.
-        parameters: {name: (start, low, high), a start value, or `spline(...)`}. `build` receives a spline as a function
-            of a length from 0 to 1.
-        step, tolerances, max_steps: as in `trace`, for each run.
+        build: function that takes the parameters by name, and returns (scene, target) or (scene, stages) for `trace` or
+            `Process.run`. It is also called with slightly changed parameters, for derivatives: then only the positions
+            of the nodes of its mesh may differ, not their number. In a contact without `nodes_per_step` one gap closes
+            per step, so that the gap closures have exact derivatives.
+        parameters: {name: start value, (start value, lower bound, upper bound), or `spline(...)`}. `build` receives a
+            spline as a function of a length from 0 to 1.
+        step: control of the step length of each run, as in `trace`.
+        tolerances: tolerances of each run, as in `trace`.
+        max_steps: maximum number of steps of each run, as in `trace`.
+
+    Attributes:
+        parameters: the `Parameters` of the design.
+        paths: number of runs so far.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: `build` is no function of these parameters, or a parameter has wrong values or bounds.
 
     >>> def build(thickness):
     ...     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=thickness, elements=(8, 1)),
@@ -64,13 +70,13 @@ class Design:
         self.paths = 0                                       # number of runs so far
 
     def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
-        """Run the design with some values.
+        """Compute the run for given values of the parameters.
 
         Args:
-            values: values of parameters, by name; the others keep their start values.
+            values: {parameter: value}; the other parameters have their start values.
 
         Returns:
-            The `DesignRun`.
+            The run, which can compute its derivatives.
 
         Raises:
             InputError: `build` returns no (scene, target) or (scene, stages), or a scene that is not allowed.
@@ -79,7 +85,11 @@ class Design:
         return self._run(self.parameters.vector(values or {}))
 
     def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
-        """Return (scene, target or stages) from the user's function for a vector of numbers."""
+        """Return (scene, target or stages) from the user's function, checked.
+
+        Args:
+            vector: values of the n numbers of the parameters, shape (n,).
+        """
         made = self._build(**self.parameters.values(vector))
         if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
             raise InputError("Design: build must return (scene, target) or (scene, stages)")
@@ -92,9 +102,9 @@ class Design:
         return scene, end
 
     def _run(self, vector: np.ndarray) -> DesignRun:
-        """Return a run for a vector of numbers."""
+        """Compute the run for the n numbers of the parameters, shape (n,)."""
         scene, end = self._make(vector)
-        scene = copy.copy(scene)                             # the script's scene is left as it is
+        scene = copy.copy(scene)                             # the script's scene is residual as it is
         scene.one_by_one = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
@@ -105,21 +115,24 @@ class Design:
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
             volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
             start: Mapping[str, Any] | DesignRun | None = None) -> Answer:
-        """Search for a wall by a Gauss-Newton method with bounds; each step is checked by a run.
+        """Search for the parameters that give an even, a wanted or a measured wall thickness.
+
+        A Gauss-Newton method with bounds proposes each step; a run checks it. The reference length of a node is its
+        distance from the axis along the middle line of the undeformed body.
 
         Args:
             wall: wanted thickness, length: a number, or a function of the reference length. With a `MeasuredWall` the
                 parameters are fitted to it (see `Answer.confidence`).
             even: True for the most even wall, with the lowest standard deviation over mean.
-            within: reference lengths that count (of the middle line, from the axis), (low, high); default all.
-            volume: "kept": the reference volume of the first run is prescribed (free with a measured wall).
-                A number prescribes the volume, length^3; None leaves it free.
+            within: lowest and highest reference length of the nodes that count, length; default all.
+            volume: "kept": the reference volume of the first run is prescribed, but free with a measured wall.
+                A number prescribes the reference volume, length^3; None leaves it free.
             runs: maximum number of runs.
             good: the search ends if the predicted relative change of the wall (root mean square) is smaller.
-            start: start values by name, or a run of this design.
+            start: {parameter: start value}, or a run of this design.
 
         Returns:
-            The `Answer`.
+            First and best run of the search, and the reason for its end.
 
         Raises:
             InputError: no target, or no parameter has an effect on it.
@@ -134,13 +147,21 @@ class Design:
         measured = hasattr(wall, "of_path")
         if measured and within is not None:
             raise InputError("fit: within is for a wanted wall: leave points of a measured one out of it")
-        held = None if volume is None or measured and volume == "kept" else (
-            first.volume * (1 - SEARCH.spare) if volume == "kept" else positive("fit: volume", volume))
-        aim = MeasuredWallTarget(first, wall, held) if measured else WallTarget(first, wall, within, held)
-        return self._search(first, aim, most, good)
+        prescribed = None if volume is None or measured and volume == "kept" else (
+            first.volume * (1 - SEARCH.volume_margin) if volume == "kept" else positive("fit: volume", volume))
+        target = (MeasuredWallTarget(first, wall, prescribed) if measured
+                  else WallTarget(first, wall, within, prescribed))
+        return self._search(first, target, most, good)
 
-    def _search(self, first: DesignRun, aim: WallTarget, most: int, good: float) -> Answer:
-        """Take Gauss-Newton steps from the best run, halved if a run is worse or fails."""
+    def _search(self, first: DesignRun, target: WallTarget, most: int, good: float) -> Answer:
+        """Search with Gauss-Newton steps from the best run, which are halved if a run is worse or fails.
+
+        Args:
+            first: first run of the search.
+            target: least-squares target of the search.
+            most: maximum number of runs.
+            good: the search ends if the predicted relative change of the wall (root mean square) is smaller.
+        """
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, taken, predicted, before = first, [first], first.wall, 1.0
@@ -148,7 +169,7 @@ class Design:
         why = f"runs = {most} were used up"
         while len(taken) + len(notes) < most:
             try:
-                left, jacobian = aim.residual(best)
+                residual, jacobian = target.residual(best)
             except InputError as error:
                 if best is first:
                     raise
@@ -157,57 +178,57 @@ class Design:
             if not np.any(np.abs(jacobian * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
             # keeps parameters without effect
-            damping = aim.damped * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
-            step = lsq_linear(np.vstack([jacobian * size, damping]), np.append(-left, 0 * size), tol=1e-12,
+            damping = target.damping * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
+            step = lsq_linear(np.vstack([jacobian * size, damping]), np.append(-residual, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
             gain = np.sqrt(np.mean((jacobian @ step) ** 2))
-            better = 1 - np.sum((left + jacobian @ step) ** 2) / np.sum(left**2)
-            if gain < good or better < SEARCH.worth:
+            better = 1 - np.sum((residual + jacobian @ step) ** 2) / np.sum(residual**2)
+            if gain < good or better < SEARCH.min_improvement:
                 why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
                     f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= SEARCH.shortest and len(taken) + len(notes) < most:
+            while share >= SEARCH.shortest_step and len(taken) + len(notes) < most:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
                     taken.append(new)
-                    if aim.cost(new) < aim.cost(best):
+                    if target.cost(new) < target.cost(best):
                         break
                 except (InputError, ConvergenceError) as error:
                     notes.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                why = "no shorter step brings an improvement" if share < SEARCH.shortest else why
+                why = "no shorter step brings an improvement" if share < SEARCH.shortest_step else why
                 break
             predicted = best.wall + share * (best.derivative("wall")[1] @ step)
-            gained = 1 - aim.cost(new) / aim.cost(best)
+            gained = 1 - target.cost(new) / target.cost(best)
             best = new
-            if max(gained, before) < SEARCH.worth:     # a single small improvement may precede a larger one
+            if max(gained, before) < SEARCH.min_improvement:     # a single small improvement may precede a larger one
                 why = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained
-            log.info("design: run %d, cost %.3g", len(taken), aim.cost(best))
-        lacks = [lack("volume", aim.held, best.volume), aim.shortfall(best)]
-        return Answer(first, best, taken, notes, aim.inside, why, predicted, "\n".join(filter(None, lacks)), aim.wanted,
-                      aim.measured)
+            log.info("design: run %d, cost %.3g", len(taken), target.cost(best))
+        lacks = [lack("volume", target.volume, best.volume), target.shortfall(best)]
+        return Answer(first, best, taken, notes, target.inside, why, predicted, "\n".join(filter(None, lacks)),
+                      target.wanted, target.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
-        """Search for the smallest reference volume with a minimum wall thickness, by successive linear programs.
+        """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.
 
-        Each iteration minimises the linearised volume within a trust region, which shrinks if a run is worse
+        Successive linear programs minimise the linearised volume within a trust region, which shrinks if a run is worse
         (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a linear constraint. So the minimum wall,
         which has kinks, needs no derivative.
 
         Args:
             min_wall: minimum wall thickness, length.
-            within: reference lengths that count, (low, high); default all.
+            within: lowest and highest reference length of the nodes that count, length, as in `fit`; default all.
             runs: maximum number of runs.
 
         Returns:
-            The `Answer`.
+            First and best run of the search, and the reason for its end.
 
         Raises:
-            InputError: an argument that is not allowed, or the first run has no derivative.
+            InputError: a minimum wall or number of runs that is not positive, or the first run has no derivative.
             ConvergenceError: the first run fails.
         """
         from scipy.optimize import linprog
@@ -220,7 +241,7 @@ class Design:
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
-            """Return the relative volume of a run plus a penalty for a wall below the minimum."""
+            """Return the volume of a run over the first run's, plus a penalty for a wall below the minimum."""
             return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
         while len(taken) + len(notes) < most:
             try:

@@ -1,4 +1,4 @@
-"""Design parameters: numbers, and profiles along the body."""
+"""Design parameters: single numbers, and profiles along the body, given by their values at knots."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ...errors import InputError, count, finite, instance, several
 
 
 class Knots:
-    """A profile over a length from 0 to 1, with equidistant knots.
+    """A function of a length from 0 to 1 that is given by its values at equidistant knots.
 
-    It is linear between the knots, or a cubic spline. Call it with positions to get values.
+    The argument of the function is one length or an array of lengths. Lengths outside 0 to 1 count as the nearest end.
 
     Args:
         values: values at the k knots, shape (k,).
-        smooth: True for a cubic spline.
+        smooth: True for a cubic spline through the knots, False for straight lines between them.
 
     Attributes:
-        values: values at the knots, shape (k,).
-        smooth: True for a cubic spline.
-        coordinates: positions of the knots, shape (k,).
+        values: values at the k knots, shape (k,).
+        smooth: True for a cubic spline through the knots, False for straight lines between them.
+        coordinates: lengths of the knots, from 0 to 1, shape (k,).
     """
 
     def __init__(self, values: Any, smooth: bool = False):
@@ -37,7 +37,7 @@ class Knots:
 
     @cached_property
     def _spline(self) -> Any:
-        """Cubic spline through the knots."""
+        """Cubic spline through the values at the knots."""
         from scipy.interpolate import CubicSpline
         return CubicSpline(self.coordinates, self.values)
 
@@ -53,14 +53,14 @@ class Knots:
 
 @dataclass(frozen=True)
 class Spline:
-    """Start values and bounds of a parameter, see `spline`.
+    """Start values and bounds of a design parameter: of a profile with k knots, or of a single number (k = 1).
 
     Attributes:
         start: start values at the knots, shape (k,).
-        low: lower bound of every value.
-        high: upper bound of every value.
-        smooth: True for a cubic spline, False for straight lines.
-        profile: False if the parameter is a single number.
+        low: lower bound of all values.
+        high: upper bound of all values.
+        smooth: True for a cubic spline through the knots, False for straight lines between them.
+        profile: True for a profile, False for a single number.
     """
 
     start: np.ndarray
@@ -71,22 +71,23 @@ class Spline:
 
 
 def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
-    """Return a design parameter that is a profile: of thickness, temperature, or a material constant.
+    """Return a design parameter that is a profile of thickness, temperature or a material constant.
 
-    The function that builds the scene receives it as a function of a length from 0 to 1, see `Knots`.
+    The function that builds the scene receives the profile as a function of a length from 0 to 1, see `Knots`.
 
     Args:
-        knots: number of equidistant knots, 2 or more; with `smooth` 4 or more.
-        start: a number, or one for each knot.
-        low: lower bound of every knot.
-        high: upper bound of every knot.
-        smooth: True for a cubic spline through the knots, False for straight lines.
+        knots: number k of equidistant knots, 2 or more; with `smooth` 4 or more.
+        start: start value of all knots, or one for each knot, shape (k,).
+        low: lower bound of the values at all knots.
+        high: upper bound of the values at all knots.
+        smooth: True for a cubic spline through the knots, False for straight lines between them.
 
     Returns:
         The parameter, for `Design`.
 
     Raises:
-        InputError: an argument that is not allowed.
+        InputError: too few knots, another number of start values, bounds in the wrong order, or a start value beyond a
+            bound.
 
     >>> fx.spline(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
@@ -105,16 +106,21 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
 class Parameters:
     """Parameters of a design as a vector of n numbers.
 
+    A parameter that is a number has one entry, a profile has an entry for each knot.
+
     Args:
-        given: {name: (start, low, high), a number, or the result of `spline`}.
+        given: {parameter: start value, (start value, lower bound, upper bound), or the result of `spline`}.
 
     Attributes:
-        names: names of the numbers, such as "travel" or "wall[3]".
-        start, low, high: start values and bounds, shape (n,).
-        size: reference size of each number, shape (n,): its range if bounded, else its start value, else 1.
+        names: names of the entries, such as "travel" or "wall[3]".
+        start: start values, shape (n,).
+        low: lower bounds, shape (n,).
+        high: upper bounds, shape (n,).
+        size: size of each entry that scales its changes, shape (n,): its range if it has two bounds, else the magnitude
+            of its start value, or 1 if that is 0.
 
     Raises:
-        InputError: no parameters, or values that are not allowed.
+        InputError: no parameters, a name that is no string, or wrong values or bounds.
     """
 
     def __init__(self, given: Mapping[str, Any]):
@@ -139,33 +145,33 @@ class Parameters:
 
     @property
     def profiles(self) -> dict[str, tuple[float, float]]:
-        """Bounds of the profiles, by name."""
+        """Bounds of the parameters that are profiles: {parameter: (lower, upper)}."""
         return {name: (entry.low, entry.high) for name, entry in self._given.items() if entry.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
-        """Return the arguments of the user's function.
+        """Return the values of the parameters for a vector, as arguments of the user's function.
 
         Args:
-            vector: numbers of the parameters, shape (n,).
+            vector: vector of the parameters, shape (n,).
 
         Returns:
-            {name: number or `Knots`}.
+            {parameter: number or `Knots`}.
         """
         parts = np.split(vector, np.cumsum([len(entry.start) for entry in self._given.values()])[:-1])
         return {name: Knots(part, entry.smooth) if entry.profile else float(part[0])
                 for (name, entry), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
-        """Return the numbers for values of some parameters; the others have their start values.
+        """Return the vector for given values of parameters.
 
         Args:
-            values: {name: value}.
+            values: {parameter: number, values at the knots, or `Knots`}; the other parameters have their start values.
 
         Returns:
-            Numbers, shape (n,).
+            Vector of the parameters, shape (n,).
 
         Raises:
-            InputError: an unknown name, or the wrong number of values.
+            InputError: an unknown parameter, or the wrong number of values.
         """
         found, first = self.start.copy(), 0
         for name in values:
@@ -185,7 +191,12 @@ class Parameters:
 
 
 def _number(name: str, given: Any) -> Spline:
-    """Return a parameter that is a single number, from the user's argument."""
+    """Return a parameter that is a single number.
+
+    Args:
+        name: name of the parameter.
+        given: start value, or (start value, lower bound, upper bound).
+    """
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
         raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.spline(...)")
@@ -195,7 +206,14 @@ def _number(name: str, given: Any) -> Spline:
 
 
 def _check_bounds(caller: str, start: np.ndarray, low: Any, high: Any) -> None:
-    """Raise an InputError unless the bounds are in order and contain the start values."""
+    """Raise an InputError unless the lower bound is below the upper, and the start values lie between them.
+
+    Args:
+        caller: name of the caller, for messages.
+        start: start values, shape (k,).
+        low: lower bound.
+        high: upper bound.
+    """
     try:
         low, high = float(low), float(high)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""HTML reports of a design run and of a search: walls, profiles, derivatives."""
+"""HTML reports of a run of a design and of a search: walls, profiles, and effects of the parameters."""
 
 import datetime
 import html
@@ -18,34 +18,34 @@ from .scatter import deviations as deviations_of
 
 
 def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a search; see `Answer.report`.
+    """Write the report of a search for design parameters as an HTML page (rank 0 writes).
 
     Args:
         answer: result of the search.
-        file: path of the file.
+        file: path of the HTML file.
         title: heading of the page.
-        deviations: standard deviations of the parameters, or None.
+        deviations: standard deviations of the parameters, see `DesignRun.spread`, or None.
         units: units of the labels.
 
     Returns:
         Path of the file.
     """
-    units = _of_scene(answer.best, units)
+    units = _units_of(answer.best, units)
     before, best, (a, b) = answer.before, answer.best, answer.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
     attainable, met, absent = answer.attainable(), answer.at_bounds(), answer.without_effect()
     walls = [run.wall[answer.inside] for run in (before, best)]
-    off = abs(answer.predicted - best.wall)[answer.inside].max() / walls[1].mean()
+    deviation = abs(answer.predicted - best.wall)[answer.inside].max() / walls[1].mean()
     cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "minimum wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
              (str(answer.paths), "runs were taken")]
-    said = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
-    said += [("", f"A run failed: {text}") for text in answer.failed]
-    said += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
-    said += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
+    notes = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
+    notes += [("", f"A run failed: {text}") for text in answer.failed]
+    notes += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
+    notes += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
     how = [f"Why it ended: {answer.why}.",
-           f"The run before the best predicted its wall to {100 * off:.2g} %.",
+           f"The run before the best predicted its wall to {100 * deviation:.2g} %.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
     rows = [[str(k), *(page.number(v) for v in (run.wall[answer.inside].std() / run.wall[answer.inside].mean(),
@@ -55,57 +55,70 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
                        units.label("volume")], rows)
 
     def pictures() -> list[str]:
-        """Return the pictures of a search as HTML."""
+        """Return HTML elements with the pictures of the part, the walls, the profiles and the effects."""
         return [_sections([before, best], ["before", "after"], units),
-                _walls(answer, spread, deviations, units), _patterns(before, best), _heat_map(effects, units)]
-    tail = [*_sure(best, deviations, units), "<h2>Runs of the search</h2>", runs]
-    return _write(file, title or "Report of a design", how, cards, said, pictures,
+                _walls(answer, spread, deviations, units), _profiles(before, best), _heat_map(effects, units)]
+    tail = [*_uncertainties(best, deviations, units), "<h2>Runs of the search</h2>", runs]
+    return _write(file, title or "Report of a design", how, cards, notes, pictures,
                   _effects(best, effects, units, before), tail, best.path.problem.comm)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a run; see `DesignRun.report`.
+    """Write the report of a run of a design as an HTML page (rank 0 writes).
 
     Args:
-        run: the run.
-        file: path of the file.
+        run: the `DesignRun`.
+        file: path of the HTML file.
         title: heading of the page.
-        deviations: standard deviations of the parameters, or None.
+        deviations: standard deviations of the parameters, see `DesignRun.spread`, or None.
         units: units of the labels.
 
     Returns:
         Path of the file.
     """
-    units = _of_scene(run, units)
+    units = _units_of(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
     cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{wall.min():.4g}", units.label("wall", "minimum wall")),
              (f"{run.volume:.4g}", units.label("volume", "volume of the whole part at rest"))]
-    said = [("bad", found.text) for found in alarming(run.path.findings())]
+    notes = [("bad", found.text) for found in alarming(run.path.findings())]
 
     def pictures() -> list[str]:
-        """Return the pictures of a run as HTML."""
+        """Return HTML elements with the pictures of the part, the wall and the effects."""
         drawing, axes = figure(1, width=9, height=4)
         _line(axes, run, "C0", "wall", spread, deviations, units)
         return [_sections([run], ["the part"], units), page.figure(drawing, "Wall over the reference length."),
                 _heat_map(effects, units)]
-    return _write(file, title or "Report of a run", ["One run and what changes it."], cards, said, pictures,
-                  _effects(run, effects, units), _sure(run, deviations, units), run.path.problem.comm)
+    return _write(file, title or "Report of a run", ["One run and what changes it."], cards, notes, pictures,
+                  _effects(run, effects, units), _uncertainties(run, deviations, units), run.path.problem.comm)
 
 
-def _of_scene(run: Any, units: Units) -> Units:
-    """Return the units of the labels, per unit depth in plane strain."""
+def _units_of(run: Any, units: Units) -> Units:
+    """Return the units of the labels of a run; in plane strain volumes and forces are per unit depth."""
     return units.per_depth() if run.path.scene.kinematics.dimension_of_volume == 2 else units
 
 
-def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictures: Any, table: str, tail: list[str],
+def _write(file: Any, title: str, how: list[str], cards: list, notes: list, pictures: Any, table: str, tail: list[str],
            comm: Any) -> FilePath:
-    """Write an HTML page on rank 0."""
+    """Write the page of a report on rank 0, and return its path.
+
+    Args:
+        file: path of the HTML file.
+        title: heading of the page.
+        how: sentences below the heading.
+        cards: (value, its description) of each large number.
+        notes: (kind, text) of each note; the kind "bad" is a warning.
+        pictures: function that returns HTML elements.
+        table: HTML table of the parameters and their effects.
+        tail: further HTML elements.
+        comm: MPI communicator.
+    """
     def make() -> None:
-        """Write the page."""
+        """Draw the pictures and write the file."""
         body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(how))}</p>"]
-        body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>" for kind, text in said if text]
+        body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>"
+                 for kind, text in notes if text]
         body.append("<div class=cards>" + "".join(
             f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(what)}</span></div>"
             for value, what in cards) + "</div>")
@@ -118,7 +131,7 @@ def _write(file: Any, title: str, how: list[str], cards: list, said: list, pictu
 
 
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
-    """Draw the parts side by side, coloured by their wall."""
+    """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -139,20 +152,30 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
 
 
 def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
-    """Draw a wall over the reference length, with its standard deviation."""
+    """Draw the wall of a run over the reference length, with a band of its standard deviation.
+
+    Args:
+        axes: matplotlib axes.
+        run: the `DesignRun`.
+        colour: colour of the line.
+        label: label of the line.
+        spread: standard deviation of the wall at the k nodes, shape (k,), length, or None for no band.
+        deviations: standard deviations of the parameters, for the label of the band.
+        units: units of the labels.
+    """
     s = run.profile.reference_length
     axes.plot(s, run.wall, color=colour, label=label)
     if spread is not None:
         sizes = np.sqrt(np.diag(covariance_of("report", run.parameters, deviations)))
-        said = ", ".join(f"{name} ± {size:.3g}" for name, size in zip(run.parameters.names, sizes) if size)
+        parameters = ", ".join(f"{name} ± {size:.3g}" for name, size in zip(run.parameters.names, sizes) if size)
         axes.fill_between(s, run.wall - spread, run.wall + spread, color=colour, alpha=0.2, linewidth=0,
-                          label=f"± standard deviation, of {said}")
+                          label=f"± standard deviation, of {parameters}")
     axes.set(xlabel=units.label("reference_length"), ylabel=units.label("wall"), ylim=(0, None))
     axes.legend()
 
 
 def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
-    """Draw the walls of a search."""
+    """Return an HTML figure of the walls of a search: of the first and the best run, predicted and wanted."""
     drawing, axes = figure(1, width=9, height=4)
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
@@ -165,8 +188,8 @@ def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
     return "<h2>The wall</h2>" + page.figure(drawing, "Wall over the reference length, before and after.")
 
 
-def _patterns(before: Any, best: Any) -> str:
-    """Draw every profile over its knots."""
+def _profiles(before: Any, best: Any) -> str:
+    """Return an HTML figure of the parameters that are profiles, in the first and the best run; "" without profiles."""
     found = best.parameters.profiles
     if not found:
         return ""
@@ -186,7 +209,7 @@ def _patterns(before: Any, best: Any) -> str:
 
 
 def _heat_map(effects: Any, units: Units) -> str:
-    """Draw the effects of the parameters on the wall."""
+    """Return an HTML figure, a heat map of the effects of all parameters on the wall."""
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(
@@ -194,8 +217,14 @@ def _heat_map(effects: Any, units: Units) -> str:
                  f" a parameter changes by a tenth of its range.")
 
 
-def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
-    """Return a table of the standard deviations of walls, volume, pressures and forces; empty without uncertainties."""
+def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
+    """Return HTML elements with the standard deviations of wall, volume, pressures and forces.
+
+    Args:
+        run: the `DesignRun`.
+        deviations: standard deviations of the parameters, or None for an empty list.
+        units: units of the labels.
+    """
     if not deviations:
         return []
     covariance = covariance_of("report", run.parameters, deviations)
@@ -217,7 +246,14 @@ def _sure(run: Any, deviations: Any, units: Units) -> list[str]:
 
 
 def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
-    """Return a table with a row for every parameter."""
+    """Return an HTML table with the value, the bounds and the effects of every parameter.
+
+    Args:
+        run: the `DesignRun`.
+        effects: derivatives of its wall by the parameters.
+        units: units of the labels.
+        before: first run of a search, for a column with its values, or None.
+    """
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),

@@ -1,4 +1,4 @@
-"""A run of a design, and the derivatives of its results by all parameters."""
+"""A run of a design, and the derivatives of its output quantities by all parameters."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from ...solve.record import Record
 from ...units import NONE, Units
 from . import scatter
 from .carry import carry
-from .neighbours import PerturbedRun, PerturbedRunFailure
 from .parameters import Parameters
+from .perturbed_runs import PerturbedRun, PerturbedRunFailure
 from .scatter import Band
 
-_SMOOTH = 1e-5
+_SMOOTH_CHANGE = 1e-5
 """Relative change of a parameter without contact: one perturbed run above, one below."""
 
-_CLOSER = (1e-8, 1e-9, 1e-10)
+_CONTACT_CHANGES = (1e-8, 1e-9, 1e-10)
 """Relative changes of a parameter with contact, to one side, tried in order until all perturbed runs converge.
 
 Contact acts within a thin ramp. The changes are so small that a one-sided difference is accurate.
@@ -36,15 +36,15 @@ Contact acts within a thin ramp. The changes are so small that a one-sided diffe
 
 @dataclass(frozen=True)
 class Effects:
-    """Derivatives of m values of an output quantity by n parameters.
+    """Derivatives of an output quantity of a run, with m values, by n parameters; its text is a table.
 
     Attributes:
         measure: name of the quantity.
-        names: names of the parameters.
+        names: names of the n parameters.
         sizes: ranges of the parameters, or their start values without a range, shape (n,).
-        coordinates: positions of the values, shape (m,): reference lengths of the wall, else numbers.
+        coordinates: of the wall, reference lengths of its m nodes, shape (m,), length; of other quantities 0 to m - 1.
         value: values of the quantity, shape (m,).
-        jacobian: derivatives, shape (m, n).
+        jacobian: derivatives of the values by the parameters, shape (m, n).
     """
 
     measure: str
@@ -65,7 +65,7 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map of the first-order change of the quantity by a tenth of each parameter's range.
+        """Draw a heat map of the first-order change of the quantity for a tenth of the range of each parameter.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -76,8 +76,9 @@ class Effects:
         from ...figures import figure
         axes = axes if axes is not None else figure()[1]
         tenth, n = (self.jacobian * self.sizes / 10).T, len(self.names)
-        most, places = abs(tenth).max() or 1.0, self.coordinates if len(self.coordinates) > 1 else np.array([0.0, 1.0])
-        edges = np.concatenate([places[:1], (places[1:] + places[:-1]) / 2, places[-1:]])
+        most = abs(tenth).max() or 1.0
+        coordinates = self.coordinates if len(self.coordinates) > 1 else np.array([0.0, 1.0])
+        edges = np.concatenate([coordinates[:1], (coordinates[1:] + coordinates[:-1]) / 2, coordinates[-1:]])
         drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5,
                                 tenth if len(self.coordinates) > 1 else tenth.repeat(2, 1),
                                 cmap="RdBu_r", vmin=-most, vmax=most)
@@ -89,21 +90,21 @@ class Effects:
 
 
 class DesignRun:
-    """A run of the user's scene for given parameter values.
+    """A run of a design for given parameters, which computes its derivatives by them; see `Design.run`.
 
     Args:
-        make: function of a vector of numbers that returns (scene, target or stages).
+        make: function of a vector of parameters, shape (n,), that returns (scene, target or stages).
         parameters: the `Parameters` of the design.
-        vector: values of the n numbers of the parameters, shape (n,).
-        path: the `Path`.
+        vector: vector of the parameters of this run, shape (n,).
+        path: the computed `Path`.
         end: target or stages of the run.
-        tolerances: tolerances of the run, or None.
+        tolerances: tolerances of the run; None for the defaults.
 
     Attributes:
-        vector: values of the n numbers of the parameters, shape (n,).
-        values: {parameter: number or `Knots`}.
         parameters: the `Parameters` of the design.
-        path: the `Path`.
+        vector: vector of the parameters of this run, shape (n,).
+        values: {parameter: number or `Knots`}.
+        path: the computed `Path`.
     """
 
     def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
@@ -114,17 +115,20 @@ class DesignRun:
 
     @cached_property
     def profile(self) -> Profile:
-        """Profile of the last state."""
+        """Outline of the part in the last state."""
         return self.path.profile()
 
     @cached_property
     def _profiles(self) -> Profiles:
-        """Evaluation of profiles on the mesh of the last state."""
+        """Evaluation of the outline of the part in any state of this run."""
         return Profiles(self.path.problem)
 
     @property
     def wall(self) -> np.ndarray:
-        """Thickness of the last state at the nodes of the bottom face, shape (k,), length."""
+        """Thickness at the k nodes of the bottom face in the last state, shape (k,), length.
+
+        It is the deformed distance to the opposite node of the top face.
+        """
         return self.profile.thickness
 
     @property
@@ -133,19 +137,19 @@ class DesignRun:
         return _volume(self.path.problem)
 
     @cached_property
-    def _neighbours(self) -> list[tuple[list[PerturbedRun], float]]:
-        """For each parameter, the perturbed runs at the last state and the parameter difference between them.
+    def _perturbed_runs(self) -> list[tuple[list[PerturbedRun], float]]:
+        """For each parameter, the perturbed runs at the last state, and the difference of the parameter between them.
 
-        The difference is taken from the base run if there is only one.
+        With contact there is one perturbed run for each parameter, and the difference is between it and this run.
         """
         contact, reason = bool(self.path.problem.contacts), ""
-        for size in _CLOSER if contact else (_SMOOTH,):
+        for size in _CONTACT_CHANGES if contact else (_SMOOTH_CHANGE,):
             made = []
             for k, step in enumerate(size * self.parameters.size):
                 ways = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
-                made.append(([self._beside(k, way * step) for way in ways], ways[0] * step * len(ways)))
+                made.append(([self._perturbed_run(k, way * step) for way in ways], ways[0] * step * len(ways)))
             try:
-                carry(self.path, self._end, [entry for beside, _ in made for entry in beside])
+                carry(self.path, self._end, [perturbed for runs, _ in made for perturbed in runs])
             except PerturbedRunFailure as failure:
                 reason = failure.reason
             except Failure as failure:
@@ -155,8 +159,8 @@ class DesignRun:
                 return made
         raise InputError(f"Design: this run has no derivative: {reason}")
 
-    def _beside(self, k: int, step: float) -> PerturbedRun:
-        """Return an unsolved perturbed run with one parameter changed."""
+    def _perturbed_run(self, k: int, step: float) -> PerturbedRun:
+        """Return a perturbed run, still to be solved, whose parameter with number k is changed by a step."""
         moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
@@ -166,51 +170,52 @@ class DesignRun:
                              f" fails: {error}") from None
 
     def derivative(self, measure: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return a quantity of the last state and its derivatives by the n parameters.
+        """Return an output quantity of the last state and its derivatives by the n parameters.
 
         Args:
-            measure: "wall" (thickness at the nodes of the bottom face), "volume" (of the body in the reference
-                configuration), or a column of the path. Or a function of a path that uses only its last state.
+            measure: the quantity: "wall" (thickness at the nodes of the bottom face, length), "volume" (reference
+                volume of the whole part, length^3), or a column of the path. Or a function of a path that uses only its
+                last state, and returns a number or an array.
 
         Returns:
-            The quantity, shape (m,), and its derivatives, shape (m, n).
+            Values of the quantity, shape (m,), and their derivatives, shape (m, n).
 
         Raises:
             InputError: the run has no derivative, or the quantity depends on earlier states.
         """
-        value, columns = self._here(measure), []
-        for beside, apart in self._neighbours:
-            first, *other = (np.atleast_1d(self._at(neighbour, measure)) for neighbour in beside)
-            columns.append((first - (other[0] if other else value)) / apart)
+        value, columns = self._value(measure), []
+        for runs, difference in self._perturbed_runs:
+            first, *other = (np.atleast_1d(self._perturbed_value(entry, measure)) for entry in runs)
+            columns.append((first - (other[0] if other else value)) / difference)
         return value, np.stack(columns, axis=-1)
 
     def sensitivities(self, measure: Any = "wall") -> Effects:
-        """Return the derivatives of a quantity as a table; the wall over the reference length.
+        """Return the derivatives of an output quantity by all parameters as a table that can be printed and drawn.
 
         Args:
-            measure: as in `derivative`.
+            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
 
         Returns:
-            The `Effects`.
+            Values and derivatives; of the wall over the reference length.
 
         Raises:
-            InputError: as `derivative`.
+            InputError: the run has no derivative, or the quantity depends on earlier states.
         """
         value, jacobian = self.derivative(measure)
-        places = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
+        coordinates = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
-        return Effects(name, self.parameters.names, self.parameters.size, places, value, jacobian)
+        return Effects(name, self.parameters.names, self.parameters.size, coordinates, value, jacobian)
 
     def spread(self, deviations: Any, measure: Any = "wall") -> np.ndarray:
-        """Return the standard deviation of a quantity, to first order.
+        """Return the standard deviation of an output quantity for uncertain parameters, to first order.
 
         Args:
-            deviations: {parameter: standard deviation}. The knots of a profile are independent, with equal deviations.
+            deviations: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations.
                 Or a `Fit` whose constants have the names of parameters, with its covariance. Or a list of such.
-            measure: as in `derivative`.
+            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
 
         Returns:
-            Standard deviation, shape (m,).
+            Standard deviation of each of the m values, shape (m,).
 
         Raises:
             InputError: the run has no derivative, a name is no parameter, or the fit leaves constants undetermined.
@@ -219,17 +224,18 @@ class DesignRun:
                                   scatter.covariance_of("spread", self.parameters, deviations))
 
     def band(self, deviations: Any, measure: Any = "wall", confidence: float = 0.95) -> Band:
-        """Return a quantity with its confidence band, to first order and without further runs; print it or plot it.
+        """Return an output quantity with its confidence band for uncertain parameters, to first order.
 
         Args:
-            deviations, measure: as in `spread`.
-            confidence: confidence level of the band, for a normal distribution.
+            deviations: {parameter: standard deviation}, a `Fit`, or a list of such, see `spread`.
+            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
+            confidence: confidence level of the band, between 0 and 1, for a normal distribution.
 
         Returns:
-            The `Band`.
+            Values and band, which can be printed and drawn.
 
         Raises:
-            InputError: as `spread`.
+            InputError: a confidence outside (0, 1), a name that is no parameter, or the run has no derivative.
         """
         return scatter.band(self, deviations, measure, confidence)
 
@@ -238,11 +244,11 @@ class DesignRun:
         """Write an HTML report of the part, its wall, and the effects of the parameters (rank 0 writes).
 
         Args:
-            file: path of the file.
+            file: path of the HTML file.
             title: heading of the page.
-            deviations: as in `spread`. Adds the standard deviation to the wall, and a table with the deviations
-                of wall, volume, pressures and forces.
-            units: a `formingx.Units`, for the labels.
+            deviations: standard deviations of the parameters, as in `spread`. They add the standard deviation to the
+                wall, and a table with the standard deviations of wall, volume, pressures and forces.
+            units: a `formingx.Units`, for the labels; default without units.
 
         Returns:
             Path of the file.
@@ -254,8 +260,12 @@ class DesignRun:
         from .report import of_run
         return of_run(self, file, title, deviations, units or NONE)
 
-    def _here(self, measure: Any) -> np.ndarray:
-        """Return the values of a quantity in the last state, shape (m,)."""
+    def _value(self, measure: Any) -> np.ndarray:
+        """Return the values of an output quantity in the last state of this run, shape (m,).
+
+        Args:
+            measure: the quantity, see `derivative`.
+        """
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
                 return np.atleast_1d(getattr(self, measure))
@@ -268,33 +278,43 @@ class DesignRun:
         if not np.all(np.isfinite(whole)):
             raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
                              f" path, or a function of it that gives finite numbers")
-        short = _of_one(self.path.last, Record(self.path.problem, self.path.record.curve))
+        short = _path_of(self.path.last, Record(self.path.problem, self.path.record.curve))
         if not np.allclose(whole, measure(short), rtol=1e-9, atol=0):
             raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
                              " earlier states too, whose derivatives are not kept")
         return whole
 
-    def _at(self, entry: PerturbedRun, measure: Any) -> Any:
-        """Return the values of a quantity in a perturbed run."""
+    def _perturbed_value(self, perturbed: PerturbedRun, measure: Any) -> Any:
+        """Return the values of an output quantity in a perturbed run, shape (m,) or a number.
+
+        Args:
+            perturbed: the perturbed run, at its last state.
+            measure: the quantity, see `derivative`.
+        """
         if measure == "volume":
-            return _volume(entry.problem)
-        state = entry.state(self.path.last)
+            return _volume(perturbed.problem)
+        state = perturbed.state(self.path.last)
         if measure == "wall":
-            mine, its = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, entry.problem))
-            same = self.path.problem.comm.allreduce(np.array_equal(mine, its), MPI.LAND)
-            return (self._profiles if same else Profiles(entry.problem)).of(state).thickness
-        if entry.path is None:
-            entry.path = _of_one(state, Record(entry.problem, Curve(entry.problem, self._tolerances)))
-        return entry.path[measure] if isinstance(measure, str) else np.asarray(measure(entry.path), dtype=float)
+            own, others = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, perturbed.problem))
+            same = self.path.problem.comm.allreduce(np.array_equal(own, others), MPI.LAND)
+            return (self._profiles if same else Profiles(perturbed.problem)).of(state).thickness
+        if perturbed.path is None:
+            perturbed.path = _path_of(state, Record(perturbed.problem, Curve(perturbed.problem, self._tolerances)))
+        return perturbed.path[measure] if isinstance(measure, str) else np.asarray(measure(perturbed.path), dtype=float)
 
 
 def _volume(problem: Any) -> float:
-    """Return the reference volume of the whole part, length^3."""
+    """Return the reference volume of the whole part, length^3, also if a half of it is modelled."""
     return float(problem.scene.symmetry_factor * problem.forms.volume)
 
 
-def _of_one(state: Any, record: Record) -> Path:
-    """Return a path of one state."""
+def _path_of(state: Any, record: Record) -> Path:
+    """Return a path that contains one state.
+
+    Args:
+        state: the state.
+        record: an empty record of a run.
+    """
     path = Path(record)
     record.segments[-1].states.append(state)
     for listener in record.hooks.on_state:

@@ -14,13 +14,13 @@ from .parameters import Parameters
 
 @dataclass(frozen=True)
 class Band:
-    """Confidence band of an output quantity of a run, to first order in the parameters.
+    """Confidence band of an output quantity of a run with uncertain parameters, to first order; its text is a table.
 
     Attributes:
         measure: name of the quantity.
-        coordinates: reference lengths of the wall, or numbers, shape (m,).
-        value: values of the run, shape (m,).
-        deviation: standard deviation, shape (m,).
+        coordinates: of the wall, reference lengths of its m nodes, shape (m,), length; of other quantities 0 to m - 1.
+        value: values of the quantity in the run, shape (m,).
+        deviation: standard deviations of the values, shape (m,).
         confidence: confidence level of the band between `low` and `high`, for a normal distribution.
 
     >>> band = fx.Design(lambda c10: (fx.Scene(
@@ -54,7 +54,7 @@ class Band:
         return norm.ppf((1 + self.confidence) / 2) * self.deviation
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
-        """Draw the value and its band over the positions.
+        """Draw the values and their band over `coordinates`.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -84,13 +84,14 @@ class Band:
 
 
 def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray:
-    """Return the covariance of the n numbers of a design.
+    """Return the covariance of the n parameters of a design; a profile counts as one parameter for each knot.
 
     Args:
         caller: name of the caller, for messages.
         parameters: the parameters of the design.
-        given: {parameter: standard deviation}. The knots of a profile are independent and have the same deviation. Or a
-            fit (`Fit`) whose constants have the names of parameters. Or a list of such, independent of each other.
+        given: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations. Or a
+            `Fit` whose constants have the names of parameters, with its covariance. Or a list of such, independent of
+            each other.
 
     Returns:
         Covariance, shape (n, n).
@@ -124,19 +125,19 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
-    """Return a quantity of a run with its confidence band; see `DesignRun.band`.
+    """Return an output quantity of a run with its confidence band for uncertain parameters, to first order.
 
     Args:
         run: the `DesignRun`.
         given: standard deviations of the parameters, see `covariance_of`.
-        measure: name of the quantity, see `DesignRun.derivative`.
+        measure: the quantity, see `DesignRun.derivative`.
         confidence: confidence level of the band, between 0 and 1.
 
     Returns:
-        The band.
+        Values and band of the quantity.
 
     Raises:
-        InputError: a confidence outside (0, 1), or as `DesignRun.spread`.
+        InputError: a confidence outside (0, 1), a name that is no parameter, or the run has no derivative.
     """
     if not 0 < finite("band: confidence", confidence) < 1:
         raise InputError(f"band: confidence = {confidence!r}: must be between 0 and 1")
@@ -146,7 +147,7 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
 
 
 def deviations(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of m values, to first order.
+    """Return the standard deviations of m values that depend on n uncertain parameters, to first order.
 
     Args:
         jacobian: derivatives of the values by the n parameters, shape (m, n).
@@ -159,6 +160,12 @@ def deviations(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def _unknown(caller: str, name: Any, parameters: Parameters) -> InputError:
-    """Return the InputError for an unknown parameter."""
+    """Return the InputError for an unknown parameter, whose message lists the known ones.
+
+    Args:
+        caller: name of the caller, for the message.
+        name: the unknown name.
+        parameters: the parameters of the design.
+    """
     known = dict.fromkeys(entry.partition("[")[0] for entry in parameters.names)
     return InputError(f"{caller}: parameter {name!r} is not known; known: {', '.join(known)}")

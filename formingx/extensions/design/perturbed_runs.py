@@ -1,0 +1,248 @@
+r"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
+
+Each perturbed run has its own problem, built from the scene that the user's function returns. It therefore includes
+every effect of a parameter (nodes, constants, tools, friction, targets, temperatures). A state of the base run
+satisfies equilibrium F = 0 and a constraint c = 0, with the tangent K = dF/dx. Near it a perturbed run solves its own
+equilibrium F' = 0 and constraint c' = 0 by modified Newton iterations:
+
+.. math::
+    K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
+
+with the unknowns x and the control :math:`\lambda`. Without contact, two runs are perturbed, by +dp and -dp of a
+parameter p. The derivative of an output quantity by p is its difference between both over 2 dp, with an error of second
+order in dp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...problem.problem import Problem
+from ...solve.newton import Failure
+from ...solve.state import State
+
+
+@dataclass(frozen=True)
+class PerturbedTolerances:
+    """Convergence criterion of a perturbed run.
+
+    The criterion is the Newton correction of (x, control) over the distance of the perturbed state from the base state.
+
+    Attributes:
+        tolerance: tolerance without contact.
+        tolerance_in_contact: tolerance with contact.
+        last_tolerance: tolerance after the last iteration; above it the perturbed run fails.
+        iterations: maximum number of iterations.
+        round_off: correction over the norm of the base state up to which it counts as round-off.
+    """
+
+    tolerance: float = 1e-9
+    tolerance_in_contact: float = 1e-5
+    last_tolerance: float = 1e-3
+    iterations: int = 12
+    round_off: float = 2e-13
+
+
+_TOLERANCES = PerturbedTolerances()
+
+
+class PerturbedRunFailure(Failure):
+    """Failure to find a perturbed state near the base state: the change is too large for the regularised contact."""
+
+
+class PerturbedRun:
+    """Problem and present state of one perturbed run, a copy of the base run with one parameter slightly changed.
+
+    Args:
+        scene: scene with the changed parameter.
+        end: target or stages with the changed parameter.
+        base: the `Problem` of the base run.
+        name: name of the parameter.
+
+    Attributes:
+        name: name of the parameter.
+        end: target or stages with the changed parameter.
+        path: the state as a path, made when an output quantity first needs it; None before.
+        problem: the `Problem` of the perturbed run.
+        F: residual, a PETSc vector for temporary results.
+        gradient: gradient of a constraint, a PETSc vector for temporary results.
+        x: locally owned unknowns of the state, shape (n,).
+        control: control of the state.
+        memory: history variables of the state.
+        plans: plans of the stages, see `formingx.solve.stage.plan`.
+        piece_end: time at which the present piece of a stage ends.
+
+    Raises:
+        InputError: the elements of the mesh, or the number of items or unknowns, differ from the base run.
+    """
+
+    def __init__(self, scene: Any, end: Any, base: Problem, name: str):
+        self.name, self.end = name, end
+        self.path: Any = None
+        own, others = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
+        if own.shape != others.shape or not np.array_equal(own, others) or len(scene.items) != len(base.scene.items):
+            raise InputError(f"Design: {name} changes the elements of the mesh, or the number of loads, supports or"
+                             f" contacts: there are derivatives only by what moves nodes or changes numbers")
+        self.problem = Problem(scene)
+        if self.problem.x.getSize() != base.x.getSize():
+            raise InputError(f"Design: {name} changes the number of unknowns: there is no derivative by that")
+        self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
+        self.x: Any = None                                   # locally owned entries, shape (n,)
+        self.control, self.memory = 0.0, self.problem.memory
+        self.plans: list[Any] = []
+        self.piece_end = 0.0
+
+    def state(self, base: State) -> State:
+        """Return the present state of the perturbed run as a `State`.
+
+        Args:
+            base: state of the base run, which gives the tangent of the path, the stage and the kind of the state.
+
+        Returns:
+            The state.
+        """
+        return State(self.x, self.control, base.direction, base.slope, memory=self.memory, stage=base.stage,
+                     kind=base.kind, time=self.problem.time_at(self.control))
+
+    def residual(self, base_residual: np.ndarray) -> np.ndarray:
+        """Return the residual of the perturbed run at its state minus the residual of the base run at the base state.
+
+        Args:
+            base_residual: residual of the base run, locally owned entries, shape (n,).
+
+        Returns:
+            Difference, locally owned entries, shape (n,).
+        """
+        self.problem.x.array_w[:] = self.x
+        self.problem.residual(self.problem.x, self.control, self.F)
+        self.F.array_w[:] -= base_residual
+        return np.array(self.F.array_r)
+
+    def balance(self, base_residual: np.ndarray) -> None:
+        """Compute the contact forces of the perturbed run by equilibrium with the internal forces of the body.
+
+        The changes of the gaps are below round-off, so the contact law gives no accurate force.
+
+        Args:
+            base_residual: residual of the base run, locally owned entries, shape (n,).
+        """
+        forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
+        F = self.residual(base_residual)[: self.problem.n_owned]
+        unit = forms.stress * forms.volume / forms.length
+        for face in self.problem.present:
+            touching = face.rule.dofs[face.touching(fields, self.control)]
+            for c in range(len(face.unbalanced)):
+                numbers = np.unique(touching[:, c::len(face.unbalanced)])
+                numbers = numbers[numbers < len(F)]
+                face.unbalanced[c] = unit * F[numbers].sum()
+                F[numbers] = 0.0                                 # a node between two tools counts once
+
+    def constraint(self, equation: Any) -> float:
+        """Return the residual of a constraint at the present state of the perturbed run.
+
+        Args:
+            equation: constraint, a function of (x, control, gradient) that returns the residual first.
+
+        Returns:
+            Residual of the constraint.
+        """
+        self.problem.x.array_w[:] = self.x
+        return float(equation(self.problem.x, self.control, self.gradient)[0])
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.F.destroy()
+        self.gradient.destroy()
+        self.problem.destroy()
+
+
+def settle(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
+           equations: Sequence[Any]) -> np.ndarray:
+    """Solve for the states of the perturbed runs near a state of the base run; collective.
+
+    The problem of the base run must have been restored to the state, with the history variables before it.
+
+    Args:
+        curve: solver of the base run, a `Curve`.
+        state: accepted state of the base run.
+        perturbed: the perturbed runs; their states are updated in place.
+        equation: constraint of the base run, a function of (x, control, gradient). None: the perturbed states lie in
+            the plane normal to the path of the base run.
+        equations: constraint of each perturbed run.
+
+    Returns:
+        Residual of the base run at the state, locally owned entries, shape (n,).
+
+    Raises:
+        PerturbedRunFailure: no perturbed state is found near the base state.
+        Failure: the tangent is singular, or the quantity of the target does not change along the path.
+    """
+    problem, newton = curve.problem, curve.newton
+    problem.x.array_w[:] = state.x
+    if not newton.tangent(problem.x, state.control):
+        raise Failure("the tangent is singular at a state of the run", [])
+    b = newton.b.array_r.copy()
+    if equation is None:
+        problem.metric_times(newton.b, newton.gradient)
+        residual, by_control = 0.0, curve.control_weight
+    else:
+        problem.x.array_w[:] = state.x
+        residual, by_control = equation(problem.x, state.control, newton.gradient)
+    g = newton.gradient.array_r.copy()
+    slope = problem.comm.allreduce(float(g @ b)) + by_control
+    if not abs(slope) > 1e-300:
+        raise Failure("the quantity of the target does not change along the path at its end", [])
+    problem.x.array_w[:] = state.x
+    problem.residual(problem.x, state.control, newton.F)
+    base_residual = newton.F.array_r.copy()                  # round-off, and the forces of points kept open
+
+    def constraint(k: int) -> float:
+        """Return the residual of the constraint of the perturbed run with number k."""
+        run = perturbed[k]
+        if equation is None:
+            return float(problem.comm.allreduce(float(g @ (run.x - state.x))) + by_control * (
+                run.control - state.control))
+        return run.constraint(equations[k]) - residual
+    size = _norm(problem, state.x) + abs(state.control)
+    tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else _TOLERANCES.tolerance
+    todo, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
+    for iteration in range(_TOLERANCES.iterations):
+        rows = np.column_stack([perturbed[k].residual(base_residual) for k in todo])
+        left = np.array([constraint(k) for k in todo])
+        if len(todo) > 1:
+            dx = -newton.solver.solve_all(rows)
+        else:
+            run = perturbed[todo[0]]
+            newton.solver.solve(run.F, run.gradient)
+            dx = -run.gradient.array_r[:, None]
+        steps = -(left + problem.comm.allreduce(g @ dx)) / slope
+        dx += np.outer(b, steps)
+        good = True
+        for j, k in enumerate(todo):
+            run = perturbed[k]
+            correction = _norm(problem, dx[:, j]) + abs(steps[j])
+            if iteration != 1:                               # iteration 1 checks one perturbed run, and updates none
+                run.x, run.control = run.x + dx[:, j], run.control + steps[j]
+            away = _norm(problem, run.x - state.x) + abs(run.control - state.control)
+            if not np.isfinite(correction):
+                raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
+            first[k] = correction if iteration == 0 else first[k]
+            good &= correction <= max(tolerance * away, _TOLERANCES.round_off * size)
+            if iteration == _TOLERANCES.iterations - 1 and correction > max(_TOLERANCES.last_tolerance * away,
+                                                                            10 * _TOLERANCES.round_off * size):
+                raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
+        if good:
+            break
+        # the error is now of second order: if the most corrected run has converged, so have the others
+        todo = [int(np.argmax(first))] if iteration == 0 else list(range(len(perturbed)))
+    return base_residual
+
+
+def _norm(problem: Any, x: np.ndarray) -> float:
+    """Return the Euclidean norm, over all ranks, of the vector with the locally owned entries x, shape (n,)."""
+    return float(np.sqrt(problem.comm.allreduce(float(x @ x))))
