@@ -1,1 +1,1 @@
-"""Constants of materials from tests: fits, in time too, their uncertainty, plots."""
+"""Fits of material constants to tests, also to tests in time, with their uncertainty and plots."""

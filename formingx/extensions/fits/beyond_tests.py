@@ -1,4 +1,4 @@
-"""Check of a run against the tests from which the constants of its materials were fitted."""
+"""Checks that the deformation of a run lies within the tests to which the constants of its materials were fitted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...mesh.triangles import place
 from ...ranks import gathered
 from .tested import MeasuredRange, mode_of, principal
 
-_SHARE = 0.005             # of a layer's volume that may lie outside the tests without a warning
+_SHARE = 0.005             # share of a layer's volume that may lie outside the tests without a warning
 
 
 @register("scene")
@@ -26,10 +26,10 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
     """Find constants that tests leave undetermined, and expected stretches beyond the tests.
 
     Args:
-        body: the examined body.
+        body: the examined body, whose `scene` has the materials.
 
     Yields:
-        Findings.
+        A finding for each layer with such constants, and for each expected stretch beyond its tests.
     """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
@@ -46,13 +46,13 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def ends_beyond_tests(path: Any) -> Iterator[Finding]:
-    """Find parts of the body whose last deformation the tests of its material do not cover; collective.
+    """Find layers with a deformation in the last state that the tests of their material do not cover; collective.
 
     Args:
         path: the computed `Path`.
 
     Yields:
-        Findings.
+        A finding for each layer of which at least 0.5 % of the volume is deformed beyond the tests.
     """
     problem, scene = path.problem, path.problem.scene
     known = dict(_tested(scene))
@@ -78,7 +78,13 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
 
 
 def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
-    """Return the nearest mode and its tested range, as text."""
+    """Return a text with the test that is nearest to a deformation, and its range of stretches.
+
+    Args:
+        tested: tests of the material.
+        largest: largest logarithmic strain of the deformation.
+        middle: middle logarithmic strain.
+    """
     mode = mode_of(largest, middle)
     found = tested.ranges.get(mode.replace(" ", "_"))
     if found is not None:
@@ -87,15 +93,21 @@ def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
 
 
 def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
-    """Return (layer, tests) of each layer whose material has a record of its tests."""
+    """Return (layer, its tests) of each layer of a scene whose material stores its tests."""
     found = [(layer, material.base.tested) for layer, material in scene.materials.items()]
     return [(layer, tested) for layer, tested in found if tested is not None]
 
 
 def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (largest and middle logarithmic strain, reference points, reference volumes) at all quadrature points.
+    """Return the strains at all n quadrature points of layers with one material, gathered from all ranks; collective.
 
-    The shapes are (n, 2), (n, 2) or (n, 3), and (n,); of all ranks.
+    Args:
+        problem: the `Problem`, in the examined state.
+        terms: terms of the forms that belong to these layers.
+
+    Returns:
+        Largest and middle logarithmic strain, shape (n, 2); reference positions, shape (n, 2) or (n, 3), length;
+        reference volumes of the points, shape (n,).
     """
     forms, cells = problem.forms, terms.own_cells
     F = shapes_of(forms, cells, terms.places)

@@ -1,4 +1,4 @@
-"""Published test data to fit materials to."""
+"""Published tests of materials, as data for fits."""
 
 import numpy as np
 
@@ -17,10 +17,10 @@ _TRELOAR_1944 = {
 
 
 def treloar1944() -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return Treloar's (1944) tests of vulcanised rubber, digitised from his curves.
+    """Return Treloar's (1944) tests of vulcanised rubber, digitised from his published curves.
 
     Returns:
-        {test: (stretch, nominal stress in MPa)}, arrays of shape (n,).
+        {test: (stretches, nominal stresses in MPa)}, arrays of shape (n,) each.
 
     >>> sorted(fx.treloar1944())
     ['equibiaxial', 'pure_shear', 'uniaxial']

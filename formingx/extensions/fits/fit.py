@@ -22,32 +22,34 @@ from .uncertainty import Uncertainty, uncertainty
 from .weights import of_numbers
 
 _FIRST = 20
-"""Evaluations for every first guess."""
+"""Largest number of evaluations of the residual from each first guess."""
 
 _LAST = 400
-"""Evaluations for the best three."""
+"""Largest number of evaluations from each of the best three results, to refine them."""
 
 IN_TIME: list[tuple[type, Callable]] = [(RelaxingMaterial, fitted_in_time)]
-"""Kinds of material that are fitted to tests in time, each with its function."""
+"""Classes of materials that are fitted to tests in time, each with the function that fits it."""
 
 
 class Fit(NamedTuple):
-    """Result of a fit.
+    """Result of `fit`; its text is a summary.
+
+    The misfit is the computed minus the measured nominal stress. Tests in time are numbered.
 
     Attributes:
-        material: the material with the fitted constants, in the data's unit of stress. Its `tested` is the range of the
-            tests; runs warn of deformations beyond it.
-        constants: {name: value} of the fitted constants.
-        rms: {test: root mean square of the nominal stress' misfit}, stress; tests in time are numbered.
-        rms_total: the same over all points.
-        deviations: {test: root mean square of the misfit over the measured stress}; stresses below 2 % of the test's
-            largest count as these 2 %.
-        errors: {constant: its standard error}, see `uncertainty`.
-        undetermined: names of the constants whose standard error exceeds half of their value. The error is computed for
-            a noise of 1 % of the stress, or for the misfit if that is larger.
-        covariance: of the constants, shape (p, p), in the order of `constants`.
+        material: the material with the fitted constants, in the unit of stress of the tests. Its attribute `tested`
+            stores the range of the tests; runs warn of deformations beyond it.
+        constants: {constant: value} of the p fitted constants.
+        rms: {test: root mean square of the misfit}, stress.
+        rms_total: root mean square of the misfit over the points of all tests, stress.
+        deviations: {test: root mean square of the misfit over the measured stress}. Stresses below 2 % of the largest
+            stress of the test count as these 2 %.
+        errors: {constant: standard error}; nan with no more points than constants, infinite without effect.
+        undetermined: names of the constants whose standard error exceeds half of their value. This error is computed
+            for a noise of 1 % of the stress, or for the misfit if that is larger.
+        covariance: covariance of the constants, shape (p, p), in the order of `constants`.
         points: number of measured stresses.
-        data: the tests, as `fit` takes them.
+        data: the tests, as they were given to `fit`.
     """
 
     material: Material
@@ -62,7 +64,9 @@ class Fit(NamedTuple):
     data: Any
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Return {constant: (lowest, highest)} by Student's t distribution, for stresses linear in the constants.
+        """Return the confidence interval of each constant by Student's t distribution.
+
+        The intervals hold if the stresses are linear in the constants.
 
         Args:
             confidence: confidence level, between 0 and 1.
@@ -81,10 +85,11 @@ class Fit(NamedTuple):
                 for name, value in self.constants.items()}
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
-        """Draw the data and the material's nominal stress against stretch, of relaxation tests against time.
+        """Draw measured and fitted nominal stresses over the stretch; of relaxation tests over the time.
 
         Args:
-            axes: matplotlib axes; a pair if only some of the tests are relaxation tests; default a new figure.
+            axes: matplotlib axes; a pair if only some of the tests are relaxation tests, these on the first. Default: a
+                new figure.
             unit: unit of stress, for the label.
             unit_of_time: unit of time, for the label.
 
@@ -107,37 +112,38 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
         weights: Any = None, within: tuple[float, float] | None = None) -> Fit:
     """Fit the constants of a material to tests by least squares of the nominal stress.
 
-    From several first guesses the best result counts. The constants stay admissible, and no step leaves a material's
-    limit (Gent, Arruda-Boyce). A misfit counts relative to the measured stress. For Treloar's rubber an absolute misfit
-    weighs the last points of the uniaxial test alone. Its constants miss the limit pressure of his sheet by 12 to 31 %,
-    constants of a relative misfit by 1 to 16 % (`demos/measured_treloar.py`).
+    The fit starts from several first guesses, and the best result counts. All constants are admissible, and no stretch
+    of the tests exceeds the limit of the material (Gent, Arruda-Boyce). By default each misfit of a stress is divided
+    by the measured stress. With absolute misfits, the fit to Treloar's rubber follows the last points of the uniaxial
+    test alone. These constants give a limit pressure of his sheet that is wrong by 12 to 31 %, constants of relative
+    misfits by 1 to 16 % (`demos/measured_treloar.py`).
 
     Args:
-        material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess: a
-            `Hyperelastic` must be given so. A `KBKZ` with a damping is given so too: the damping is fitted, and its
-            spectrum stays (see `fit_spectrum`).
-        data: {test: (stretch, nominal stress)}, each of shape (n,), for any of "uniaxial", "pure_shear" (planar) and
-            "equibiaxial". For "biaxial" it is (stretch 1, stretch 2, nominal stress 1, nominal stress 2); a stress that
-            was not measured is nan. Force over reference area, in any unit: the constants get the same.
+        material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess. A
+            `Hyperelastic` must be given as a material, and so must a `KBKZ` with a damping. Of this the damping is
+            fitted, and the spectrum does not change (see `fit_spectrum`).
+        data: {test: (stretches, nominal stresses)}, arrays of shape (n,), for any of "uniaxial", "pure_shear" (planar)
+            and "equibiaxial". For "biaxial" it is (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); a
+            stress that was not measured is nan. The constants get the unit of the stress, force over reference area.
             For a material that relaxes: a list of `TimedTest`.
-            Or the name of a CSV file (see `csv_files.records`) with the columns test, stretch, stress (nominal), in any
-            order if the first line names them, else in this order. Units in brackets are checked, not converted. A file
-            for a relaxing material has a column with the time; each test begins where the time decreases. Its rows are
-            as in `TimedTest`; a stress that was not measured is left empty.
+            Or the name of a CSV file with the columns test, stretch and stress (nominal). They may be in any order if
+            the first line names them, else in this order. Units in brackets are checked, not converted. A file for a
+            relaxing material has a column with the time; each test begins where the time decreases. Its rows are as in
+            `TimedTest`; a stress that was not measured is left empty.
         terms: number of terms if `material` is the class `Ogden`, default 3. For a relaxing class it is the number of
-            branches, default as many as the data determine; the equilibrium is then neo-Hookean.
-        relative: True: misfits over the measured stress, or over 2 % of the test's largest if that is more. False:
-            misfits in stress, every point with the same weight.
-        weights: {test: weight} of the squared misfits of its points, or for tests in time one number each; default 1.
-        within: (lowest, highest): only points at such stretches count; of biaxial tests both stretches.
+            branches, default as many as the tests determine; the equilibrium is then neo-Hookean.
+        relative: True: each misfit is divided by the measured stress, or by 2 % of the largest stress of the test if
+            that is more. False: misfits in stress, every point with the same weight.
+        weights: {test: weight of the squared misfits of its points}; for tests in time, one number for each. Default 1.
+        within: lowest and highest stretch of the points that count; of biaxial tests both stretches must lie between.
 
     Returns:
-        The `Fit`.
+        Fitted material, with misfits and uncertainty of the constants.
 
     Raises:
-        InputError: data that are not finite, stretches that are not positive, arrays of different length, fewer points
-            than constants, or no strain at all. Also an unknown test, stresses whose sign differs from the sign of the
-            strains, or stretches beyond every admissible limit.
+        InputError: tests with numbers that are not finite, stretches that are not positive, arrays of different length,
+            fewer points than constants, or no strain at all. Also an unknown test, stresses whose sign differs from the
+            sign of the strains, or stretches beyond every admissible limit.
 
     >>> stretch = np.array([1.2, 1.6, 2.0])
     >>> found = fx.fit(fx.MooneyRivlin, {"uniaxial": (stretch, 2 * (stretch - stretch**-2) * (0.2 + 0.05 / stretch))})
@@ -156,7 +162,17 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
 def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
              within: Any) -> Fit:
-    """Return the fit of a material that relaxes."""
+    """Return the fit of a material to tests in time.
+
+    Args:
+        fitted: function that fits materials of this class, see `IN_TIME`.
+        material: class, or material with initial constants.
+        data: list of `TimedTest`, or the name of a CSV file.
+        terms: see `fit`.
+        relative: see `fit`.
+        weights: weight of each test, or None.
+        within: see `fit`.
+    """
     tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
     many = len(tests) if isinstance(tests, list | tuple) else 0
     relaxing, constants, used, found = fitted(material, tests, terms, relative, of_numbers(weights, many), within)
@@ -181,7 +197,18 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
-    """Return the result of a fit from its misfits."""
+    """Return the result of a fit.
+
+    Args:
+        material: material with the fitted constants.
+        constants: {constant: value} of the fitted constants.
+        parts: {test: slice of its points}.
+        misfit: computed minus measured stress at all m points, shape (m,).
+        measured: measured stress at all points, shape (m,).
+        found: uncertainty of the constants.
+        tested: range of the tests.
+        data: the tests, as they were given to `fit`.
+    """
     card = copy.copy(material)
     card.tested = tested
     deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), 0.02 * abs(measured[part]).max()))
@@ -191,7 +218,16 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
 
 
 def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
-    """Return (the material, the uncertainty of its constants)."""
+    """Fit a material to tests without time; return it with the uncertainty of its constants.
+
+    Args:
+        material: class, or material with initial constants.
+        points: measured stresses of all tests.
+        terms: number of terms of the class `Ogden`, or None.
+
+    Raises:
+        InputError: fewer points than constants, or no finite stress at some stretch of the tests.
+    """
     from scipy.optimize import least_squares
     guesses = _guesses(material, points, terms)
     response, n, measured = guesses[0].response, len(guesses[0].parameters), points.measured
@@ -199,7 +235,10 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
 
     def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
-        """Return (cost, guess, coordinates) after this number of evaluations; the cost is infinite where stress is."""
+        """Return (cost, guess, its fitted coordinates) after a least-squares fit with at most this many evaluations.
+
+        The cost is infinite if the stress of the guess is not finite at some stretch.
+        """
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):
@@ -214,7 +253,7 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         return found.cost, guess, found.x
 
     def cost(trial: tuple) -> float:
-        """Return the cost of a trial, for sorting."""
+        """Return the cost of a result of `refined`, to sort by it."""
         return trial[0]
 
     trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)
@@ -227,10 +266,10 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
 
 
 def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
-    """Return {test: (stretch, stress)} of a file.
+    """Return {test: (stretches, stresses)} of a CSV file without times.
 
     Raises:
-        InputError: a fourth column, the time: the material does not relax.
+        InputError: the file has a fourth column with the time.
     """
     found: dict[str, list] = {}
     for mode, columns in read_tests(place("fit: data", file)):
@@ -242,7 +281,11 @@ def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
 
 
 def _tests_in_time(file: Any) -> list[TimedTest]:
-    """Return the tests in time of a file."""
+    """Return the tests in time of a CSV file.
+
+    Raises:
+        InputError: the file has no fourth column with the time.
+    """
     tests = read_tests(place("fit: data", file))
     if any(len(columns) != 3 for _, columns in tests):
         raise InputError(f"fit: data: {file}: has no times: a material that relaxes needs a fourth column with"
@@ -251,7 +294,16 @@ def _tests_in_time(file: Any) -> list[TimedTest]:
 
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:
-    """Return the initial materials of a fit."""
+    """Return materials with the constants from which a fit starts.
+
+    Args:
+        material: class, or material with initial constants.
+        points: measured stresses of all tests.
+        terms: number of terms of the class `Ogden`, or None.
+
+    Raises:
+        InputError: no material, terms that it does not have, or stresses whose sign differs from the strains.
+    """
     if isinstance(material, Material):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r} is for the class Ogden; {material} has its terms already")

@@ -1,4 +1,4 @@
-"""Relaxation spectrum of a melt from oscillation tests, and its damping from tests at large strain."""
+"""Fits of the relaxation spectrum of a melt to oscillation tests, and of its damping to tests at large strain."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .uncertainty import Uncertainty, uncertainty
 from .weights import scales
 
 _PER_DECADE = 2.0
-"""Relaxation times for each decade of frequency."""
+"""Number of relaxation times for each decade of frequency."""
 _BEYOND = 1.5
-"""Factor by which relaxation times go beyond the inverse frequencies at both ends."""
+"""Factor by which the range of relaxation times exceeds the range of inverse frequencies at both ends."""
 
 
 class Spectrum(NamedTuple):
-    """Relaxation spectrum of a melt.
+    """Relaxation spectrum of a melt, fitted to its storage and loss moduli.
 
     Attributes:
-        pairs: list of (modulus, relaxation time), stress and time, for `KBKZ`.
-        deviation: root mean square of the relative misfit of both moduli.
+        pairs: list of (modulus G, relaxation time tau), stress and time, for `KBKZ`.
+        deviation: root mean square of the relative misfits of storage and loss modulus.
     """
 
     pairs: list[tuple[float, float]]
@@ -34,26 +34,27 @@ class Spectrum(NamedTuple):
 
     @property
     def viscosity(self) -> float:
-        """Zero-shear viscosity, the sum of G tau; stress times time."""
+        """Zero-shear viscosity, the sum of modulus times relaxation time; stress times time."""
         return math.fsum(G * tau for G, tau in self.pairs)
 
 
 def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = None) -> Spectrum:
-    r"""Fit a relaxation spectrum to the moduli of small oscillations.
+    r"""Fit a relaxation spectrum to the storage and loss moduli of small oscillations.
 
     .. math:: G'(\omega) = \sum_k G_k \frac{\omega^2 \tau_k^2}{1 + \omega^2 \tau_k^2}, \quad
               G''(\omega) = \sum_k G_k \frac{\omega \tau_k}{1 + \omega^2 \tau_k^2}
 
-    The times are in geometric progression. The nonnegative moduli minimise the sum of the squared relative misfits
-    (Lawson and Hanson 1974). Times with a zero modulus are left out.
+    The relaxation times tau are in geometric progression. The moduli G are nonnegative and minimise the sum of the
+    squared relative misfits (Lawson and Hanson 1974). Times with a zero modulus are left out.
 
     Args:
-        frequencies: angular frequencies, 1/time, shape (n,).
-        storage, loss: G' and G'', stress, shape (n,).
-        terms: number of times; default two for each decade of frequency.
+        frequencies: angular frequencies omega, 1/time, shape (n,).
+        storage: storage moduli G' at these frequencies, stress, shape (n,).
+        loss: loss moduli G'' at these frequencies, stress, shape (n,).
+        terms: number of relaxation times; default two for each decade of frequency.
 
     Returns:
-        The `Spectrum`.
+        Pairs of modulus and relaxation time, with the misfit.
 
     Raises:
         InputError: arrays of different length, or a number that is not above 0.
@@ -83,21 +84,22 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
 
 def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
-    """Fit the damping of a melt; see `fit`.
+    """Fit the damping function of a melt to tests in time; its spectrum does not change.
 
     Args:
         material: a `KBKZ` with the initial damping.
         tests: list of `TimedTest`.
         terms: must be None.
-        relative: see `fit`.
+        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
         weights: weight of each test.
-        within: see `fit`.
+        within: lowest and highest stretch of the points that count, or None.
 
     Returns:
-        The material, its constants of damping, the tests, and their uncertainty.
+        Material with the fitted damping; {constant of the damping: value}; the tests as arrays; uncertainty of the
+        constants.
 
     Raises:
-        InputError: the tests or arguments do not fit the material.
+        InputError: a material without a damping to fit, `terms`, fewer points than constants, or wrong tests.
     """
     from scipy.optimize import least_squares
     if not isinstance(material, KBKZ) or material.damping is None or not material.damping.bounds:
@@ -114,11 +116,11 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
         raise InputError(f"fit: {len(row)} points cannot fix the {len(names)} constants of {law.__name__}")
 
     def with_damping(damping: Damping) -> KBKZ:
-        """Return the material with another damping."""
+        """Return a copy of the material with another damping."""
         return KBKZ(material.spectrum, damping, material.equilibrium, irreversible=material.integral.irreversible)
 
     def stress(x: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses for constants of damping, shape (n,)."""
+        """Return the nominal stresses at all n measured points for constants x of the damping; nan beyond bounds."""
         if np.any(x < low) or np.any(x > high):
             return np.full(len(row), np.nan)
         card = with_damping(law(*map(float, x)))

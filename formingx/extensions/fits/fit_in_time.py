@@ -1,8 +1,9 @@
-"""Constants of a material that relaxes from tests in time: relaxation, constant rates, any history.
+"""Fits of the constants of a material that relaxes to tests in time: relaxation, constant rates, or any history.
 
-The stress of a branch is mu times a function of tau alone, which is computed once for a row of tau. The best fit of a
-spectrum with nonnegative moduli (Lawson and Hanson 1974) is the initial guess. A least-squares fit of all constants
-follows, with the logarithms of mu and tau as variables, so every result is admissible.
+A branch has a modulus mu and a relaxation time tau. Its stress in a test is mu times a function of tau alone, which is
+computed once for a sequence of tau. The best fit of a spectrum with nonnegative moduli (Lawson and Hanson 1974) is the
+initial guess. A least-squares fit of all constants follows, with the logarithms of mu and tau as variables, so that
+every result is admissible.
 """
 
 from __future__ import annotations
@@ -21,19 +22,20 @@ from .uncertainty import Uncertainty, uncertainty
 from .weights import in_range, scales
 
 _PER_DECADE = 16
-"""Relaxation times a decade at which a branch's stress is computed; between them a cubic spline."""
+"""Number of relaxation times per decade at which the stress of a branch is computed; a cubic spline connects them."""
 
 
 class TimedTest(NamedTuple):
-    """A homogeneous test in time of a body that is undeformed before.
+    """Homogeneous test in time, with n points, of a body that is undeformed and relaxed before the test.
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times, shape (n,), not decreasing. The first stretch is applied suddenly at the first time; two stretches
-            at the same time are a jump. A constant stretch with a positive first time is applied at time 0.
-        stretches: shape (n,).
-        stress: nominal, shape (n,); not a number where it was not measured.
-        between: the quantity that grows at a constant rate between two times, "stretch" or "strain" (logarithmic).
+        times: times of the points, shape (n,), not decreasing. The first stretch is applied suddenly at the first time;
+            two stretches at the same time are a jump. A constant stretch with a positive first time is applied at time
+            0.
+        stretches: stretches at these times, shape (n,).
+        stress: nominal stresses at these times, shape (n,); nan where the stress was not measured.
+        between: quantity that changes at a constant rate between two points, "stretch" or "strain" (logarithmic).
 
     >>> held = fx.TimedTest("uniaxial", times=[0.0, 1.0, 5.0], stretches=[1.0, 2.0, 2.0], stress=[0.0, 1.2, 0.9])
     >>> held.between                                                        # constant rate from time 0 to 1
@@ -48,13 +50,13 @@ class TimedTest(NamedTuple):
 
     @classmethod
     def relaxation(cls, mode: str, stretch: float, times: Any, stress: Any) -> TimedTest:
-        """Return a relaxation test: a stretch applied at once at time 0 and kept constant.
+        """Return a relaxation test, with a stretch that is applied suddenly at time 0 and then constant.
 
         Args:
-            mode: see the class.
-            stretch: the stretch.
-            times: times of the stresses, above 0, rising, shape (n,).
-            stress: nominal stress at these times, shape (n,).
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            stretch: the constant stretch.
+            times: times of the measured stresses, above 0, increasing, shape (n,).
+            stress: nominal stresses at these times, shape (n,).
 
         Returns:
             The test.
@@ -64,13 +66,13 @@ class TimedTest(NamedTuple):
 
     @classmethod
     def constant_rate(cls, mode: str, rate: float, stretches: Any, stress: Any) -> TimedTest:
-        """Return a test at a constant Hencky rate from stretch 1.
+        """Return a test at a constant Hencky rate (rate of the logarithmic strain), which begins at stretch 1.
 
         Args:
-            mode: see the class.
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
             rate: Hencky rate, 1/time, above 0.
-            stretches: stretches, in order, shape (n,).
-            stress: nominal stress at these stretches, shape (n,).
+            stretches: stretches of the measured stresses, in order, shape (n,).
+            stress: nominal stresses at these stretches, shape (n,).
 
         Returns:
             The test.
@@ -83,21 +85,22 @@ class TimedTest(NamedTuple):
 def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
                    weights: list[float], within: Any
                    ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
-    """Fit a relaxing material to tests in time; see `fit`.
+    """Fit the constants of a relaxing material to tests in time.
 
     Args:
         material: class, or material with initial constants.
         tests: list of `TimedTest`.
-        terms: number of branches, or None.
-        relative: see `fit`.
+        terms: number of branches for a class; None for as many as the tests determine, at most 10.
+        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
         weights: weight of each test.
-        within: see `fit`.
+        within: lowest and highest stretch of the points that count, or None.
 
     Returns:
-        The material, its constants, the tests, and their uncertainty.
+        Material with the fitted constants; {constant: value}; the tests as arrays; uncertainty of the constants.
 
     Raises:
-        InputError: the tests or arguments do not fit the material.
+        InputError: wrong tests, fewer points than constants, no finite stress at some stretch, or `terms` for a
+            material that has branches already.
     """
     data = _Data(checked_tests(tests, within), material if isinstance(material, type) else type(material), relative,
                  weights)
@@ -119,13 +122,17 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """Return the tests as arrays, with nan for stresses at stretches outside `within`.
+    """Return tests in time as arrays, checked, with nan for stresses at stretches outside a range.
+
+    Args:
+        tests: list of `TimedTest`.
+        within: lowest and highest stretch of the points that count, or None for all.
 
     Returns:
-        The tests.
+        The tests. A constant stretch with a positive first time gets a point at time 0.
 
     Raises:
-        InputError: an argument that is no list of tests, or a test with inconsistent arrays.
+        InputError: an argument that is no list of tests, a test with inconsistent arrays, or no stress other than 0.
     """
     found = []
     for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
@@ -141,11 +148,31 @@ def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
 
 
 def _first(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
+    """Return a material of a class with a neo-Hookean equilibrium and one branch, with all constants 1."""
     return kind(NeoHookean(c10=1.0), [(1.0, 1.0)])
 
 
 class _Data:
-    """The tests, and the stresses of an equilibrium energy and of branches in them; all points in one row."""
+    """Measured stresses of all tests as one vector, and the stresses of a relaxing material at the same n points.
+
+    Args:
+        tests: the checked tests.
+        law: class of the material.
+        relative: True for misfits over the measured stress, False for misfits in stress.
+        weights: weight of each test.
+
+    Attributes:
+        tests: the checked tests.
+        stress: measured nominal stresses, shape (n,).
+        scale: largest measured stress.
+        sizes: stress by which each misfit is divided, shape (n,).
+        log_tau: logarithms of the relaxation times at which the stress of a branch is computed, shape (k,).
+        branch: spline over the logarithm of the relaxation time, which gives the stresses of a branch of unit modulus.
+        largest_I1: largest first invariant of C at the points.
+
+    Raises:
+        InputError: the times of each test are all the same.
+    """
 
     def __init__(self, tests: list[TimedTest], law: type[RelaxingMaterial], relative: bool, weights: list[float]):
         self.tests = tests
@@ -168,27 +195,51 @@ class _Data:
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
     def relaxed(self, material: Material | None, constants: Any = None) -> np.ndarray:
-        """Return the nominal stress of an equilibrium energy at all points, shape (n,); not finite beyond its limit."""
+        """Return the nominal stresses of a hyperelastic material at all points, shape (n,).
+
+        They are not finite beyond the limit of the material.
+
+        Args:
+            material: the material, or None for no stress.
+            constants: other values of its constants, unchecked, or None for its own.
+        """
         if material is None:
             return np.zeros(len(self.stress))
         values = material.parameters.values() if constants is None else constants
         return material.response.stress(self._stretches, values)[0]
 
     def stresses(self, material: RelaxingMaterial, constants: np.ndarray) -> np.ndarray:
-        """Return the nominal stress of a material with other, unchecked constants at all points, shape (n,)."""
+        """Return the nominal stresses of a relaxing material with other constants at all points, shape (n,).
+
+        Args:
+            material: the relaxing material, with b branches.
+            constants: constants of the equilibrium, then b pairs of modulus and relaxation time; unchecked.
+        """
         n = len(constants) - 2 * len(material.branches)
         mu, tau = constants[n::2], constants[n + 1::2]
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
         return self.relaxed(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
 
     def uncertainty(self, material: RelaxingMaterial) -> Uncertainty:
-        """See `uncertainty`."""
+        """Return the uncertainty of the fitted constants of a relaxing material."""
         return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress, self.sizes)
 
 
 def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
-    """Return (the material with its constants and this number of branches fitted, root mean square of the scaled
-    misfit)."""
+    """Fit the constants of a relaxing material with n branches to the tests.
+
+    Args:
+        data: the tests.
+        material: relaxing material whose constants are one of the initial guesses if it has n branches.
+        n: number of branches.
+
+    Returns:
+        The fitted material, with its branches in ascending order of relaxation time; root mean square of the scaled
+        misfits.
+
+    Raises:
+        InputError: fewer points than constants, or no finite stress at some stretch of the tests.
+    """
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
         raise InputError(f"fit: {len(data.stress)} points cannot fix the {needed} constants of"
@@ -221,7 +272,10 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
 
 
 def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
-    """Return starts with this number of branches: the material's own, and two from the best spectrum."""
+    """Return materials with n branches from which a fit starts: two from the best spectrum, and the given material.
+
+    The given material counts only if it has n branches. For the arguments see `_refined`.
+    """
     from scipy.optimize import nnls
     rest = material.equilibrium
     shape = data.relaxed(rest)[:, None] / data.sizes[:, None]
@@ -241,7 +295,16 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """Return a material of this kind with its modulus times a factor, for data up to this I1."""
+    """Return an equilibrium material with its shear modulus times a factor.
+
+    Args:
+        material: the material, or None.
+        factor: factor of the shear modulus.
+        I1: largest first invariant of the tests, within the limit of the result.
+
+    Returns:
+        First guess of the same class, or the material itself if its class has none; None for None.
+    """
     if material is None:
         return None
     try:
@@ -251,7 +314,15 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
 
 
 def _checked(name: str, test: TimedTest) -> dict[str, Any]:
-    """Return the arguments of a test as arrays; raise an InputError for inconsistent ones."""
+    """Return times, stretches and stresses of a test as arrays: {argument of `TimedTest`: array}.
+
+    Args:
+        name: name of the test, for messages.
+        test: the test.
+
+    Raises:
+        InputError: wrong or inconsistent arrays, or a first stretch without the time of its application.
+    """
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:
         stress = np.asarray(test.stress, float)

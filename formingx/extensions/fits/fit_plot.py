@@ -1,4 +1,4 @@
-"""Data and fitted material in one picture."""
+"""Figures of tests and of the material that was fitted to them."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ from ...figures import figure
 
 
 def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
-    """Draw data and fitted material; see `Fit.plot`.
+    """Draw measured and fitted nominal stresses over the stretch; of relaxation tests over the time.
 
     Args:
-        material: the material.
-        data: the tests.
-        axes: matplotlib axes, or None.
+        material: the fitted material.
+        data: the tests, {test: columns} or a list of `TimedTest`.
+        axes: matplotlib axes, a pair if only some of the tests are relaxation tests; None for a new figure.
         unit: unit of stress, for the label.
         unit_of_time: unit of time, for the label.
 
@@ -22,7 +22,7 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
         The matplotlib axes.
 
     Raises:
-        InputError: relaxation tests and other tests on one axes.
+        InputError: one matplotlib axes for relaxation tests and other tests together.
     """
     held = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
     count = 1 + (any(held) and not all(held))
@@ -45,7 +45,7 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
 
 
 def _stretched(material: Any, data: dict, panel: Any) -> None:
-    """Draw tests without time, and the curves of the material."""
+    """Draw stresses of tests without time over the stretch on matplotlib axes `panel`, with curves of the material."""
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _biaxial(material, (l, *others, P), panel)
@@ -56,7 +56,13 @@ def _stretched(material: Any, data: dict, panel: Any) -> None:
 
 
 def _biaxial(material: Any, columns: Any, panel: Any) -> None:
-    """Draw both stresses over the first stretch, and the stresses of the material as crosses."""
+    """Draw stresses of a biaxial test over its first stretch, and the stresses of the material as crosses.
+
+    Args:
+        material: the fitted material.
+        columns: (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2), shape (n,) each.
+        panel: matplotlib axes.
+    """
     l1, l2, *stresses = (np.asarray(x, float) for x in columns)
     computed = material.stress("biaxial", np.stack([l1, l2]))
     for k, (P, found) in enumerate(zip(stresses, computed), 1):
@@ -65,7 +71,14 @@ def _biaxial(material: Any, columns: Any, panel: Any) -> None:
 
 
 def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
-    """Draw tests at constant stretch on the first panel, against a logarithmic time; the others on the last."""
+    """Draw stresses of tests in time, with curves of the material.
+
+    Args:
+        material: the fitted material.
+        tests: the tests in time.
+        held: True for each test at constant stretch: it is drawn over the logarithmic time, else over the stretch.
+        panels: matplotlib axes; tests at constant stretch are drawn on the first, the others on the last.
+    """
     for i, (test, still) in enumerate(zip(tests, held), 1):
         panel = panels[0] if still else panels[-1]
         t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
@@ -77,5 +90,5 @@ def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
 
 
 def _rate(times: np.ndarray, stretches: np.ndarray) -> str:
-    """Return the mean Hencky rate, for a legend."""
+    """Return the mean Hencky rate of a test as text, for a legend."""
     return f"rate {abs(np.log(stretches[-1] / stretches[0])) / (times[-1] - times[0]):.3g}"

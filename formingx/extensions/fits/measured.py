@@ -1,4 +1,4 @@
-"""Tests from a file with columns test, stretch, stress, and optionally time."""
+"""Tests from a CSV file with columns test, stretch, stress, and optionally time."""
 
 import itertools
 from pathlib import Path
@@ -18,18 +18,16 @@ _UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
 
 
 def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
-    """Read the tests of a CSV file; see `fit`.
+    """Read the tests of a CSV file, see `fit`.
 
-    The columns are (stretch, stress) or (stretch, stress, time), shape (2 or 3, n); an empty stress is nan.
-
-    A test ends where its name changes or the time decreases. The columns are (stretch, stress) or (stretch, stress,
-    time); an empty stress is nan.
+    A test ends where its name changes or the time decreases.
 
     Args:
-        file: path of the file.
+        file: path of the CSV file.
 
     Returns:
-        List of (test, columns), columns of shape (2 or 3, n).
+        List of (name of the test, array). The rows of the array are stretch, nominal stress and, if the file has it,
+        time, shape (2, n) or (3, n). An empty stress is nan.
 
     Raises:
         InputError: a file that cannot be read or has no rows, a header without these columns or with another unit, or a
@@ -54,7 +52,15 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
 
 
 def _columns(caller: str, head: list[str]) -> list[int]:
-    """Return the columns of test, stretch, stress and, if there is one, time, by their names in the first line."""
+    """Return the numbers of the columns with test, stretch, stress and, if there is one, time.
+
+    Args:
+        caller: name of the caller and the file, for messages.
+        head: names of the columns, the first line of the file.
+
+    Raises:
+        InputError: a missing or doubled column, or an unknown unit.
+    """
     found: dict[str, int] = {}
     for k, cell in enumerate(head):
         words, unit = name_and_unit(cell)
@@ -73,7 +79,14 @@ def _columns(caller: str, head: list[str]) -> list[int]:
 
 
 def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
-    """Return the kind of test ("uniaxial", ...) that a row of the file names, checked."""
+    """Return the name of the test ("uniaxial", ...) in a row of the file, checked.
+
+    Args:
+        where: file and line, for messages.
+        row: cells of the row.
+        width: number of cells that a row must have.
+        columns: numbers of the columns with test, stretch, stress and, if there is one, time.
+    """
     if len(row) != width or len(columns) not in (3, 4):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")
@@ -82,7 +95,13 @@ def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
 
 
 def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
-    """Return the numbers of a row."""
+    """Return the numbers in a row of the file: stretch, stress (nan if empty) and, if there is one, time.
+
+    Args:
+        where: file and line, for messages.
+        row: cells of the row.
+        columns: numbers of the columns with test, stretch, stress and, if there is one, time.
+    """
     cells = [row[k] for k in columns[1:]]
     for i, cell in enumerate(cells):
         if not is_number(cell) and not (cell == "" and i == 1 and len(cells) == 3):
@@ -91,7 +110,11 @@ def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
 
 
 def _counted(points: list[tuple[str, list[float]]]) -> list[int]:
-    """Return the number of the test of each point; a test ends where its name changes or the time starts again."""
+    """Return for each row of the file the number of its test; a test ends where its name changes or time decreases.
+
+    Args:
+        points: (name of the test, [stretch, stress and, if there is one, time]) of each row.
+    """
     found, n = [], 0
     for (mode, row), (before, last) in zip(points, [points[0], *points]):
         n += mode != before or len(row) == 3 and row[2] < last[2]

@@ -1,4 +1,4 @@
-"""Measured stresses of homogeneous tests as one vector."""
+"""Measured stresses of homogeneous tests without time as one vector."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from .weights import in_range, of_names, scales
 
 
 class Points:
-    """Measured stresses of all tests of a material without time, checked.
+    """All m measured stresses of tests without time as one vector, checked.
+
+    A biaxial test has two stresses at each of its points, the other tests have one.
 
     Args:
-        data: see `fit`.
-        relative: see `fit`.
-        weights: see `fit`.
-        within: see `fit`.
+        data: {test: (stretches, nominal stresses)}, see `fit`.
+        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
+        weights: {test: weight}, or None; see `fit`.
+        within: lowest and highest stretch of the points that count, or None.
 
     Attributes:
         data: the tests as given.
-        stretches_of: {test: stretches of its points}, shape (n,), of "biaxial" (2, n).
-        measured: nominal stresses, shape (m,).
+        stretches_of: {test: stretches of its n points that count}, shape (n,); of "biaxial" (2, n).
+        measured: nominal stresses, shape (m,), test by test.
         sizes: stress by which each misfit is divided, shape (m,).
-        parts: {test: its slice of the stresses}.
+        parts: {test: slice of its stresses in `measured`}.
         largest_I1: largest first invariant of C at the points.
 
     Raises:
-        InputError: see `fit`.
+        InputError: wrong or inconsistent tests, no strain, or no point within the range; see `fit`.
     """
 
     def __init__(self, data: Any, relative: bool, weights: Any, within: Any):
@@ -62,22 +64,23 @@ class Points:
         self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
 
     def stress(self, response: Any, constants: Any) -> np.ndarray:
-        """Return the nominal stress at every measured point; not finite beyond a limit.
+        """Return the nominal stresses of a material in the order of `measured`; not finite beyond its limit.
 
         Args:
-            response: derivatives of the energy.
-            constants: values of its constants.
+            response: stress response of the material, `Material.response`.
+            constants: values of the constants of the material.
 
         Returns:
-            Stresses, shape (m,).
+            Nominal stresses, shape (m,).
         """
         return self._in_order(response.stress(self._stretches, list(constants)))
 
     def modulus(self) -> float:
-        """Return the median ratio of the stresses to a neo-Hookean body of unit modulus, stress.
+        """Return a first guess of the shear modulus.
 
         Returns:
-            Modulus, stress.
+            Median ratio of the measured stresses to the stresses of a neo-Hookean material of unit shear modulus,
+            stress.
         """
         l1, l2 = self._stretches
         with np.errstate(divide="ignore"):
@@ -85,25 +88,36 @@ class Points:
         return float(np.median(self.measured[shape != 0] / shape[shape != 0]))
 
     def _in_order(self, both: np.ndarray) -> np.ndarray:
-        """Return the measured ones of values in both directions, shape (2, n), test by test, shape (m,)."""
+        """Return values in the order of `measured`, shape (m,).
+
+        Args:
+            both: values in the first and the second direction at all n points, shape (2, n).
+        """
         return np.concatenate([both[:, self._rows == k][self._there[:, self._rows == k]]
                                for k in range(len(self.parts))])
 
 
 def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points of a test at stretches within a range."""
+    """Return stretches and stresses of the k points of a test whose stretches lie in a range, shape (2, k) each.
+
+    Args:
+        mode: name of the test; of "biaxial" both stretches must lie in the range.
+        l: stretches, shape (2, n).
+        P: nominal stresses, shape (2, n).
+        within: lowest and highest stretch, or None for all.
+    """
     inside = in_range(within, l).all(0) if mode == "biaxial" else in_range(within, l[0])
     return l[:, inside], P[:, inside]
 
 
 def strains(values: np.ndarray) -> str:
-    """Return a hint for an error message: whether strains were given for stretches; "" if the values are no strains.
+    """Return a hint for an error message if the given stretches of a test are probably strains.
 
     Args:
-        values: given stretches of a test, shape (n,), dimensionless.
+        values: given stretches, shape (n,), dimensionless.
 
     Returns:
-        The hint.
+        The hint; "" if the values are no strains.
     """
     if not np.all(np.isfinite(values)) or np.min(values) > 0 and np.max(values) > 1 or np.min(values) <= -1:
         return ""
@@ -111,7 +125,17 @@ def strains(values: np.ndarray) -> str:
 
 
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return (stretches, stresses) of a test, each of shape (2, n); a stress that was not measured is nan."""
+    """Return stretches and nominal stresses of a test in both directions, shape (2, n) each, checked.
+
+    A stress that was not measured is nan.
+
+    Args:
+        mode: name of the test.
+        columns: (stretches, stresses), or for "biaxial" (stretches 1, stretches 2, stresses 1, stresses 2).
+
+    Raises:
+        InputError: an unknown test, wrong shapes, or numbers that are not admissible.
+    """
     known("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"
     what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"

@@ -1,4 +1,4 @@
-"""Deformations in which a material was tested, and how far others are from them."""
+"""Range of the deformations in which a material was tested, and distances of other deformations from it."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from ...materials.homogeneous import MODES, along
 from ...materials.material import Material
 
 _NEAR = 0.1
-"""Distance from the tested strains, over the size of the strain, up to which a deformation counts as tested."""
+"""Distance of strains from the tested ones, over their norm, up to which a deformation counts as tested."""
 _SMALL = 0.02
-"""Logarithmic strain below which a deformation counts as tested whatever its mode."""
+"""Distance of logarithmic strains from the tested ones up to which every deformation counts as tested."""
 
 _STRAIGHT = 1e-8
-"""Area of a triangle of strains, doubled, below which its corners count as on a line."""
+"""Twice the area of a triangle of strains below which its corners count as points of a line."""
 
 
 @dataclass(frozen=True)
 class MeasuredRange:
-    """Tests that the constants of a material come from.
+    """Range of the tests to which the constants of a material were fitted.
 
-    A deformation is compared by its logarithmic principal strains in descending order. It counts as tested if they lie
-    in the convex hull of the tested strains, or within 10 % of their size from it. Between two tested modes it counts
-    as tested.
+    A deformation is described by its largest and its middle principal logarithmic strain. It counts as tested if these
+    lie in the convex hull of the tested strains, or outside it by at most 10 % of their norm. A deformation between two
+    tested modes therefore counts as tested.
 
     Attributes:
         ranges: {test: (lowest, highest stretch)}; the test is "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
-        strains: largest and middle logarithmic strain of the measured points, shape (n, 2).
-        undetermined: names of the constants that these tests leave open.
+        strains: largest and middle logarithmic strain of the n measured points, shape (n, 2).
+        undetermined: names of the constants that these tests do not determine.
         rates: lowest and highest Hencky rate of tests in time, 1/time, or None.
     """
 
@@ -46,14 +46,15 @@ class MeasuredRange:
     @classmethod
     def of(cls, stretches: Mapping[str, Any], undetermined: tuple[str, ...] = (),
            rates: tuple[float, float] | None = None) -> MeasuredRange:
-        """Return the record of tests.
+        """Return the range of tests with given stretches.
 
         Args:
             stretches: {test: stretches, shape (n,)}; of "biaxial" shape (2, n).
-            undetermined, rates: see the class.
+            undetermined: names of the constants that these tests do not determine.
+            rates: lowest and highest Hencky rate of tests in time, 1/time, or None.
 
         Returns:
-            The record.
+            Range of the tests.
 
         Raises:
             InputError: unknown test, or a stretch that is not above 0.
@@ -69,13 +70,13 @@ class MeasuredRange:
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:
-        """Return the distance of strains from the tested ones.
+        """Return the distances of deformations from the tested ones.
 
         Args:
-            strains: largest and middle logarithmic strain, shape (m, 2).
+            strains: largest and middle logarithmic strain of m deformations, shape (m, 2).
 
         Returns:
-            Distances, shape (m,).
+            Distances from the convex hull of the tested strains and zero strain, shape (m,); 0 inside the hull.
         """
         corners = self._corners
         after = np.roll(corners, -1, axis=0)
@@ -89,10 +90,10 @@ class MeasuredRange:
         return np.where(np.all(side >= 0, axis=1) & (len(corners) > 2), 0.0, found)
 
     def outside(self, strains: np.ndarray) -> np.ndarray:
-        """Return the mask of the strains that the tests do not cover.
+        """Return the mask of the deformations that the tests do not cover.
 
         Args:
-            strains: largest and middle logarithmic strain, shape (m, 2).
+            strains: largest and middle logarithmic strain of m deformations, shape (m, 2).
 
         Returns:
             Mask, shape (m,).
@@ -101,10 +102,10 @@ class MeasuredRange:
         return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
 
     def rows(self) -> list[tuple[str, str]]:
-        """Return the rows of a material's report.
+        """Return rows of a table about the tests, for the report of a material.
 
         Returns:
-            List of (quantity, value).
+            List of (label, text): tested stretches, undetermined constants and tested rates.
         """
         found = [("tested at stretches", str(self))]
         if self.undetermined:
@@ -115,7 +116,7 @@ class MeasuredRange:
 
     @property
     def of_one_mode(self) -> bool:
-        """True if all tests are of one mode, so that another mode is not between tested ones."""
+        """True if all tested strains lie on one line with zero strain, as for tests of one mode."""
         return len(self._corners) < 3
 
     @cached_property
@@ -129,16 +130,17 @@ class MeasuredRange:
 
 
 def with_tests(material: Material, **stretches: Any) -> Material:
-    """Return the same material with a record of its tests; runs warn of deformations beyond them.
+    """Return a copy of a material that stores the range of its tests; runs warn of deformations beyond it.
 
-    `fit` makes this record by itself.
+    `fit` stores this range in its material by itself.
 
     Args:
         material: any material.
-        stretches: of each test, any shape, such as uniaxial=(1, 4), equibiaxial=(1, 2.5); of "biaxial" shape (2, n).
+        stretches: stretches of each test, any shape, such as uniaxial=(1, 4), equibiaxial=(1, 2.5); of "biaxial" shape
+            (2, n).
 
     Returns:
-        The material.
+        The copy; its attribute `tested` is the range.
 
     Raises:
         InputError: unknown test, or a stretch that is not above 0.
@@ -152,40 +154,43 @@ def with_tests(material: Material, **stretches: Any) -> Material:
 
 
 def principal(stretches: Any) -> np.ndarray:
-    """Return the principal logarithmic strains.
+    """Return the largest and the middle principal logarithmic strain of incompressible deformations.
 
     Args:
-        stretches: (l1, l2), shape (2, n).
+        stretches: principal stretches in two directions, shape (2, n), in any order.
 
     Returns:
-        Largest and middle strain, shape (n, 2).
+        Largest and middle logarithmic strain, shape (n, 2).
     """
     e = np.log(np.asarray(stretches, float))
     return -np.sort(-np.stack([*e, -e[0] - e[1]]), axis=0)[:2].T
 
 
 def mode_of(largest: float, middle: float) -> str:
-    """Return the name of the test that is nearest to these two logarithmic strains.
+    """Return the name of the test whose mode of deformation is nearest to given strains.
 
     Args:
-        largest: largest logarithmic strain.
-        middle: middle logarithmic strain.
+        largest: largest principal logarithmic strain.
+        middle: middle principal logarithmic strain.
 
     Returns:
-        The name.
+        "uniaxial", "pure shear" or "equibiaxial".
     """
     share = middle / largest if largest > 0 else 0.0
     return min(MODES, key=lambda mode: abs(MODES[mode] - share)).replace("_", " ")
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the corners of the convex hull of points, shape (n, 2), counter-clockwise (Andrew's chain)."""
+    """Return the k corners of the convex hull of points, shape (n, 2), counter-clockwise, shape (k, 2).
+
+    Andrew's monotone chain algorithm is used.
+    """
     ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:
         return np.array(ordered)
 
     def half(chain: Any) -> list[tuple[float, float]]:
-        """Return one half of the hull."""
+        """Return the corners of one half of the hull for points in ascending or descending order, without the last."""
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])

@@ -1,4 +1,4 @@
-"""Uncertainty of fitted constants: covariance, standard errors, and constants that the tests leave open."""
+"""Uncertainty of fitted constants: covariance, standard errors, and constants that the tests do not determine."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import NamedTuple
 import numpy as np
 
 _NOISE = 0.01
-"""Relative noise of a measurement, where the misfit does not say more."""
+"""Relative noise of a measurement that is assumed if the misfit is smaller."""
 _OPEN = 0.5
-"""Standard error over its constant above which the constant counts as open."""
+"""Standard error over the value of a constant above which the tests do not determine the constant."""
 _VISIBLE = 1e-6
-"""Share of its scale by which some stress must change for a derivative."""
+"""Change of some stress, over its size in the fit, that the step of a difference quotient must reach."""
 
 
 class Uncertainty(NamedTuple):
-    """Uncertainty of a least-squares fit.
+    """Uncertainty of the p constants of a least-squares fit.
 
     Attributes:
         errors: {constant: standard error}.
-        undetermined: names of the constants that the tests leave open.
-        covariance: of the constants, shape (p, p), in their order.
+        undetermined: names of the constants that the tests do not determine.
+        covariance: covariance of the constants, shape (p, p), in the order of `errors`.
     """
 
     errors: dict[str, float]
@@ -31,23 +31,23 @@ class Uncertainty(NamedTuple):
 
 
 def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndarray, sizes: np.ndarray) -> Uncertainty:
-    r"""Return the uncertainty of a fit that divides each misfit by a size.
+    r"""Return the uncertainty of a least-squares fit of stresses whose misfits are divided by given sizes.
 
     .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}
 
     J contains the derivatives of the scaled stresses by the constants at the optimum. s^2 is the sum of the squared
     scaled misfits over the number of points minus constants (Seber and Wild 1989, chapter 5). A standard error is nan
-    if
-    there are no more points than constants. It is infinite if a doubled constant changes no stress visibly.
+    if there are no more points than constants. It is infinite if doubling the constant changes no stress visibly.
 
     Args:
-        stress: called with constants, shape (p,); the stresses at all points, shape (n,), not finite beyond a limit.
-        constants: {name: value} of the fit, with p entries.
-        measured: the measured stresses, shape (n,).
+        stress: function of the constants, shape (p,), that returns the stresses at all points, shape (n,); not finite
+            beyond the limit of a material.
+        constants: {constant: fitted value}, with p entries.
+        measured: measured stresses, shape (n,).
         sizes: stress by which each misfit is divided, shape (n,).
 
     Returns:
-        The uncertainty.
+        Standard errors and covariance of the constants.
     """
     values = np.array(list(constants.values()), float)
     first = stress(values)
@@ -70,7 +70,17 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
-    """Return the derivative of the scaled stresses by constant i, shape (n,); 0 where no change of it can be seen."""
+    """Return the derivative of the scaled stresses by one constant, by a difference quotient, shape (n,).
+
+    It is 0 if no step up to doubling the constant changes a stress visibly.
+
+    Args:
+        stress: function of the constants, shape (p,), that returns stresses, shape (n,).
+        first: stresses for the fitted values, shape (n,).
+        values: fitted values of the constants, shape (p,).
+        i: number of the constant.
+        sizes: stress by which each misfit is divided, shape (n,).
+    """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf                    # a larger step in an exponent without effect would show
     for _ in range(50):

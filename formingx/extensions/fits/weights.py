@@ -1,4 +1,4 @@
-"""Weights of measured stresses in a fit."""
+"""Weights of the measured stresses in a fit, and the stresses by which misfits are divided."""
 
 from __future__ import annotations
 
@@ -13,15 +13,19 @@ _LEAST = 0.02
 
 
 def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
-    """Return the stress by which each misfit is divided, test by test.
+    """Return the stress by which the misfit of each measured stress is divided.
 
     Args:
-        parts: measured stresses of each test.
-        relative: see `fit`.
-        weights: weight of each test.
+        parts: measured stresses of each test, arrays with n numbers in all.
+        relative: True: the measured stress, or 2 % of the largest of its test if that is more. False: the largest
+            stress of all tests.
+        weights: weight of each test; its divisors are divided by the root of the weight.
 
     Returns:
-        Divisors, shape (n,), stress.
+        Divisors, test by test, shape (n,), stress.
+
+    Raises:
+        InputError: `relative` is neither True nor False.
     """
     relative = instance("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
@@ -34,14 +38,14 @@ def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.n
 
 
 def of_names(weights: Any, names: list[str]) -> list[float]:
-    """Return the weights of named tests; the default is 1.
+    """Return the weights of named tests, checked.
 
     Args:
-        weights: {test: weight}, or None.
+        weights: {test: weight}, or None; tests without a weight have weight 1.
         names: names of the tests.
 
     Returns:
-        Weight of each test.
+        Weight of each test, in the order of the names.
 
     Raises:
         InputError: an unknown test, or a weight that is not positive.
@@ -57,10 +61,10 @@ def of_names(weights: Any, names: list[str]) -> list[float]:
 
 
 def of_numbers(weights: Any, count: int) -> list[float]:
-    """Return the weights of numbered tests; the default is 1.
+    """Return the weights of numbered tests, checked.
 
     Args:
-        weights: list of weights, or None.
+        weights: list with the weight of each test; None for weights of 1.
         count: number of tests.
 
     Returns:
@@ -78,24 +82,24 @@ def of_numbers(weights: Any, count: int) -> list[float]:
 
 
 def _weight(name: str, value: Any) -> float:
-    """Return a weight; raise an InputError unless it is positive."""
+    """Return a weight as a number; raise an InputError unless it is positive."""
     if not (found := non_negative(name, value)) > 0:
         raise InputError(f"{name} = {value!r}: must be above 0; leave the test out instead")
     return found
 
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the stretches within a range.
+    """Return the mask of the stretches that lie in a range.
 
     Args:
-        within: (lowest, highest), or None for all.
+        within: lowest and highest stretch, or None for all.
         stretches: stretches, any shape.
 
     Returns:
         Mask, the same shape.
 
     Raises:
-        InputError: `within` is no range.
+        InputError: `within` is no pair of stretches, the first below the second.
     """
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
