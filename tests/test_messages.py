@@ -306,8 +306,8 @@ REFUSED = [
     (lambda: fx.TimedTest.constant_rate("uniaxial", 0, L, L), "rate = 0"),
     # comparisons
     *of(lambda arguments: fx.compare(GOOD, GOOD, **arguments), [
-        ({"columns": {"a": "a", "x": "b"}}, "column 'x' is not known; known: 'a', 'b'"),
-        ({"columns": {"a": "a", "b": "y"}}, "theirs: column 'y' is not known"),
+        ({"columns": {"a": "a", "x": "b"}}, "^compare: ours: column 'x' is not known; known: 'a', 'b'"),
+        ({"columns": {"a": "a", "b": "y"}}, "^compare: theirs: column 'y' is not known"),
         ({"columns": ["a"]}, "at least two columns"),
         ({"units": {"z": 1}}, "units: column 'z' is not known"),
         ({"units": {"a": 0}}, "must be greater than 0"),

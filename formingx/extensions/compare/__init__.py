@@ -1,1 +1,1 @@
-"""Comparison of runs with each other and with tables."""
+"""Comparisons of runs with results of other programs and with measured walls."""

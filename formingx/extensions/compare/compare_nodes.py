@@ -18,20 +18,22 @@ from ...results import files
 from ...results.show import plots
 
 _REST = {2: ("R", "Z"), 3: ("X", "Y")}
-"""Columns of reference coordinates, by the number of displacement components; a sheet with three is flat at first."""
+"""{number of displacement components: columns of the reference coordinates}; a sheet in three dimensions is flat."""
 
 
 @dataclass(frozen=True)
 class NodalComparison:
     """Result of `compare_nodes`; its text is a report.
 
+    "Ours" are the displacements of the run, "theirs" the displacements of the other program.
+
     Attributes:
         nodes: numbers of the n nodes, shape (n,).
         points: reference positions (R, Z), in three dimensions (X, Y), shape (n, 2), our unit of length.
         ours: displacements (u_r, u_z) of the run, shape (n, 2), in three dimensions (u_x, u_y, u_z), shape (n, 3),
             length.
-        theirs: displacements of the other program, in the same shape and unit.
-        largest: our largest displacement, the scale of the differences.
+        theirs: displacements of the other program, of the same shape and unit.
+        largest: largest norm of our displacements at these nodes, the scale of the differences, length.
     """
 
     nodes: np.ndarray
@@ -42,17 +44,17 @@ class NodalComparison:
 
     @property
     def difference(self) -> np.ndarray:
-        """Norm of the displacement difference at each node, shape (n,)."""
+        """Norm of the displacement difference at each node, shape (n,), length."""
         return np.linalg.norm(self.theirs - self.ours, axis=1)
 
     @property
     def maximum(self) -> float:
-        """The largest difference."""
+        """Largest norm of the displacement difference over the nodes, length."""
         return float(self.difference.max())
 
     @property
     def rms(self) -> float:
-        """Root mean square of the difference over the nodes."""
+        """Root mean square of the norm of the displacement difference over the nodes, length."""
         return float(np.sqrt(np.mean(self.difference**2)))
 
     def __str__(self) -> str:
@@ -68,7 +70,7 @@ class NodalComparison:
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """Draw the deformed nodes of both sides, z over r (in three dimensions over x).
+        """Draw the deformed nodes of the run and of the other program, z over r (in three dimensions over x).
 
         Returns:
             The matplotlib figure.
@@ -86,19 +88,20 @@ class NodalComparison:
 
 
 def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
-    """Write node, R, Z, u_r, u_z of every node of a state as CSV, in the user's unit of length (rank 0 writes).
+    """Write a CSV file with the reference position and displacement of every node in a state (rank 0 writes).
 
-    For a sheet in three dimensions the columns are node, X, Y, u_x, u_y, u_z.
+    The columns are node, R, Z, u_r, u_z, for a sheet in three dimensions node, X, Y, u_x, u_y, u_z, in the user's unit
+    of length.
 
     Args:
         path: the computed `Path`.
         file: path of the CSV file.
         state: a state of the path; default: the last.
-        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the nodes and their numbers. Default: the run's own
-            mesh, numbered as by `mesh.write` (one rank only).
+        mesh: a text mesh file (`formingx.mesh.Grid`) that gives the nodes and their numbers. Default: the mesh of the
+            run, numbered as by `mesh.write` (one rank only).
 
     Raises:
-        InputError: the mesh file cannot be read, or one of its nodes lies outside the run's mesh.
+        InputError: the mesh file cannot be read, or one of its nodes lies outside the mesh of the run.
 
     >>> fx.write_nodes(path, "nodes.csv")
     >>> open("nodes.csv").readline().strip()
@@ -113,22 +116,24 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
 def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.PathLike | None = None,
                   columns: Mapping[str, str] | None = None,
                   units: Mapping[str, float | str] | None = None) -> NodalComparison:
-    """Compare a state with another program's nodal displacements, at its nodes; the meshes may differ.
+    """Compare the displacements in a state ("ours") with nodal displacements of another program ("theirs").
+
+    The comparison is at the nodes of the other program; its mesh may differ from the mesh of the run.
 
     Args:
         path: the computed `Path`.
-        theirs: a CSV file or {column: values} with u_r, u_z and either R, Z or, with `mesh`, node. For a sheet in three
-            dimensions u_x, u_y, u_z and X, Y.
+        theirs: a CSV file or {column: values} with the displacements u_r, u_z, and the reference positions R, Z or,
+            with `mesh`, the numbers node. For a sheet in three dimensions u_x, u_y, u_z and X, Y.
         state: a state of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
-        mesh: a text mesh file (`formingx.mesh.Grid`) with the coordinates of the numbered nodes, in our unit.
+        mesh: a text mesh file (`formingx.mesh.Grid`) with the reference positions of the numbered nodes, in our unit.
         columns: {our name: their name} for columns with other names.
-        units: as for `compare`, by our column names: R, Z, u_r, u_z.
+        units: {our name: factor} from their units to ours, or {our name: our unit} if their header states their unit.
 
     Returns:
-        The `NodalComparison`.
+        Displacements of both sides at the nodes, and their differences.
 
     Raises:
-        InputError: a file that cannot be read, an unknown column, unit or node, or a node outside our mesh.
+        InputError: a file that cannot be read, an unknown column, unit or node, or a node outside the mesh of the run.
 
     >>> fx.write_nodes(path, "nodes.csv")                                   # or what another program wrote
     >>> found = fx.compare_nodes(path, "nodes.csv")
@@ -142,8 +147,11 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         known("compare_nodes: column", name, ("node", *_columns(path)))
 
     def take(name: str) -> np.ndarray:
+        """Return their values of a column in our unit, by our name of the column."""
         return table.take(names.get(name, name), units.get(name))
+
     def take_nodes() -> np.ndarray:
+        """Return their node numbers; raise an InputError unless they are whole."""
         numbers = take("node")
         if np.any(numbers != np.round(numbers)):
             raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
@@ -166,13 +174,19 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
 
 def _columns(path: Any) -> list[str]:
-    """Return the columns of files of nodal displacements: reference coordinates, then components."""
+    """Return the names of the columns with reference positions, then displacements, such as R, Z, u_r, u_z."""
     axes = path.problem.scene.kinematics.axes
     return [*_REST[len(axes)], *(f"u_{axis}" for axis in axes)]
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
-    """Return the displacements at reference points in a state (default: the last), shape (n, components)."""
+    """Return the displacements in a state at reference positions, shape (n, 2) or (n, 3), length.
+
+    Args:
+        path: the computed `Path`.
+        state: a state of the path, or None for the last.
+        points: reference positions, shape (n, 2), length.
+    """
     problem, state = path.problem, state or path.last
     with problem.state_context(state):
         return probe(problem, points).displacement(problem.x)

@@ -1,4 +1,4 @@
-"""Comparison of the measured wall of a formed part with a run."""
+"""Comparison of the measured wall thickness of a formed part with a run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...results import files
 from ...results.path import Path
 
 _FAR = 1.0
-"""Distance of a measured point from the computed section, over the wall there, above which the table shows it."""
+"""Distance of a measured point from the computed middle line, over the wall there, above which the table shows it."""
 _BEYOND = 0.1
-"""Length beyond the end of the computed part, over its length, up to which a point counts as at its end."""
+"""Distance of a measured point beyond the end of the computed part, over its length, up to which it is accepted."""
 _WALL = ("wall", "thickness", "wall_thickness")
 _LENGTH = ("length", "arc_length")
 _REFERENCE = ("reference_length", "R")
@@ -28,11 +28,14 @@ _REFERENCE = ("reference_length", "R")
 class MeasuredWall:
     """Measured wall thickness at m points of a formed part.
 
+    The positions of the points are given in one of three ways.
+
     Args:
-        wall: thickness, shape (m,), length.
-        length: arc length along the middle line of the part, from the axis, shape (m,), length.
-        reference_length: instead, positions on the flat sheet (for example of a printed grid), shape (m,), length.
-        points: instead, positions (r, z) on the section, shape (m, 2), length.
+        wall: measured thickness, shape (m,), length.
+        length: arc lengths along the middle line of the formed part, from the axis, shape (m,), length.
+        points: positions (r, z) on the section of the formed part, shape (m, 2), length.
+        reference_length: arc lengths along the middle line of the undeformed body, from the axis, shape (m,), length;
+            for example of a grid that was printed on the flat sheet.
 
     Raises:
         InputError: not exactly one kind of position, a wall that is not positive, or shapes that do not agree.
@@ -67,12 +70,13 @@ class MeasuredWall:
 
     @classmethod
     def from_csv(cls, file: Any) -> MeasuredWall:
-        """Read a CSV file with a column `wall` (or `thickness`) and `length`, `reference_length`, or `r` and `z`.
+        """Read a measured wall from a CSV file.
 
-        Numbers are in the unit of the run; units in the header ("wall [mm]") must be the same in all columns.
+        The file has a column `wall` (or `thickness`), and one of `length`, `reference_length`, or both `r` and `z`.
+        Numbers are in the unit of length of the run. Units in the header ("wall [mm]") must be the same in all columns.
 
         Args:
-            file: path of the file.
+            file: path of the CSV file.
 
         Returns:
             The measured wall.
@@ -87,6 +91,7 @@ class MeasuredWall:
                              f" unit, that of the run")
 
         def column(names: tuple[str, ...]) -> np.ndarray | None:
+            """Return the values of the first column that has one of these names, or None."""
             found = [name for name in table.columns if name.replace(" ", "_") in names]
             return table._replace(units=dict.fromkeys(table.units)).take(found[0]) if found else None
         wall, r, z = column(_WALL), column(("r",)), column(("z",))
@@ -96,13 +101,13 @@ class MeasuredWall:
                    points=None if r is None or z is None else np.column_stack([r, z]))
 
     def of_path(self, path: Path) -> np.ndarray:
-        """Return the wall of the last state of a path at the measured points.
+        """Return the computed wall thickness in the last state of a path at the measured points.
 
         Args:
             path: the computed `Path`.
 
         Returns:
-            Wall, shape (m,), length.
+            Thickness at the m points, shape (m,), length.
 
         Raises:
             InputError: a length is more than a tenth beyond the end of the computed part.
@@ -111,13 +116,13 @@ class MeasuredWall:
         return np.interp(self._numbers(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
 
     def compare(self, path: Path) -> WallComparison:
-        """Compare the wall of the last state of a path with the measured one; collective.
+        """Compare the wall thickness in the last state of a path with the measured one; collective.
 
         Args:
             path: the computed `Path`.
 
         Returns:
-            The comparison.
+            Computed and measured walls at the m points.
 
         Raises:
             InputError: a length is more than a tenth beyond the end of the computed part; a sheet in three dimensions.
@@ -127,12 +132,24 @@ class MeasuredWall:
         numbers = np.arange(len(profile.middle))
 
         def interpolated(values: np.ndarray) -> np.ndarray:
+            """Return values at the points of the middle line, interpolated to the measured points."""
             return np.interp(at, numbers, values)
         return WallComparison(interpolated(profile.arc_length), interpolated(profile.reference_length), self.wall,
                               interpolated(profile.wall_thickness), away, path.problem.comm)
 
     def _numbers(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the (fractional) point numbers on the middle line, and the distances from it, shape (m,) each."""
+        """Return the positions of the measured points on the middle line of a computed part.
+
+        Args:
+            profile: outline of the computed part, a `Profile`.
+
+        Returns:
+            Fractional numbers of the points of the middle line, shape (m,); distances of the measured points from the
+            middle line, shape (m,), length.
+
+        Raises:
+            InputError: a length is more than a tenth beyond the end of the computed part.
+        """
         numbers = np.arange(len(profile.middle), dtype=float)
         if self.points is None:
             name = "length" if self.length is not None else "reference_length"
@@ -153,14 +170,22 @@ class MeasuredWall:
 
 
 class WallComparison:
-    """Computed and measured walls; print it, `.plot()`, `.to_csv(file)`.
+    """Measured wall thickness of a formed part and the computed one at the same m points; its text is a table.
+
+    Args:
+        length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length.
+        reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
+        measured: measured thicknesses, shape (m,), length.
+        computed: computed thicknesses, shape (m,), length.
+        away: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
+        comm: MPI communicator of the run.
 
     Attributes:
-        length: arc lengths of the m points on the computed part, shape (m,), length.
-        reference_length: reference arc lengths, shape (m,), length.
-        measured: measured walls, shape (m,), length.
-        computed: computed walls, shape (m,), length.
-        away: distance of the measured points from the computed middle line, or beyond its end, shape (m,), length.
+        length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length.
+        reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
+        measured: measured thicknesses, shape (m,), length.
+        computed: computed thicknesses, shape (m,), length.
+        away: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
     """
 
     def __init__(self, length: np.ndarray, reference_length: np.ndarray, measured: np.ndarray, computed: np.ndarray,
@@ -170,17 +195,17 @@ class WallComparison:
 
     @property
     def deviation_percent(self) -> np.ndarray:
-        """Computed over measured wall, minus 1, shape (m,), %."""
+        """Relative deviation of the computed from the measured thickness at each point, shape (m,), %."""
         return 100 * (self.computed / self.measured - 1)
 
     @property
     def mean_percent(self) -> float:
-        """Mean deviation, %."""
+        """Mean deviation of the computed from the measured thickness over the points, %."""
         return float(self.deviation_percent.mean())
 
     @property
     def rms_percent(self) -> float:
-        """Root mean square of the deviation, %."""
+        """Root mean square of the deviation of the computed from the measured thickness over the points, %."""
         return float(np.sqrt(np.mean(self.deviation_percent**2)))
 
     def __str__(self) -> str:
@@ -195,7 +220,7 @@ class WallComparison:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw measured and computed walls, and the deviation in %, over the length.
+        """Draw measured and computed walls, and their deviation in %, over the arc length of the part.
 
         Args:
             axes: a pair of matplotlib axes; default a new figure.
@@ -218,7 +243,9 @@ class WallComparison:
         return axes
 
     def to_csv(self, file: Any) -> FilePath:
-        """Write the table (rank 0 writes).
+        """Write a CSV file with a row for each measured point (rank 0 writes).
+
+        The columns are length, reference_length, measured, computed, deviation_percent and away.
 
         Args:
             file: path of the CSV file.
@@ -231,6 +258,7 @@ class WallComparison:
             "computed": self.computed, "deviation_percent": self.deviation_percent, "away": self.away}
 
         def write(stream: Any) -> None:
+            """Write the header and the rows to an open text file."""
             out = csv.writer(stream)
             out.writerow(columns)
             out.writerows(zip(*(values.tolist() for values in columns.values())))
