@@ -97,7 +97,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("solve/path_following.py", "if not 0 < self.curve.progress(old, new) < 2 * length:", "if False:",
      "details"),
     ("solve/progress.py", "change *= now / (now - then) if now * then < 0 else 1.0", "change *= 1.0", "details"),
-    ("solve/arc_length.py", "if self.problem.folded(self._x, control):               # forces", "if False:  # forces",
+    ("solve/state_solver.py", "if self.problem.folded(self._x, control):               # forces", "if False:  # forces",
      "details"),
     ("solve/arc_length.py", "share = (length / h) ** 2", "share = -(length / h) ** 2", "treloar stepping limit"),
     ("solve/arc_length.py", "if found.slope**2 < 2e-12 * curvature * abs(found.control):", "if True:", "treloar limit"),

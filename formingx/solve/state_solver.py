@@ -1,0 +1,362 @@
+"""Solver for single states of a problem, with the metric of the path through them and its tangents."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..errors import ConvergenceError
+from .equations import Array, Attempt, Constraint, Equations, Measure
+from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
+from .state import State
+
+
+class StateSolver:
+    r"""Solver for single states of a problem, with the arc length between states.
+
+    The arc length of a small change (dx, dlambda) of the unknowns and of the control is
+
+    .. math:: \Delta s^2 = \overline{|\Delta x|^2} + w \, \Delta\lambda^2,
+
+    with the mean squared displacement over the size of the body and the weight w of the control.
+
+    Args:
+        problem: the equations.
+        tolerances: convergence criteria of a state.
+
+    Attributes:
+        problem: the equations.
+        newton: solver of F = 0 with a constraint.
+        fixed_control: True if the solver cannot pass a limit point.
+        control_weight: weight w of the squared control in arc length (dimensionless).
+    """
+
+    fixed_control = False
+    control_weight = 0.1
+
+    def __init__(self, problem: Equations, tolerances: Tolerances):
+        self.problem = problem
+        self.newton = BorderedNewton(problem, tolerances, self.norm)
+        self._iterations = 0
+        self._found: State | None = None                    # state whose tangent was factorised last
+        self._ahead_of: tuple[State | None, int] = None, 0  # state of the factors ahead; factorisations until then
+        self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
+
+    def norm(self, x: PETSc.Vec, control: float) -> float:
+        """Return the arc length of a change.
+
+        Args:
+            x: change of the unknowns.
+            control: change of the control.
+
+        Returns:
+            Length of the straight line, dimensionless.
+        """
+        return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
+
+    def distance(self, a: State, b: State) -> float:
+        """Return the arc length of the straight line between two states.
+
+        Args:
+            a: first state.
+            b: second state.
+
+        Returns:
+            The length, dimensionless.
+        """
+        return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
+
+    def moved(self, a: State, b: State) -> float:
+        """Return the mean displacement of the body between two states.
+
+        Args:
+            a: first state.
+            b: second state.
+
+        Returns:
+            Root of the mean squared displacement, over the size of the body.
+        """
+        self._x.array_w[:] = b.x - a.x
+        return self.norm(self._x, 0.0)
+
+    def progress(self, old: State, new: State) -> float:
+        """Return the distance between two states, projected on the tangent of the first.
+
+        Args:
+            old: first state.
+            new: second state.
+
+        Returns:
+            Arc length; negative if `new` lies behind `old`.
+        """
+        return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
+
+    def start(self) -> State:
+        """Return the state at control 0, in equilibrium with all loads besides the controlled one.
+
+        Returns:
+            The state, of kind "start", with the tangent of the path.
+
+        Raises:
+            Failure: Newton's method does not converge from the unloaded state.
+            ConvergenceError: the body has no stiffness.
+        """
+        history: list[Iteration] = []
+        self._x.set(0)
+        self.problem.residual(self._x, 0.0, self.newton.F)
+        if relative(self.problem, self.newton.F.norm()) > Tolerances().residual:
+            try:
+                _, history = self.newton.correct(self._x, 0.0, fixed(0.0))
+            except Failure as failure:
+                self._iterations += len(failure.history)
+                failure.attempt = self._attempt()
+                raise
+            self._iterations += len(history) - 1
+        else:
+            self.problem.stiff_state(self._x)
+            if not self.newton.tangent(self._x, 0.0):
+                raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has"
+                                       " no stiffness")
+            self._x.set(0)
+        return self._state(0.0, history, "start", None)
+
+    def resume(self, x: Array, control: float) -> State:
+        """Return a known solution as the first state of a path.
+
+        Args:
+            x: unknowns of the solution, locally owned entries, shape (n,).
+            control: its control.
+
+        Returns:
+            The state, of kind "start", with the tangent of the path under the present step data of the problem.
+
+        Raises:
+            Failure: the tangent is singular.
+        """
+        self._x.array_w[:] = x
+        self.problem.residual(self._x, control, self.newton.F)
+        if not self.newton.tangent(self._x, control):
+            raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
+        return self._state(control, [], "start", None)
+
+    def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
+              chords: bool = False) -> State:
+        """Return the state that satisfies F = 0 and a constraint.
+
+        Args:
+            x: guess of the unknowns, locally owned entries, shape (n,).
+            control: guess of the control.
+            constraint: the constraint, such as control = 0.1.
+            kind: kind of the new state (`State.kind`).
+            before: accepted state before the guess; the tangent of the new state points away from it.
+            chords: True to allow tangents of earlier iterations, see `BorderedNewton.correct`.
+
+        Returns:
+            The state, with the tangent of the path.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
+        self._x.array_w[:] = x
+        self._found = None
+        try:
+            control, history = self.newton.correct(self._x, control, constraint, before, chords)
+        except Failure as failure:
+            self._iterations += len(failure.history)
+            failure.attempt = self._attempt()
+            raise
+        self._iterations += len(history) - 1
+        if self.problem.folded(self._x, control):               # forces of 1/J do not show the sign of J
+            raise Failure("an element turned inside out", history)
+        self._found = self._state(control, history, kind, before)
+        return self._found
+
+    def solve_again(self, new: State, equation: Constraint, old: State) -> State:
+        """Solve again for the end of a step, with another constraint or after a change of contact.
+
+        Args:
+            new: the solved end of the step, used as guess.
+            equation: the constraint.
+            old: accepted state at the start of the step.
+
+        Returns:
+            The state, with kind, target, jump and direction along the path of `new`.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
+        found = self.solve(new.x, new.control, equation, new.kind, old)
+        sense = float(np.sign(found.slope * new.slope)) or 1.0
+        return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
+
+    def look_ahead(self, state: State) -> None:
+        """Compute the path tangent of an accepted state again, with updated history variables, for the next step.
+
+        The factors of its last iteration are used, unless many contact points differ or materials have advanced.
+        Predicted contact events need new factors, so that a run from a checkpoint finds the same events.
+
+        Args:
+            state: the accepted state; its tangent is changed in place.
+        """
+        self._x.array_w[:] = state.x
+        limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
+        at_hand, self._found = at_hand and not (limit and limit.predicts_events), None
+        if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
+                self._x, state.control, ahead=True):
+            size = self._length_of(self.newton.b)
+            direction, slope = self.newton.b.array_r / size, 1 / size
+            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+            state.direction, state.slope = sense * direction, sense * slope
+            self._ahead_of = state, self.newton.solver.count
+
+    def factorise_ahead(self, state: State) -> bool:
+        """Factorise the tangent dF/dx towards the next step from a state, unless it was the last one factorised.
+
+        Args:
+            state: the accepted state.
+
+        Returns:
+            False if the tangent is singular.
+        """
+        if self._ahead_of != (state, self.newton.solver.count):
+            self._x.array_w[:] = state.x
+            if not self.newton.tangent(self._x, state.control, ahead=True):
+                return False
+            self._ahead_of = state, self.newton.solver.count
+        return True
+
+    def value(self, bound: Measure, x: Array, control: float) -> float:
+        """Return the value of an output quantity.
+
+        Args:
+            bound: the quantity.
+            x: unknowns, locally owned entries, shape (n,).
+            control: the control.
+
+        Returns:
+            The value, in the user's units.
+        """
+        self._b.array_w[:] = x
+        return float(bound.value(self._b, control))
+
+    def aim(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
+        """Return the residual of the constraint "quantity = target" at a state, and its derivative by arc length.
+
+        The derivative is used since values a step ahead along the tangent mean nothing for a stiff quantity, such as a
+        contact force.
+
+        Args:
+            bound: the output quantity.
+            target: its target, in the user's units.
+            state: the state.
+
+        Returns:
+            (c, dc/ds) of the constraint c = 0, as `bound.equation` scales it; s: arc length along the tangent.
+        """
+        self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
+        left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
+        return left, self.newton.gradient.dot(self._b) + by_control * state.slope
+
+    def unit_slope(self, state: State) -> float:
+        """Return the derivative of the control with respect to arc length.
+
+        Args:
+            state: the state at which the derivative is taken.
+
+        Returns:
+            Derivative along the tangent of the state.
+        """
+        return state.slope
+
+    def work_ahead(self, state: State) -> float:
+        """Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
+
+        Args:
+            state: the state.
+
+        Returns:
+            Work, dimensionless; for a pressure the growth of the enclosed volume over arc length.
+        """
+        self._x.array_w[:] = state.x
+        self._b.array_w[:] = state.direction
+        self.problem.control_derivative(self._x, state.control, self.newton.F_control)
+        return -float(self.newton.F_control.dot(self._b))
+
+    def work(self, a: State, b: State) -> float:
+        """Return the work of the controlled load between two states, per unit of control, by the trapezoidal rule.
+
+        Args:
+            a: first state.
+            b: second state.
+
+        Returns:
+            Work, dimensionless, see `work_ahead`.
+        """
+        done = 0.0
+        for state in (a, b):
+            self._x.array_w[:] = state.x
+            self._b.array_w[:] = b.x - a.x
+            self.problem.control_derivative(self._x, state.control, self.newton.F_control)
+            done -= float(self.newton.F_control.dot(self._b)) / 2
+        return done
+
+    def spend(self, iterations: int) -> None:
+        """Count the Newton iterations of another solver for the present step.
+
+        Args:
+            iterations: number of iterations, such as those with viscous forces.
+        """
+        self._iterations += iterations
+
+    @property
+    def iterations(self) -> int:
+        """Number of Newton iterations of the present step (since the last call of `spent`)."""
+        return self._iterations
+
+    def spent(self) -> int:
+        """Return the number of Newton iterations since the last call, and start to count anew.
+
+        Returns:
+            Number of iterations, failed attempts included.
+        """
+        spent, self._iterations = self._iterations, 0
+        return spent
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.newton.destroy()
+        for vector in (self._x, self._a, self._b):
+            vector.destroy()
+
+    def _attempt(self) -> Attempt:
+        """Return the unknowns and last corrections of a failed run of Newton's method."""
+        control, step = self.newton.reached
+        return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
+
+    def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
+        """Return the state with the unknowns `_x` at a control.
+
+        Its tangent is the one of the last factorisation, directed away from the state `before`.
+        """
+        b = self.newton.b
+        size = self._length_of(b)
+        state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind,
+                      time=self.problem.time_at(control))
+        if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
+                                              control - before.control) < 0:
+            state.direction, state.slope = -state.direction, -state.slope
+        if not (self.fixed_control or self.problem.has_history):
+            state.orientation = self.newton.solver.sign() * int(np.sign(state.slope))
+        return state
+
+    def _length_of(self, b: PETSc.Vec) -> float:
+        """Return the arc length per unit of the control along a tangent b = dx/dcontrol."""
+        return self.norm(b, 1.0)
+
+    def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
+        """Return the inner product of two changes (x, control) and (y, other), by which arc length is measured."""
+        self._a.array_w[:] = x
+        self._b.array_w[:] = y
+        return self.problem.inner(self._a, self._b) + self.control_weight * control * other
