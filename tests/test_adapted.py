@@ -1,4 +1,4 @@
-"""Meshes whose columns a pilot run asks for."""
+"""Meshes adapted to a first run (`mesh.adapted`, `trace(adapt_mesh=)`)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A body has a shape: hoop stretch and in-plane determinant are positive at and beside the quadrature points."""
+"""Admissible shapes: hoop stretch and in-plane determinant are positive at and beside the quadrature points."""
 
 import basix
 import numpy as np

@@ -1,4 +1,4 @@
-"""Warnings where a run leaves the tests of its card: which deformations they cover, how much of a body they do not."""
+"""Warnings for deformations that the tests of a material do not cover, and the share of the body that has them."""
 
 import numpy as np
 import pytest

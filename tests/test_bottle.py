@@ -1,4 +1,4 @@
-"""A long parison that comes to stand on the base of its mould buckles; with more room below it the bottle is blown."""
+"""A long parison that reaches the base of its mould buckles; in a deeper mould the bottle is blown."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Calls with arguments of another kind, or number, than they take: errors in words, by one mechanism for all."""
+"""Calls with arguments of a wrong type or number raise an error that names the allowed ones."""
 
 import collections
 import cProfile

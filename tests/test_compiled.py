@@ -1,4 +1,4 @@
-"""Forms are compiled by one call of the compiler; the libraries outlive interruptions and depend on the compiler."""
+"""Compilation of forms by one call of the compiler: interruptions, errors, and libraries of another compiler."""
 
 import fcntl
 import shutil

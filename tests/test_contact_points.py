@@ -1,4 +1,4 @@
-"""Contact at Gauss points of the facets: areas, derivatives, ranks, and what contact at the nodes gives."""
+"""Contact at Gauss points of the facets: areas, derivatives, ranks, comparison with contact at the nodes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Some of the damaged files of benchmarks/damaged_files.py: read right, or refused in words."""
+"""Some of the damaged files of benchmarks/damaged_files.py: each is read correctly, or refused with a message."""
 
 import sys
 

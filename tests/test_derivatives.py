@@ -1,4 +1,4 @@
-"""Energy, residual, tangent and derivative by the control, each against central differences of the one before."""
+"""Residual, tangent and derivative by the control against central differences of energy and residual."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Derivatives of runs by the numbers of their script, and searches that use them."""
+"""Derivatives of runs by parameters of their script, and optimisation with them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The demos of designs, as a user runs them."""
+"""Demos of design and optimisation, as a user runs them."""
 
 import pytest
 from conftest import drawn

@@ -1,4 +1,4 @@
-"""Lines that whole runs hardly feel, each by itself: found by `benchmarks/mutants.py`."""
+"""Single lines of code that hardly change whole runs, tested alone; `benchmarks/mutants.py` found them."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,8 +8,8 @@ import pytest
 import ufl
 from conftest import treloar
 from mpi4py import MPI
+from test_energy_balance import RELAXES, sheet
 from test_heat import body_of
-from test_ledger import RELAXES, sheet
 
 import formingx as fx
 from formingx import Stage, tools

@@ -1,4 +1,4 @@
-"""A run made to fail for each reason gives the right words, numbers and place."""
+"""Runs that fail for a known cause: the diagnosis names this cause, with numbers and place."""
 
 import math
 import subprocess

@@ -1,4 +1,4 @@
-"""Elements on the edges of tools that a body slides over: how far they turn, and what that does to forces."""
+"""Elements on edges of tools over which a body slides: the angle by which they turn, and its effect on forces."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The solver on equations that are no body: a shallow arch in NumPy, through its limit points and its snap."""
+"""The solver on equations without a mesh: a shallow arch in NumPy, through limit points and snap-through."""
 
 import contextlib
 

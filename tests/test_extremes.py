@@ -1,4 +1,4 @@
-"""The quick subset of the extremes: every row ends right, and near its reference."""
+"""The quick rows of benchmarks/extremes.py: each run ends as expected, near its reference."""
 
 import sys
 

@@ -175,7 +175,7 @@ def test_animation(formed, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
-def test_a_film_is_mp4(formed, tmp_path):
+def test_an_animation_is_mp4(formed, tmp_path):
     """Seven moving frames in two seconds, and the last one for a second more, as ffmpeg's own programs read them."""
     formed.animate(tmp_path / "run.mp4", frames=7, seconds=2.0)
     film = json.loads(subprocess.run(["ffprobe", "-v", "error", "-show_streams", "-of", "json", tmp_path / "run.mp4"],
@@ -284,7 +284,7 @@ def test_shells_hold_the_volume(formed, tmp_path):
         formed.to_inp(tmp_path / "cup.inp", parts=2)
 
 
-def test_formed_as_a_mesh_file(formed, tmp_path):
+def test_deformed_mesh_as_a_file(formed, tmp_path):
     formed.to_msh(tmp_path / "cup.msh")
     mesh, old = fx.mesh.read(tmp_path / "cup.msh"), formed.deformed_mesh()
     assert mesh.layers.keys() == old.layers.keys() and mesh.boundaries.keys() == old.boundaries.keys()

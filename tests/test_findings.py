@@ -1,4 +1,4 @@
-"""Findings of one kind, before and after every run: what was meant by a scene, and what a run did instead."""
+"""Findings of checks before and after a run: scenes that differ from the intended ones, results to be doubted."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Forces as targets: up, on the way, and back down, whichever way the curve bends."""
+"""Forces as targets: on rising and falling branches, at the end of a run and on the way."""
 
 import numpy as np
 import pytest

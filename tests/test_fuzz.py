@@ -1,4 +1,4 @@
-"""A hundred random calls of benchmarks/fuzz.py, and every argument wrong in turn: results, or errors in words."""
+"""Random calls of benchmarks/fuzz.py, and calls with one wrong argument: each gives a result or a clear error."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Temperatures on any mesh: layers below faces that heat passes, and what is said of the error in space."""
+"""Temperatures on coarse meshes: layers of elements below heated faces, and the estimated error of the mesh."""
 
 import logging
 import re

@@ -1,4 +1,4 @@
-"""What `fx.heat` takes and gives: starts, units, ranks, windows, files, pictures, and what it refuses."""
+"""Arguments and results of `fx.heat`: starts, units, ranks, windows, files, pictures, errors."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The structure of the package: no import climbs from a lower room to a higher one, none goes in a circle."""
+"""The structure of the package: the order of folders in imports, without circles, and rules for all files."""
 
 import ast
 

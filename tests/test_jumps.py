@@ -1,4 +1,4 @@
-"""Where there is no state nearby to go on to: jumps to the next one."""
+"""Snap-through: jumps to the next state where there is no equilibrium nearby."""
 
 import sys
 from dataclasses import replace

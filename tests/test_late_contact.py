@@ -1,4 +1,4 @@
-"""Points that come into a tool in space in a step are held before a target, or the end of a stage, is accepted."""
+"""Points that enter a tool in the last step, in three dimensions, are in contact when a target is accepted."""
 
 import numpy as np
 import pytest

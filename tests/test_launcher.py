@@ -1,4 +1,4 @@
-"""./fx: what a command writes is there afterwards, at the same path, or the write fails with words."""
+"""./fx: files that a command writes exist afterwards at the same path, or writing them fails with a message."""
 
 import os
 import subprocess

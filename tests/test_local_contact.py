@@ -1,4 +1,4 @@
-"""The local problem of a few contact points: a point at the foot of the ramp of its law, between stick and free."""
+"""The local problem of a few contact points: a point at the outer edge of the ramp of its law, open or sticking."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Demos that predict experiments: their keys, how well they fit, and the physics that ties their numbers together."""
+"""Demos that predict experiments: their summaries, deviations, and relations between their numbers."""
 
 import numpy as np
 import pytest

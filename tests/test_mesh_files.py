@@ -1,4 +1,4 @@
-"""Mesh files are data: nothing in one runs, gmsh's formats give one mesh, and a bad one is refused in words."""
+"""Mesh files: read as data, equal meshes from all formats of gmsh, messages for damaged files."""
 
 import numpy as np
 import pytest

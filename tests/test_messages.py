@@ -1,4 +1,4 @@
-"""Messages of wrong input: an error that names the thing, its value and what is allowed, before any solve."""
+"""Messages for wrong input: the error names the argument, its value and the allowed values, before any solve."""
 
 import math
 from decimal import Decimal

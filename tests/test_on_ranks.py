@@ -1,4 +1,4 @@
-"""Tests on several ranks: what a script says, and one that fails or never ends."""
+"""The tool of tests on several ranks: output of scripts, scripts that fail or never end."""
 
 import pytest
 from on_ranks import Ranks

@@ -1,4 +1,4 @@
-"""Problems of other programs' manuals: what is exact in them is met, the rest as near as its source allows."""
+"""Problems from manuals of other programs: exact values, and values within the accuracy of their source."""
 
 import pytest
 from conftest import drawn

@@ -1,4 +1,4 @@
-"""The stress peak under a plug's edge converges with a fillet, and is said not to without."""
+"""The stress peak under the edge of a plug: it converges with a fillet; without one a message denies it."""
 
 import sys
 

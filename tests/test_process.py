@@ -1,4 +1,4 @@
-"""Processes in stages: what they end in does not depend on how they were staged, and nothing is made twice."""
+"""Processes in stages: final states independent of the division into stages; nothing is compiled twice."""
 
 import json
 
@@ -450,7 +450,7 @@ def test_tools_are_kept_apart_from_where_a_stage_ended():
     assert caught.value.path.last.measures["pole_height"] == pytest.approx(-1.0)
 
 
-def test_what_is_driven_is_not_held_too():
+def test_a_controlled_item_is_not_constant_too():
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim"),
                                fx.PrescribedDisplacement("rim", "z", name="lift")])

@@ -1,4 +1,4 @@
-"""What a long run says of itself."""
+"""Progress messages of long runs."""
 
 import logging
 import re

@@ -94,7 +94,7 @@ VERDICT = """
 import json, sys
 sys.path.insert(0, "tests")
 import formingx as fx
-from test_verdict import block, foot
+from test_inadmissible_states import block, foot
 pot = fx.tools.pot(mouth=4.0, base=3.5, depth=4.0, sheet=0.25, fillet=0.8, lip=0.4, plug=2.6, nose=0.8)
 scene = fx.Scene(mesh=fx.mesh.disc(radius=5.0, thickness=0.25, elements=(14, 1)),
                  materials=fx.TransientNetwork(fx.NeoHookean(c10=0.5), [(1.0, 0.02)]),

@@ -1,4 +1,4 @@
-"""How far a body has relaxed: stress over that in equilibrium, elastic stretches of branches; what its steps cost."""
+"""Relaxation of a body: stress over its value in equilibrium, elastic stretches of branches, cost of steps."""
 
 import csv
 
@@ -90,7 +90,7 @@ def test_a_layer_without_branches_has_no_elastic_stretch():
     assert np.isnan(found[~low]).all() and np.all(found[low] > 1)
 
 
-def test_a_cubic_in_time_is_foretold_exactly():
+def test_a_cubic_in_time_is_predicted_exactly():
     """From states far enough apart, and none from before a jump."""
     def state(time, **kind):
         return State(np.array([time**3 - time, 2.0]), 0.0, np.zeros(2), 1.0, time=time, **kind)

@@ -1,4 +1,4 @@
-"""Runs whose mesh is made again on the way."""
+"""Runs with remeshing: `trace(remesh=)`."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Checkpoints: a run goes on as if it had never stopped; a damaged or foreign checkpoint says so."""
+"""Checkpoints: a continued run equals an uninterrupted one; messages for damaged or foreign checkpoints."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Sheets in space: their equations, exact solutions, contact that sticks, tools, what is read off, what is refused."""
+"""Membranes in three dimensions: equations, exact solutions, sticking contact, tools, evaluation, errors."""
 
 import shutil
 from dataclasses import replace

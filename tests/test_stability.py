@@ -1,4 +1,4 @@
-"""The second variation against tangents, rigid motions and energies in space; losses against exact bifurcations."""
+"""The second variation against tangents, rigid motions and energies; critical points against exact bifurcations."""
 
 import numpy as np
 import pytest
@@ -267,7 +267,7 @@ def test_ranks():
     assert np.array(one)[:, :2] == pytest.approx(np.array(two)[:, :2], rel=1e-8) and len(one) == 1
 
 
-def test_formed_is_the_deformed_body():
+def test_deformed_mesh_is_the_deformed_body():
     """Its volume is that of the body, its boundaries are where the deformed ones were."""
     path = fx.trace(treloar(elements=(8, 1)), until=fx.pole_height(1.0), progress=False)
     mesh, old = path.deformed_mesh(), path.problem.scene.mesh
@@ -280,7 +280,7 @@ def test_formed_is_the_deformed_body():
     assert again.forms.volume == pytest.approx(path.problem.forms.volume, rel=1e-5)
 
 
-def test_formed_of_new_elements():
+def test_deformed_mesh_of_new_elements():
     """A blown sheet with new elements has its volume and its boundaries, and bears what the old one does."""
     path = fx.trace(treloar(elements=(16, 2)), until=fx.pole_height(1.0), progress=False)
     old, new = path.deformed_mesh(), path.deformed_mesh(size=0.03)

@@ -1,4 +1,4 @@
-"""Steps in time: tables with corners, going on in the middle, and what `accuracy` promises, by any step control."""
+"""Steps in time: tables with corners, continued runs, and the error that `accuracy` promises, for any step control."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Estimated stress errors: against true ones, layer by layer; peaks that have converged and peaks that have not."""
+"""Estimated stress errors: against true errors, in each layer; converged and unconverged stress peaks."""
 
 import logging
 

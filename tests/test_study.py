@@ -1,4 +1,4 @@
-"""Studies: all combinations, failures that end nothing, folders that are gone on with, effects and the best."""
+"""Parameter studies: all combinations, failed runs, continued folders, effects, the best run."""
 
 import dataclasses
 import logging

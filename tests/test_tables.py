@@ -1,4 +1,4 @@
-"""Tables and shift factors: values, slopes, UFL against NumPy, what they refuse."""
+"""Tables and shift factors: values, slopes, UFL against NumPy, errors."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Constants that depend on the temperature of a scene, and theirs shifts in time."""
+"""Constants that depend on the temperature of a scene, and time-temperature superposition."""
 
 import numpy as np
 import pytest

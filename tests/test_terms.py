@@ -1,4 +1,4 @@
-"""Loads, constants and histories of a user's own: closed forms, differences, and nothing lost on the way."""
+"""User-defined loads, constants and history variables: closed forms and central differences."""
 
 import json
 

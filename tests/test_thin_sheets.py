@@ -1,4 +1,4 @@
-"""A thin sheet that sticks to a ball, lifts off and sticks again: walls, cost and warnings do not hide its steps."""
+"""A thin sheet that sticks to a ball, separates and sticks again: wall, cost, and a warning of its step dependence."""
 
 import importlib
 import logging

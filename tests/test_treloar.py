@@ -1,4 +1,4 @@
-"""The main job: Treloar's sheet through its pressure maximum."""
+"""Treloar's sheet through its pressure maximum."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A run does not depend on its units: nothing in it has a dimension; numbers are rounded otherwise."""
+"""A run does not depend on its units but for round-off."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Materials that relax: the step's potential by differences, order in time, limits, dissipation, tests, bad input."""
+"""Viscoelastic materials: potential of a step by differences, order in time, limits, dissipation, tests, errors."""
 
 import functools
 import math

@@ -1,4 +1,4 @@
-"""The core and the readers of its results without an extension: it is imported and gives the same results."""
+"""The core and the readers without each extension: the package is imported and gives the same results."""
 
 import subprocess
 import sys
@@ -25,7 +25,7 @@ path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(
 print(path.part().volume, path.wall().wall.min(), len(path.stress().at_quadrature_points().points))
 print(len(path), path.last.x.tobytes().hex())
 """
-CORE = ("test_equations.py", "test_treloar.py", "test_contact_points.py", "test_time.py", "test_standing.py")
+CORE = ("test_equations.py", "test_treloar.py", "test_contact_points.py", "test_time.py", "test_state_context.py")
 
 
 @pytest.fixture(scope="module")

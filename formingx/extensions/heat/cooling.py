@@ -19,7 +19,7 @@ _CONTINUOUS = 1e4
 """Conductance that replaces a suddenly prescribed temperature, over conductivity/thickness.
 
 The shrinkage of a part differs by 0.1 % from the limit of an infinite conductance (with 1e3: 0.6 %, with 1e2: 2.5 %;
-tests/test_released.py).
+tests/test_springback.py).
 """
 
 _TOOLS = "a dict of (conductance, tool) by the names of contacts"

@@ -1,4 +1,4 @@
-"""A state that a body cannot have ends a run, in words, with the path up to the last good state."""
+"""States that no body can have end a run, with a message and the path up to the last admissible state."""
 
 import re
 

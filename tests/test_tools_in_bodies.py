@@ -1,4 +1,4 @@
-"""A tool never passes through the body: shorter steps, or words."""
+"""A tool does not pass through the body: steps become shorter, or a message says so."""
 
 import numpy as np
 import pytest

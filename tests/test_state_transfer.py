@@ -1,4 +1,4 @@
-"""What histories remember, carried to another mesh of the body."""
+"""Transfer of history variables to another mesh of the body."""
 
 from dataclasses import replace
 

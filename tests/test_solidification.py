@@ -1,4 +1,4 @@
-"""A material that sets: what is born in the drawn shape keeps it, what melts lets it go."""
+"""Solidification: networks that form in a deformed shape keep it; melting releases them."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Runs with friction that go on wherever the process does: through folds, kinks and snaps."""
+"""Runs with friction through limit points, kinks and snap-through."""
 
 import sys
 

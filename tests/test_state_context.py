@@ -1,4 +1,4 @@
-"""Whatever is read off a state with friction is that of its own history, wherever the run has gone since."""
+"""Quantities of a state with friction belong to the history of this state, also after later states."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A measured wall beside a run: where its points are, what a fit to it finds, and what it cannot tell."""
+"""Comparison with a measured wall: positions of its points, fits to it, and constants that it does not determine."""
 
 import numpy as np
 import pytest

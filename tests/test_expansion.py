@@ -1,4 +1,4 @@
-"""Thermal expansion: free and restrained cooling, strips of two layers, parts that are let out of their mould."""
+"""Thermal expansion: free and restrained cooling, strips of two layers, shrinkage of parts out of their mould."""
 
 import numpy as np
 import pytest

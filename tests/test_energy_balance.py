@@ -1,4 +1,4 @@
-"""Whole processes keep their books: work, storage and losses from the states, against `Path.work` and each other."""
+"""Energy balance of whole processes: work, stored energy and dissipation from the states, against `Path.work`."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Parts that are let go: `Path.springback`."""
+"""Springback of formed parts: `Path.springback`."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 import ufl
 from conftest import drawn, run
 from dolfinx import fem
-from test_sets import BASE, air, balance, block, draw
+from test_solidification import BASE, air, balance, block, draw
 
 import formingx as fx
 from formingx.extensions.heat import cooling

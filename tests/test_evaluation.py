@@ -1,4 +1,4 @@
-"""What an engineer asks of a run: wall, part, filling, contact, forces, work; against closed forms and conservation."""
+"""Evaluation of runs: wall, part, filling, contact, forces, work; against closed forms and conservation laws."""
 
 import numpy as np
 import pytest
