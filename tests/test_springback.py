@@ -43,7 +43,7 @@ def test_an_elastic_part_goes_back_to_rest(trim):
 def test_a_relaxing_part_recovers_in_time(path):
     """At once, and after more and more time; trimmed it is what the same material is without its rim."""
     part = path.springback(duration=0.3, accuracy="draft")
-    heights = [part.path.wall(s).height.max() for s in (part.path.states[0], part.path.state("let go"),
+    heights = [part.path.wall(s).height.max() for s in (part.path.states[0], part.path.state("release"),
                                                         part.path.state("cool"))]
     assert heights[0] > heights[1] > heights[2] > 0.2 * heights[0]
     assert heights[0] == pytest.approx(path.wall().height.max(), rel=1e-12)

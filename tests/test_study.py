@@ -162,7 +162,7 @@ def test_what_cannot_be_run_is_refused():
                            (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measure = {}")):
         with pytest.raises(fx.InputError, match=message):
             fx.study(formula, *given, progress=False)
-    with pytest.raises(fx.InputError, match="way 'big' is not known"):
+    with pytest.raises(fx.InputError, match="goal of f: 'big' is not known"):
         fx.study(formula, {"x": [1]}, {"f": f}, goal={"f": "big"})
 
 

@@ -1,4 +1,4 @@
-"""Meshes adapted to the states of a pilot run."""
+"""Meshes adapted to the states of a pilot run, for `trace(adapt_mesh=True)` and `formingx.mesh.adapted`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +9,7 @@ from .adapted import adapted, of_columns
 
 
 class _Adaptation:
-    """`MeshAdaptation` of runs with a pilot run."""
+    """Adaptation of the mesh of a run, as a `formingx.run_hooks.MeshAdaptation`."""
 
     def check(self, mesh: Any) -> None:
         if mesh.domain.geometry.dim == 2:

@@ -12,21 +12,22 @@ from ...mesh.sizes import GROWTH, ends_of_columns, moved_nodes, number_of_column
 from .column_factors import column_factors
 from .sizes import wanted_sizes
 
-_LEAST = 1 / 8
-"""Smallest length of a column over its length in the run: finer sizes are unreliable on coarse columns."""
+_SHORTEST = 1 / 8
+"""Smallest length of a new column over its length in the run: finer sizes are unreliable on coarse columns."""
 
 _SAMPLES = 16
-"""Sampling points of a column for sizes."""
+"""Number of sampling points of a column for sizes."""
 
-_MOST = 20_000             # columns
+_MAX_COLUMNS = 20_000
+"""Largest number of columns of a new mesh."""
 
 
 def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = None) -> Mesh:
-    """Return the mesh of a run with columns of elements as fine as its states need. Collective.
+    """Return a new mesh of the body of a run, with columns of elements as fine as its states need. Collective.
 
-    The reference length of a column is the smallest that its states demand. It is at most 1.25 times its neighbour's
-    and at least an eighth of the column in the run, because coarse columns give unreliable sizes. To refine further,
-    adapt a second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
+    The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's and at
+    least an eighth of the column in the run, because coarse columns give unreliable sizes. To refine further, adapt a
+    second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
 
     The mesh must come from `disc`, `sphere`, `parison` or `from_lines`. In a `sheet` in three dimensions triangles
     become smaller, at most to a quarter, and never larger.
@@ -71,7 +72,12 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
 
 
 def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
-    """Return the sheet with triangles of given sizes at points, linear in between.
+    """Return a new mesh of a flat sheet with triangles of given sizes.
+
+    Args:
+        mesh: mesh of the sheet.
+        points: positions (x, y) at which sizes are given, shape (n, 2), length; sizes are linear between these.
+        sizes: edge lengths of triangles there, shape (n,), length.
 
     Raises:
         InputError: the mesh is no `sheet`, or its nodes were moved.
@@ -80,16 +86,17 @@ def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     from scipy.spatial import cKDTree
     if mesh.of_size is None:
         raise InputError("adapted: must be a sheet made by fx.mesh.sheet: of another the outline is not known")
-    inside, near = LinearNDInterpolator(points, sizes), cKDTree(points)
+    inside, outside = LinearNDInterpolator(points, sizes), cKDTree(points)
 
     def size(x: float, y: float) -> float:
+        """Return the edge length of triangles at (x, y), length."""
         found = float(inside(x, y))
-        return found if np.isfinite(found) else float(sizes[near.query((x, y))[1]])
+        return found if np.isfinite(found) else float(sizes[outside.query((x, y))[1]])
     return mesh.of_size(size)
 
 
 def of_columns(mesh: Mesh) -> Columns:
-    """Return the columns of a mesh.
+    """Return the columns of elements along the sheet of a mesh.
 
     Args:
         mesh: the mesh.
@@ -111,21 +118,26 @@ def of_columns(mesh: Mesh) -> Columns:
 
 
 def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return the ends of new columns whose lengths are scaled by `factors`, shape (n,).
+    """Return the ends of new columns along the sheet, as coordinates of `Columns`.
 
-    A factor of inf stands for the length of the longest column.
+    Args:
+        columns: the n present columns.
+        factors: required over present length of each column, shape (n,); inf: as long as the longest column.
+
+    Raises:
+        InputError: too many columns would be needed.
     """
     old = columns.ends
-    at = np.append((old[:-1, None] + np.diff(old)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), old[-1])
-    faces = columns.place(at)[[0, -1]]
+    samples = np.append((old[:-1, None] + np.diff(old)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), old[-1])
+    faces = columns.place(samples)[[0, -1]]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(faces, axis=1), axis=2).mean(0))])
     joints = s[::_SAMPLES]
     length = np.diff(joints)
-    requested = np.minimum(np.maximum(factors, _LEAST) * length, length.max())
-    away = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
-    size = (requested + GROWTH * away).min(1)
+    requested = np.minimum(np.maximum(factors, _SHORTEST) * length, length.max())
+    distance = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
+    size = (requested + GROWTH * distance).min(1)
     number = number_of_columns(s, size)[-1]
-    if number > _MOST:
-        raise InputError(f"adapted: share and error ask for {number:.3g} elements along the sheet, at most {_MOST}"
-                         f" are allowed: make share or error larger")
-    return ends_of_columns(at, s, size, np.union1d(columns.fixed, old[[0, -1]]))
+    if number > _MAX_COLUMNS:
+        raise InputError(f"adapted: share and error ask for {number:.3g} elements along the sheet, at most"
+                         f" {_MAX_COLUMNS} are allowed: make share or error larger")
+    return ends_of_columns(samples, s, size, np.union1d(columns.fixed, old[[0, -1]]))

@@ -1,4 +1,4 @@
-"""Factors for the lengths of mesh columns, from the states of a run."""
+"""Factors by which the columns of a mesh must become shorter or longer, from the states of a run."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _STATES = 12
 """Number of states whose stresses are examined, evenly spaced."""
 
 _NEAR = 0.25
-"""Gap over the fillet radius up to which the face lies on the fillet: the gap of a chord of 80 degrees."""
+"""Gap over the fillet radius up to which a face lies on the fillet: the gap of a chord of 80 degrees."""
 
-_MOST = 1.0
-"""Largest rotation of a column that is used, radians: a larger one belongs to a coarse or a crushed element."""
+_MAX_ROTATION = 1.0
+"""Upper bound of the rotation of a column, radians: a larger one belongs to a coarse or a crushed element."""
 
 _ORDER = 2
 """Order of the stress error."""
@@ -26,11 +26,13 @@ _ORDER = 2
 
 @method_of(Path)
 def column_factors(path: Any, share: float | None, error: float | None) -> np.ndarray:
-    """Return the wanted over the present length of the n columns, the smallest over all states.
+    """Return the required over the present length of the n columns of a mesh, the smallest over all states.
 
     Args:
         path: the run.
-        share, error: see `formingx.mesh.adapted`.
+        share: largest rotation of the sheet along a column, radians, or length of a column over the radius of a fillet
+            that it touches; None: ignored.
+        error: largest estimated relative error of the stress over the body; None: ignored.
 
     Returns:
         Factors, shape (n,); inf where no state demands a size.
@@ -49,14 +51,27 @@ def column_factors(path: Any, share: float | None, error: float | None) -> np.nd
 
 
 def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """Return the numbers of the columns whose middle lines, shape (rows, n, 2), are nearest to points."""
+    """Return the number of the column nearest to each point, shape (m,).
+
+    Args:
+        points: reference positions, shape (m, 2), length.
+        middles: positions of nodes in the middle of the n columns, shape (rows, n, 2), length.
+    """
     n = middles.shape[1]
     from scipy.spatial import cKDTree
     return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
 
 
 def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
-    """Return factors that limit the rotation of a column to `share`, of its middle line or of a fillet it touches."""
+    """Return the factors of the n columns by which rotations are at most `share`, shape (n,).
+
+    The rotation of a column is that along the sheet, or on a fillet of a tool its length over the fillet radius.
+
+    Args:
+        path: the run.
+        share: largest rotation, radians.
+        middles: positions of nodes in the middle of the columns, shape (rows, n, 2), length.
+    """
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
@@ -79,39 +94,48 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
             for contact, face in zip(problem.contacts, faces):
                 if not contact.present:
                     continue
-                at = points[face] - contact.travelled(state.control)
-                near = contact.contact.tool.nearest(at.reshape(-1, at.shape[-1]))
-                bend = np.abs(near.curvature)
+                positions = points[face] - contact.travelled(state.control)
+                nearest = contact.contact.tool.nearest(positions.reshape(-1, positions.shape[-1]))
+                bend = np.abs(nearest.curvature)
                 radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(
-                    near.curvature) * near.distance
-                lies = (radius > 0) & (-near.distance < _NEAR * radius)
-                least = np.where(lies, radius, np.inf).reshape(-1, FINE_PIECES + 1).min(1)
-                np.minimum.at(found, column[face], share * least / length[face])
+                    nearest.curvature) * nearest.distance
+                on_fillet = (radius > 0) & (-nearest.distance < _NEAR * radius)
+                smallest = np.where(on_fillet, radius, np.inf).reshape(-1, FINE_PIECES + 1).min(1)
+                np.minimum.at(found, column[face], share * smallest / length[face])
     return found
 
 
 def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the rotation of the sheet along each column, radians, shape (n,).
+    """Return the rotation of the sheet along each of the n columns, radians, shape (n,).
 
     Half of a kink between two columns counts in each.
+
+    Args:
+        edges: deformed edges of the outline: first end, second end, midpoint, shape (m, 3, 2), length.
+        sides: for each of the two faces, the edges of the columns in order, and the mask of the reversed ones.
     """
-    way = np.zeros(edges.shape[-1])                          # directions at both ends, averaged over both faces
-    for numbers, back in sides:
+    tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
+    for numbers, reversed_edges in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)
         first, last = 4 * m - 3 * a - b, 3 * b - 4 * m + a
-        tangents = np.where(back[:, None, None], -np.stack([last, first], 1), np.stack([first, last], 1))
-        way = way + tangents / np.linalg.norm(b - a, axis=1)[:, None, None]
-    angle = np.unwrap(np.arctan2(way[..., 1], way[..., 0]).ravel())
+        tangents = np.where(reversed_edges[:, None, None], -np.stack([last, first], 1), np.stack([first, last], 1))
+        tangent = tangent + tangents / np.linalg.norm(b - a, axis=1)[:, None, None]
+    angle = np.unwrap(np.arctan2(tangent[..., 1], tangent[..., 0]).ravel())
     turn = np.abs(np.diff(angle))
     inside, kinks = turn[::2], np.concatenate([[0.0], turn[1::2], [0.0]])
-    return np.minimum(inside + (kinks[1:] + kinks[:-1]) / 2, _MOST)
+    return np.minimum(inside + (kinks[1:] + kinks[:-1]) / 2, _MAX_ROTATION)
 
 
 def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    """Return factors that equidistribute the stress error, as in a mesh with the fewest elements.
+    """Return the factors of the n columns that equidistribute the stress error, as in a mesh with the fewest elements.
 
     The error of a column is C(s) h^p per length, with the order p. The optimal size is h ~ C^(-2/(2 p + 1)), scaled so
     that the integral of (C h^p)^2 meets the tolerance.
+
+    Args:
+        path: the run.
+        error: largest estimated relative error of the stress over the body.
+        middles: positions of nodes in the middle of the columns, shape (rows, n, 2), length.
     """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(
@@ -119,9 +143,9 @@ def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
     found = np.full(n, np.inf)
     states = [state for state in path.states if state.kind != "start"]
     for state in {id(s): s for s in (states[k] for k in np.linspace(0, len(states) - 1, _STATES).astype(int))}.values():
-        of = path.stress(state).error()
-        squares = np.bincount(_column_of(of.points, middles), of.cells**2, n)
-        allowed = (error * np.linalg.norm(of.stress)) ** 2
+        estimate = path.stress(state).error()
+        squares = np.bincount(_column_of(estimate.points, middles), estimate.cells**2, n)
+        allowed = (error * np.linalg.norm(estimate.stress)) ** 2
         q = 2 * _ORDER + 1
         density = (squares / length**q) ** (1 / q)           # C^(2/q)
         with np.errstate(divide="ignore"):

@@ -10,22 +10,22 @@ from ...mesh.nodes import COORDINATES
 from ...mesh.sizes import GROWTH
 
 _FINEST = 0.25
-"""Smallest wanted over present size: a coarse mesh shows that it is too coarse, not by how much."""
-
+"""Smallest required over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
 
 def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the triangle sizes that the states of a run demand.
+    """Return the triangle sizes that the states of a run on a sheet in three dimensions demand.
 
-    Both limits decrease with the size; the strictest of all states counts.
+    Each limit reduces the size; the smallest size of all states counts.
 
     Args:
         path: the run.
-        share: largest rotation of the surface between triangles, radians; None: ignored.
-        error: largest relative change of the wall between triangles; None: ignored.
+        share: largest rotation of the surface between neighbouring triangles, radians; None: ignored.
+        error: largest relative change of the wall between neighbouring triangles; None: ignored.
 
     Returns:
-        Nodes (x, y) of the flat sheet, shape (n, 2), length, and sizes there, shape (n,), length.
+        Positions (x, y) of the nodes of the flat sheet, shape (n, 2), length; edge lengths of triangles there, shape
+        (n,), length.
     """
     factor: np.ndarray = np.ones(0)
     for state in path.states:
@@ -40,8 +40,8 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
         for allowed, found in ((share, turn), (error, change)):
             if allowed is not None:
                 part = np.maximum(allowed / np.maximum(found, allowed), _FINEST)
-                for of_pair in pairs.T:
-                    np.minimum.at(factor, of_pair, part)
+                for triangle in pairs.T:
+                    np.minimum.at(factor, triangle, part)
     strictest = np.ones(len(wall.rest))
     np.minimum.at(strictest, wall.triangles.ravel(), np.repeat(factor, 3))
     size = wall.to_nodes(np.sqrt(wall.area_at_rest / (np.sqrt(3) / 4)))         # equilateral ones
@@ -49,16 +49,25 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
-    """Return the pairs of triangles with a common edge, shape (k, 2)."""
+    """Return the numbers of each pair of triangles with a common edge, shape (k, 2).
+
+    triangles: node numbers, shape (m, 3).
+    """
     edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
-    of = np.tile(np.arange(len(triangles)), 3)
+    triangle = np.tile(np.arange(len(triangles)), 3)
     order = np.lexsort(edges.T)
     same = (edges[order[1:]] == edges[order[:-1]]).all(1)
-    return np.column_stack([of[order[:-1]][same], of[order[1:]][same]])
+    return np.column_stack([triangle[order[:-1]][same], triangle[order[1:]][same]])
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return sizes at nodes, reduced so that they grow by at most `GROWTH` along edges."""
+    """Return sizes at nodes, reduced so that they grow by at most `GROWTH` per length of an edge, shape (n,).
+
+    Args:
+        points: positions of the nodes, shape (n, 3), length.
+        triangles: node numbers, shape (m, 3).
+        size: edge lengths of triangles at the nodes, shape (n,), length.
+    """
     a, b = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).T
     reach = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:

@@ -1,6 +1,6 @@
 """Springback of a formed part, and its mesh: `Path.springback`, `Path.deformed_mesh`, `Path.to_msh`.
 
-Imports `remeshing` where a formed body gets new elements (`Path.deformed_mesh(size=...)`).
+`Path.deformed_mesh(size=...)` imports the extension `remeshing`, for new elements.
 """
 
 from . import deformed_mesh, springback

@@ -1,4 +1,4 @@
-"""The formed body as a new mesh, free of stress: to be crushed, formed once more, or written for another program."""
+"""Stress-free mesh of a deformed body: to be crushed, formed once more, or written for another program."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ from ...results.path import Path
 from ...solve.state import State
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
-_TO_GRID = [0, 1, 2, 5, 3, 4]                               # middles of the edges 01, 12, 20
+"""Local coordinates of the corners of a triangle, and of the midpoints of the opposite edges."""
+_TO_GRID = [0, 1, 2, 5, 3, 4]
+"""Numbers of these nodes in the order of a `Grid`: corners 0, 1, 2, midpoints of the edges 01, 12, 20."""
 
 
 @method_of(Path)
 def deformed_mesh(path: Path, state: State | None = None, *, size: float | None = None) -> Mesh:
-    """Make a new mesh of the body of a state, free of stress; collective.
+    """Return a stress-free mesh of the deformed body in a state; collective.
 
-    (`Path.springback` releases the body with the stresses that it has.)
+    In contrast, `Path.springback` releases the body with its stresses.
 
     Args:
         path: the path of a solid.
-        state: default the last.
-        size: edge length of new elements, length; None: the deformed elements stay. New ones are available for a body
-            of one layer without holes, on one rank.
+        state: a state of the path; default the last.
+        size: edge length of new elements, length; None: the deformed elements stay. New elements are available for a
+            body of one layer without holes, on one rank.
 
     Returns:
         The mesh, with the names of layers and boundaries and with second-order geometry.
@@ -89,18 +91,21 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
 
 @method_of(Path)
 def to_msh(path: Path, file: Any, state: State | None = None) -> None:
-    """Write the mesh that `deformed_mesh` makes of a state as a gmsh file, with its names; on one rank.
+    """Write the mesh of the deformed body in a state as a gmsh file, with its names; on one rank.
 
     Args:
         path: the path of a solid.
-        file: name of the file.
-        state: default the last.
+        file: path of the file.
+        state: a state of the path; default the last.
+
+    Raises:
+        InputError: as `deformed_mesh`.
     """
     write(deformed_mesh(path, state), file)
 
 
 def _of_size(problem: Any, state: Any, size: float) -> Mesh:
-    """Return the deformed outline, with new elements inside."""
+    """Return a mesh of the deformed body in a state, with new elements of edge length `size` inside its outline."""
     from ..remeshing.remeshed import remeshed
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:
@@ -108,7 +113,7 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
                          f" rank: leave it out")
     with problem.state_context(state):
         edges = outline.edges()
-    of, order = {name: outline.mask(name) for name in mesh.boundaries}, outline.ordered("Path.deformed_mesh: size")
-    names = [frozenset(name for name, on_boundary in of.items() if on_boundary[k]) for k in order]
+    masks, order = {name: outline.mask(name) for name in mesh.boundaries}, outline.ordered("Path.deformed_mesh: size")
+    names = [frozenset(name for name, mask in masks.items() if mask[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
     return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)

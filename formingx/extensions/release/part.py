@@ -1,4 +1,4 @@
-"""A part of a mesh: the rest of a trimmed sheet."""
+"""Mesh of a trimmed sheet: the elements up to a cut."""
 
 import numpy as np
 
@@ -6,49 +6,57 @@ from ...mesh.grid import Grid, gathered, to_mesh
 from ...mesh.mesh import Mesh
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
+"""Corner numbers of the edges of a triangle."""
 
 
 def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
-    """Return the elements of a mesh that lie next to the first pieces of a line through it; collective.
+    """Return the elements of a mesh that lie along the first segments of a line through the body; collective.
 
-    The cut edges belong to each boundary that vanishes, such as the rim; else to a new one, "trim".
+    Each boundary that vanishes, such as the rim, is moved to the cut edges; without such a boundary they are named
+    "trim".
 
     Args:
         mesh: the mesh.
-        line: points of the line, shape (n, 2), length.
-        pieces: number of its n - 1 segments that are kept.
+        line: points of a polyline through the body, such as the middle line of a sheet, shape (n, 2), length.
+        pieces: number of the n - 1 segments whose elements remain.
 
     Returns:
-        The mesh.
+        The mesh of these elements.
 
     Raises:
-        InputError: nothing is left of a layer.
+        InputError: no element of a layer remains.
     """
     grid = gathered(mesh)
 
     def part() -> Grid:
-        return _kept(grid, {name: rows[_nearest(grid.points[rows[:, :3]].mean(1), line) < pieces]
+        return _part(grid, {name: rows[_nearest(grid.points[rows[:, :3]].mean(1), line) < pieces]
                             for name, rows in grid.layers.items()})
     return to_mesh(part, mesh.comm, "the trimmed part")
 
 
 def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the number of the piece of a line, shape (n, 2), next to each point."""
+    """Return the number of the nearest segment of a polyline, shape (n, 2), for each point, shape (m,)."""
     a, along = line[:-1], np.diff(line, axis=0)
-    away = points[:, None] - a
-    share = np.clip(np.einsum("mij,ij->mi", away, along) / np.einsum("ij,ij->i", along, along), 0, 1)
-    return np.argmin(np.hypot(*np.moveaxis(away - share[..., None] * along, -1, 0)), axis=1)
+    offsets = points[:, None] - a
+    share = np.clip(np.einsum("mij,ij->mi", offsets, along) / np.einsum("ij,ij->i", along, along), 0, 1)
+    return np.argmin(np.hypot(*np.moveaxis(offsets - share[..., None] * along, -1, 0)), axis=1)
 
 
-def _kept(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
+def _part(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
+    """Return the grid of some of the triangles of a grid, with boundaries on the cut edges.
+
+    Args:
+        grid: the whole grid.
+        layers: {layer: rows of node numbers of the triangles that remain}.
+    """
     triangles = np.concatenate(list(layers.values()))
     outline, before = _outline(triangles), _outline(np.concatenate(list(grid.layers.values())))
     cut: np.ndarray = np.array([edge for key, edge in outline.items() if key not in before], dtype=np.int64)
     boundaries: dict[str, np.ndarray] = {name: np.array([row for row in rows.tolist() if frozenset(row[:2]) in outline],
                                                     dtype=np.int64).reshape(-1, rows.shape[1])
                                      for name, rows in grid.boundaries.items()}
-    gone = [name for name, rows in boundaries.items() if not len(rows) and len(grid.boundaries[name])] or ["trim"]
-    boundaries |= dict.fromkeys(gone if len(cut) else [], cut)
+    vanished = [name for name, rows in boundaries.items() if not len(rows) and len(grid.boundaries[name])] or ["trim"]
+    boundaries |= dict.fromkeys(vanished if len(cut) else [], cut)
     used = np.unique(triangles)
     number = np.zeros(len(grid.points), dtype=np.int64)
     number[used] = np.arange(len(used))
@@ -57,7 +65,10 @@ def _kept(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 
 def _outline(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
-    """Return {ends of an edge: first, last, middle} of the edges that belong to a single triangle."""
+    """Return {frozenset of the ends of an edge: [first, last, middle]} for edges of a single triangle.
+
+    triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle.
+    """
     found: dict[frozenset[int], list[list[int]]] = {}
     for row in ([int(node) for node in nodes] for nodes in triangles):
         for k, (i, j) in enumerate(_EDGES):

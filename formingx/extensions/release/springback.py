@@ -31,18 +31,18 @@ from ...units import NONE, Units
 from .part import part_along
 
 _THROUGH = 1.0
-"""Time that a wall is given to cool, over thickness^2/diffusivity: exp(-pi^2) of a difference is left."""
+"""Default cooling time over thickness^2/diffusivity: a temperature difference decreases by exp(-pi^2)."""
 
 
 @dataclass(frozen=True, repr=False)
 class Springback(KeyNumbers):
-    """A part before and after it was released.
+    """Shape of a part in its tools and after its release; prints a table.
 
     Attributes:
         path: the run from the part in its tools to the released part (`Path`).
         before: `Wall` of the part in its tools.
         after: `Wall` of the released part.
-        trimmed: radius of the middle line in the tools where it was cut off, length.
+        trimmed: radius of the cut end of the middle line, in the tools, length.
         units: units of the labels.
     """
 
@@ -54,7 +54,10 @@ class Springback(KeyNumbers):
 
     @property
     def height(self) -> float:
-        """Largest distance along the axis from the pole, the part's base, length."""
+        """Height of the released part: largest axial distance of its middle line from the pole, length.
+
+    Without a pole it is measured from the lowest point.
+    """
         return _height(self.after)
 
     @property
@@ -64,7 +67,7 @@ class Springback(KeyNumbers):
 
     @property
     def min_wall(self) -> float:
-        """Minimum wall of the released part, length."""
+        """Minimum wall thickness of the released part, length."""
         return float(self.after.wall.min())
 
     @property
@@ -74,38 +77,42 @@ class Springback(KeyNumbers):
 
     @property
     def shrinkage(self) -> float:
-        """Decrease of the largest diameter by the release, over the diameter in the tools."""
+        """Decrease of the largest outer diameter by the release, over this diameter in the tools."""
         return 1 - self.diameter / _diameter(self.before)
 
     @property
     def flange_angle(self) -> float:
-        """Rotation of the end of the middle line upward (along Z), degrees: the warpage."""
-        turned = _end(self.after) - _end(self.before)
-        return (turned + 180) % 360 - 180
+        """Rotation of the end of the middle line by the release, positive upward (along Z), degrees: the warpage."""
+        angle = _end(self.after) - _end(self.before)
+        return (angle + 180) % 360 - 180
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """Rows of the report: (label, value with unit)."""
-        said, before = self._length, self.before
-        return [("trimmed at the radius", said(self.trimmed)),
-                ("height (in its tools)", f"{said(self.height)} ({said(_height(before))})"),
-                ("springback of the height", said(self.springback)),
-                ("largest diameter (in its tools)", f"{said(self.diameter)} ({said(_diameter(before))})"),
+        """Rows of the printed table: (label, value with unit)."""
+        text, before = self._length, self.before
+        return [("trimmed at the radius", text(self.trimmed)),
+                ("height (in its tools)", f"{text(self.height)} ({text(_height(before))})"),
+                ("springback of the height", text(self.springback)),
+                ("largest diameter (in its tools)", f"{text(self.diameter)} ({text(_diameter(before))})"),
                 ("shrinkage of the diameter", f"{100 * self.shrinkage:.3g} %"),
-                ("minimum wall", said(self.min_wall)),
+                ("minimum wall", text(self.min_wall)),
                 ("flange has turned by", f"{self.flange_angle:.3g} degrees")]
 
 
 def _height(wall: Wall) -> float:
+    """Return the largest axial distance of the middle line from the pole (without a pole from its lowest point),
+    length.
+    """
     return float(wall.height.max())
 
 
 def _diameter(wall: Wall) -> float:
+    """Return the largest outer diameter, length."""
     return 2 * float(max(wall.profile.bottom[:, 0].max(), wall.profile.top[:, 0].max()))
 
 
 def _end(wall: Wall) -> float:
-    """Return the direction of the last edge of the middle line, degrees from R."""
+    """Return the direction of the last edge of the middle line, degrees from the R axis."""
     (r, z) = wall.profile.middle[-1] - wall.profile.middle[-3]
     return float(np.degrees(np.arctan2(z, r)))
 
@@ -114,25 +121,25 @@ def _end(wall: Wall) -> float:
 def springback(path: Path, temperature: float | None = None, *, trim: Any = None, boundaries: Any = None,
                duration: float | None = None, state: State | None = None, accuracy: str | float = "standard",
                units: Any = None) -> Springback:
-    """Release a formed part: compute its springback, shrinkage and warpage.
+    """Release a formed part from its tools: compute its springback, shrinkage and warpage.
 
-    Tools and loads are removed; the part is trimmed; of supports only `Symmetry` is left; then, where heat or materials
-    take time, it cools. At first the forces that held the part keep it in equilibrium; then they fade.
+    Tools and loads are removed, and the part is trimmed. Of the supports only `Symmetry` remains. The forces that kept
+    the part in equilibrium then fade. With heat, or with a duration, the part cools or relaxes afterwards.
 
     Args:
         path: the path of a solid.
         temperature: temperature of both faces of the part after the release, only for a scene with `heat=Cooling(...)`.
             It acts through a conductance of 1e4 conductivity/wall.
-        trim: as in `Path.part`: the part is cut along the nearest line of nodes.
+        trim: end of the part, as in `Path.part`; the part is cut along the nearest line of nodes.
         boundaries: laws of the faces in place of a temperature, as for `Cooling`; they need a duration.
         duration: time of cooling or relaxation after the release; default wall^2/diffusivity with a temperature, else
-            none.
+            0.
         state: state of the part in its tools; default the last.
-        accuracy: see `Process.run`.
+        accuracy: accuracy of the run, see `Process.run`.
         units: a `formingx.Units`, for the labels.
 
     Returns:
-        The `Springback`, which prints a table; its own run is `Springback.path`.
+        Shape before and after the release; its own run is `Springback.path`.
 
     Raises:
         InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
@@ -149,18 +156,27 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         if source.scene.preformed is not None:
             raise InputError("Path.springback: trim: is not available for a remeshed run: leave it out")
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
-    heat, cools = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
+    heat, cooling_time = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))
     x = _carried(source, state, problem)
     problem.enter(StepData([0.0] * len(problem.scene.items) + [state.time], [0.0] * (1 + len(problem.scene.items)),
                           [], fading=True), x, 0.0)
-    return _run(problem, x, cools, allowed_error("Path.springback", accuracy), trimmed, units or NONE)
+    return _run(problem, x, cooling_time, allowed_error("Path.springback", accuracy), trimmed, units or NONE)
 
 
-def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed: float,
+def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, trimmed: float,
          units: Units) -> Springback:
-    """Release the body, then follow it for the time `cools`; return the `Springback`."""
-    stages = [Stage("let go"), *([Stage("cool", duration=cools)] if cools else [])]
+    """Release a part, then let it cool or relax.
+
+    Args:
+        problem: the problem of the free part.
+        x: unknowns of the part in its tools, locally owned entries.
+        cooling_time: duration after the release; 0: none.
+        accuracy: relative error of a step in time.
+        trimmed: radius of the cut end, length.
+        units: units of the labels.
+    """
+    stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]
     record = Record(problem, Curve(problem, Tolerances()))
     path = Path(record, True)
     record.stage = stages[0].name
@@ -175,7 +191,19 @@ def _run(problem: Problem, x: np.ndarray, cools: float, accuracy: float, trimmed
 
 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
-    """Return the cooling of the part or None, and its duration."""
+    """Return the `Cooling` of the released part (or None without heat), and the duration of its cooling or relaxation.
+
+    Args:
+        scene: the scene of the part in its tools.
+        mesh: mesh of the part.
+        temperature: as for `springback`.
+        boundaries: as for `springback`.
+        duration: as for `springback`.
+        wall: `Wall` of the part in its tools.
+
+    Raises:
+        InputError: arguments that do not fit the scene.
+    """
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
             raise InputError("Path.springback: temperature: the scene has no heat=Cooling(...) that could change it:"
@@ -183,8 +211,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
         return None, 0.0 if duration is None else positive("Path.springback: duration", duration)
     if (temperature is None) == (boundaries is None):
         raise InputError("Path.springback: give the temperature to which the part is cooled, or the boundaries= at"
-                         " which"
-                         " it loses heat, and not both")
+                         " which it loses heat, and not both")
     if boundaries is not None and duration is None:
         raise InputError("Path.springback: boundaries: for how long? give duration=...")
     faces = next(pair for pair in FACES if all(face in mesh.boundaries for face in pair))
@@ -197,23 +224,34 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
-    """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion."""
+    """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion.
+
+    Args:
+        scene: the scene of the part in its tools.
+        mesh: mesh of the part.
+        heat: `Cooling` of the part, or None.
+    """
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
-    held = {s.component for s in symmetries}
-    anywhere = mesh.nodes_of(str(symmetries[0].on) if symmetries else next(iter(mesh.boundaries)))[0]
-    if 1 not in held:
-        supports.append(_Still(1, anywhere))
-    if 0 not in held and not scene.kinematics.axisymmetric:
-        supports.append(_Still(0, anywhere))
+    constrained = {s.component for s in symmetries}
+    point = mesh.nodes_of(str(symmetries[0].on) if symmetries else next(iter(mesh.boundaries)))[0]
+    if 1 not in constrained:
+        supports.append(_FixedComponent(1, point))
+    if 0 not in constrained and not scene.kinematics.axisymmetric:
+        supports.append(_FixedComponent(0, point))
     return Scene(mesh=mesh, materials=scene.materials, supports=supports, model=scene.model, heat=heat,
                  kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree, preformed=scene.preformed,
                  temperature=None if scene.temperature is None else scene.temperature.T,
                  expansion=dict(scene.expansion) or None)
 
 
-class _Still(PinnedNode):
-    """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it."""
+class _FixedComponent(PinnedNode):
+    """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it.
+
+    Args:
+        component: number of the component.
+        point: reference position of the node, shape (2,), length.
+    """
 
     def __init__(self, component: int, point: np.ndarray):
         super().__init__(*point)
@@ -224,15 +262,24 @@ class _Still(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """Return (the mesh up to the line of nodes next to where it is trimmed, radius there now)."""
-    kept = float(strips_within(wall, trim).sum())                                 # edges have two parts
-    last = int(np.clip(round(kept / 2), 1, (len(wall.r) - 1) // 2))
+    """Return the mesh up to the line of nodes nearest to a trim, and the radius of its middle line now, length."""
+    strips = float(strips_within(wall, trim).sum())                               # an edge has two strips
+    last = int(np.clip(round(strips / 2), 1, (len(wall.r) - 1) // 2))
     middle = (wall.profile.reference_bottom + wall.profile.reference_top)[::2] / 2
     return part_along(mesh, middle, last), float(wall.r[2 * last])
 
 
 def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """Return the unknowns of the part, locally owned entries, and transfer the history variables of the whole body."""
+    """Return the unknowns of the part in a state of the whole body; transfer the history variables.
+
+    Args:
+        source: the problem of the whole body.
+        state: a state of it.
+        problem: the problem of the part, whose fields are set.
+
+    Returns:
+        Unknowns of `problem`, locally owned entries.
+    """
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]

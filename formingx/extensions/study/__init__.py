@@ -1,14 +1,16 @@
-"""Parameter studies."""
+"""Parameter studies: many runs of one script with different values."""
 
 from collections.abc import Callable
 from typing import Any
 
 from ...run_hooks import dry_runs
-from .study import Study, StudyRun, study
+from .study import Study, study
+from .task import StudyRun
 from .variables import design
 
 
 def _first_case(build: Callable[..., Any], variables: Any, *_: Any, **__: Any) -> None:
+    """Build and run only the first set of values of a study, for a check of a script."""
     build(**design(variables)[0])
 
 

@@ -9,11 +9,11 @@ from ...results.show import page as pages
 
 
 def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str) -> Any:
-    """Draw every run as a dot, and the mean at each level of a variable as a line.
+    """Draw the main effects on a measure: one panel per variable, runs as dots, the mean at each level as a line.
 
     Args:
-        runs: the runs.
-        effects: result of `Study.effects`.
+        runs: the successful runs (`StudyRun`).
+        effects: result of `Study.effects` for this measure.
         measure: name of the measure.
 
     Returns:
@@ -31,7 +31,7 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
     """Draw two measures of all runs as dots, with the Pareto front as a line.
 
     Args:
-        runs: the runs.
+        runs: the successful runs (`StudyRun`).
         front: runs of the Pareto front, in order.
         a: name of the first measure.
         b: name of the second measure.
@@ -47,7 +47,7 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
 
 
 def page(study: Any, title: str) -> str:
-    """Return the HTML page of `Study.report`.
+    """Return the HTML page of `Study.report`: best run, main effects, Pareto fronts, all runs.
 
     Args:
         study: the `Study`.

@@ -6,32 +6,23 @@ The results are tables, main effects, and the best run.
         ...
         return fx.trace(...)                                 # a path
 
-    def evenness(path):
+    def uniformity(path):
         return path.part().uniformity
 
     if __name__ == "__main__":                               # processes read the script again
-        found = fx.study(pot, {"depth": [30, 40, 50], "radius": [18, 22]}, {"evenness": evenness},
-                         goal={"evenness": "max"}, folder="results/pots")
-        print(found); found.to_csv("pots.csv"); found.plot_effects("evenness")
+        found = fx.study(pot, {"depth": [30, 40, 50], "radius": [18, 22]}, {"uniformity": uniformity},
+                         goal={"uniformity": "max"}, folder="results/pots")
+        print(found); found.to_csv("pots.csv"); found.plot_effects("uniformity")
 """
 
 from __future__ import annotations
 
-import json
-import logging
 import math
 import os
-import pickle
-import re
-import threading
-import time
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent import futures
-from contextlib import nullcontext
-from dataclasses import asdict, dataclass, field
 from pathlib import Path as FilePath
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -39,89 +30,33 @@ from mpi4py import MPI
 from ...errors import InputError, count, known, place
 from ...results.files import replace
 from ...results.files.sheet import Sheet
-from . import effects
+from . import effects, stored_runs
+from .task import Measure, StudyRun, Task, as_text, check_importable, finished, pool_of
 from .variables import design
 
-Measure = Callable[[Any], float] | str
-
-_AT_EDGE = 1e-3        # of the range of a variable
-
-
-@dataclass(frozen=True)
-class StudyRun:
-    """One run of a study.
-
-    Attributes:
-        values: {variable: value}.
-        measures: {name: number}; empty if the run failed.
-        error: reason for the failure, or "".
-        seconds: duration of the run.
-        warnings: texts of its warnings.
-    """
-
-    values: dict[str, float]
-    measures: dict[str, float] = field(default_factory=dict)
-    error: str = ""
-    seconds: float = 0.0
-    warnings: list[str] = field(default_factory=list)
-
-
-class _Task(NamedTuple):
-    """Task of one process."""
-
-    build: Callable[..., Any]
-    measure: dict[str, Measure]
-
-    def __call__(self, values: dict[str, float]) -> StudyRun:
-        began, log, names = time.perf_counter(), logging.getLogger("formingx"), _NamesRun(values)
-        log.addFilter(names)
-        try:
-            result = self.build(**values)
-            found = {name: float(result.last.measures[of] if isinstance(of, str) else of(result))
-                     for name, of in self.measure.items()}
-            error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
-        except Exception as failure:                         # the other runs continue after any exception of the script
-            found, error = {}, f"{type(failure).__name__}: {failure}"
-        finally:
-            log.removeFilter(names)
-        return StudyRun(values, {} if error else found, error, time.perf_counter() - began, names.warnings)
-
-
-class _NamesRun(logging.Filter):
-    """Log filter that prefixes records with the values of the run and collects warnings; one per thread."""
-
-    def __init__(self, values: dict[str, float]):
-        super().__init__()
-        self._values, self._thread, self.warnings = values, threading.get_ident(), list[str]()
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        if record.thread == self._thread:
-            text = record.getMessage()
-            record.msg, record.args = f"run {_shown(self._values)}: {text}", ()
-            if record.levelno >= logging.WARNING:
-                self.warnings.append(text)
-        return True
+_AT_EDGE = 1e-3
+"""Distance from the ends of the range of a variable, over this range, within which the best value is at its edge."""
 
 
 class Study(Sheet):
-    """Runs of a parameter study.
+    """Runs of a parameter study; prints a summary with the best run.
 
     Attributes:
-        runs: runs in the order of the design.
+        runs: runs in the order of the sets of values.
         variables: names of the variables.
         measures: names of the measures.
-        goal: {measure: "max" or "min"}.
+        goal: {measure: "max" or "min"}; the first one defines the best run.
     """
 
     comm = MPI.COMM_SELF
 
-    def __init__(self, task: _Task, variables: list[str], goal: dict[str, str], folder: FilePath | None):
+    def __init__(self, task: Task, variables: list[str], goal: dict[str, str], folder: FilePath | None):
         self._task, self._folder, self.variables, self.goal = task, folder, variables, goal
         self.measures, self.runs = list(task.measure), list[StudyRun]()
 
     @property
     def good(self) -> list[StudyRun]:
-        """Successful runs."""
+        """Runs without failure."""
         return [run for run in self.runs if not run.error]
 
     @property
@@ -144,14 +79,19 @@ class Study(Sheet):
         return min(self.good, key=self._distance)
 
     def pareto(self, a: str, b: str) -> list[StudyRun]:
-        """Return the runs that no other run beats in both measures, sorted by the first.
+        """Return the runs that no other run beats in two measures, sorted by the first measure.
+
+        A measure without a goal is best where it is largest.
 
         Args:
-            a: name of the first measure; optimised to its goal, without a goal to the largest value.
-            b: name of the second measure, likewise.
+            a: name of the first measure.
+            b: name of the second measure.
 
         Returns:
             The runs.
+
+        Raises:
+            InputError: an unknown measure.
         """
         signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
         points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
@@ -160,9 +100,9 @@ class Study(Sheet):
         return sorted(front, key=lambda run: run.measures[a])
 
     def effects(self, measure: str) -> dict[str, dict[float, float]]:
-        """Return the main effects on a measure.
+        """Return the main effects of the variables on a measure: its mean at each level of each variable.
 
-        After failures an additive model is fitted to the other runs by least squares. This keeps a level's mean
+        After failures an additive model is fitted to the other runs by least squares. This keeps the mean at a level
         independent of the failed combinations.
 
         Args:
@@ -170,20 +110,23 @@ class Study(Sheet):
 
         Returns:
             {variable: {level: mean over the runs at this level}}.
+
+        Raises:
+            InputError: an unknown measure.
         """
         self._known(measure)
         values = np.array([run.measures[measure] for run in self.good])
         levels = {name: sorted({run.values[name] for run in self.good}) for name in self.variables}
-        masks = {name: np.array([[run.values[name] == level for level in of] for run in self.good], dtype=float)
-                 for name, of in levels.items()}
+        masks = {name: np.array([[run.values[name] == level for level in tried] for run in self.good], dtype=float)
+                 for name, tried in levels.items()}
         parts = np.split(np.linalg.lstsq(np.hstack(list(masks.values())), values)[0],
-                         np.cumsum([len(of) for of in levels.values()])[:-1])
-        usual = [float(mask.mean(0) @ part) for mask, part in zip(masks.values(), parts)]
-        return {name: {level: float(value + sum(usual) - own) for level, value in zip(of, part)}
-                for (name, of), part, own in zip(levels.items(), parts, usual)}
+                         np.cumsum([len(tried) for tried in levels.values()])[:-1])
+        means = [float(mask.mean(0) @ part) for mask, part in zip(masks.values(), parts)]
+        return {name: {level: float(value + sum(means) - mean) for level, value in zip(tried, part)}
+                for (name, tried), part, mean in zip(levels.items(), parts, means)}
 
     def plot_effects(self, measure: str) -> Any:
-        """Draw the main effects on a measure, and every run.
+        """Draw the main effects on a measure, with every successful run as a dot.
 
         Args:
             measure: name of the measure.
@@ -194,7 +137,7 @@ class Study(Sheet):
         return effects.main_effects(self.good, self.effects(measure), measure)
 
     def plot_pareto(self, a: str, b: str) -> Any:
-        """Draw two measures of all runs, with the Pareto front.
+        """Draw two measures of all successful runs as dots, with the Pareto front as a line.
 
         Args:
             a: name of the first measure.
@@ -206,15 +149,20 @@ class Study(Sheet):
         return effects.pareto(self.good, self.pareto(a, b), a, b)
 
     def report(self, file: Any, title: str = "Study") -> None:
-        """Write an HTML report: best run, main effects, Pareto fronts of the goals, all runs."""
+        """Write an HTML page with the best run, main effects, Pareto fronts of the goals, and all runs.
+
+        Args:
+            file: path of the HTML file.
+            title: heading of the page.
+        """
         replace(file, lambda stream: stream.write(effects.page(self, title)))
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
                executor: futures.Executor | None = None) -> StudyRun:
-        """Improve the best run by the Nelder-Mead method with bounds; all runs are kept.
+        """Search for a better run, from the best one, by the Nelder-Mead method with bounds; all runs are kept.
 
-        Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy. It suits few
-        variables with a smooth effect. A failed run counts as worse than all others.
+        Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy. It suits few variables
+        with a smooth effect. A failed run counts as worse than all others.
 
         Args:
             evaluations: maximum number of further runs, one after the other.
@@ -248,7 +196,7 @@ class Study(Sheet):
         first = (np.array([start.values[name] for name in within]) - low) / (high - low)
         simplex = np.vstack([first, *(first + np.eye(len(first))[k] * (0.2 if first[k] < 0.5 else -0.2)
                                       for k in range(len(first)))])
-        with _pool(executor, 1) as pool:
+        with pool_of(executor, 1) as pool:
             minimize(objective, first, method="Nelder-Mead", bounds=[(0, 1)] * len(first),
                      options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6})
         return self.best
@@ -258,41 +206,39 @@ class Study(Sheet):
         lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
                  + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
         if self.goal and self.good:
-            shown = _shown({**self.best.values, **self.best.measures})
-            lines.append(f"best ({', '.join(f'{way} {name}' for name, way in self.goal.items())}): {shown}")
+            shown = as_text({**self.best.values, **self.best.measures})
+            lines.append(f"best ({', '.join(f'{direction} {name}' for name, direction in self.goal.items())}): {shown}")
             lines += self._edges()
-        lines += [f"failed: {_shown(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
-        return "\n".join([*lines, *(f"warning: {_shown(run.values)}: {text}" for run in self.runs
+        lines += [f"failed: {as_text(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
+        return "\n".join([*lines, *(f"warning: {as_text(run.values)}: {text}" for run in self.runs
                                     for text in run.warnings)])
 
     def _edges(self) -> list[str]:
-        """Return the variables whose best value is the first or last one tried, as text."""
+        """Return a line of text for each variable whose best value is the lowest or the highest one tried."""
         found = []
         for name in self.variables:
             values = [run.values[name] for run in self.runs]
             low, high, best = min(values), max(values), self.best.values[name]
-            near = _AT_EDGE * (high - low)
-            if low < high and not low + near < best < high - near:
+            margin = _AT_EDGE * (high - low)
+            if low < high and not low + margin < best < high - margin:
                 found.append(f"the best is at the edge of {name}, which was run from {low:g} to {high:g}: a better one"
-                             f" may lie {'below' if best <= low + near else 'above'}")
+                             f" may lie {'below' if best <= low + margin else 'above'}")
         return found
 
     def _distance(self, run: StudyRun) -> float:
-        name, way = next(iter(self.goal.items()))
-        return run.measures[name] * (1 if way == "min" else -1)
+        """Return the measure of the first goal in a run, with the sign for which smaller is better."""
+        name, direction = next(iter(self.goal.items()))
+        return run.measures[name] * (1 if direction == "min" else -1)
 
     def _known(self, measure: str) -> str:
+        """Return the name of a measure; raise an InputError if the study does not have it."""
         known("Study: measure", measure, self.measures)
         return measure
 
     def _keep(self, run: StudyRun) -> None:
-        """Add a run, and write it to the folder."""
+        """Add a run to the study, and write it to the folder, if there is one."""
         if self._folder is not None:
-            # the number is one above the largest; the checksum tells files of one number by two processes apart
-            last = max((int(file.name[4:9]) for file in _files(self._folder)), default=-1)
-            values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())
-            file = self._folder / f"run-{last + 1:05d}-{values:08x}.json"
-            replace(file, lambda stream: json.dump(asdict(run), stream, indent=1))
+            stored_runs.write(self._folder, run)
         self.runs.append(run)
 
 
@@ -332,18 +278,19 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     """
     from tqdm import tqdm
     cases = design(variables)
-    task, ways = _Task(build, _measures(build, measure)), dict(goal or {})
-    for name, way in ways.items():
+    task, goals = Task(build, _measures(build, measure)), dict(goal or {})
+    for name, direction in goals.items():
         known("study: goal", name, task.measure)
-        known(f"study: goal of {name}: way", way, ("max", "min"))
-    place_of = None if folder is None else _folder(place("study: folder", folder), task, list(cases[0]))
-    found = Study(task, list(cases[0]), ways, place_of)
-    found.runs += [] if place_of is None else _there(place_of, found.variables)
+        known(f"study: goal of {name}:", direction, ("max", "min"))
+    names = list(cases[0])
+    checked = None if folder is None else stored_runs.checked(place("study: folder", folder), task, names)
+    found = Study(task, names, goals, checked)
+    found.runs += [] if checked is None else stored_runs.read(checked, names)
     todo = [case for case in cases if not any(run.values == case for run in found.runs)]
-    with _pool(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
+    with pool_of(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
-            _check_importable(task)
-        runs = _finished(pool, task, todo)
+            check_importable(task)
+        runs = finished(pool, task, todo)
         for run in tqdm(runs, total=len(todo), disable=not (progress and todo), desc="study", unit="run"):
             found._keep(run)
     order = {tuple(case.items()): k for k, case in enumerate(cases)}
@@ -351,92 +298,15 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     return found
 
 
-def _shown(numbers: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
-
-
-def _finished(pool: Any, task: _Task, cases: list[dict]) -> Iterator[StudyRun]:
-    """Yield the runs as they finish; the first one runs alone."""
-    for some in (cases[:1], cases[1:]):
-        jobs: dict[Any, dict] = {pool.submit(task, case): case for case in some}
-        for job in futures.as_completed(jobs):
-            failure = job.exception()
-            yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
-
-
-def _pool(executor: futures.Executor | None, workers: int) -> Any:
-    """Return a context of the user's executor, which stays open, or of processes, which end with the block."""
-    if executor:
-        return nullcontext(executor)
-    from multiprocessing import get_context  # costs time, which others do not spend
-    return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-
-
 def _measures(build: Any, measure: Any) -> dict[str, Measure]:
+    """Return the measures that a user gave as a dict.
+
+    Raises:
+        InputError: `build` is no function, or `measure` is no dict of functions and names of columns.
+    """
     if not callable(build):
         raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")
     if not isinstance(measure, Mapping) or not measure or not all(callable(m) or isinstance(m, str)
                                                                   for m in measure.values()):
         raise InputError(f"study: measure = {measure!r}: must be {{name: function of the path, or a column's name}}")
     return dict(measure)
-
-
-def _check_importable(task: _Task) -> None:
-    try:
-        pickle.dumps(task)
-    except Exception as error:
-        raise InputError(f"study: what is run in processes must be importable by name, no lambda and no function inside"
-                         f" another: {error}; or give an executor that runs here") from None
-
-
-def _folder(folder: FilePath, task: _Task, variables: list[str]) -> FilePath:
-    """Return the folder, made or checked.
-
-    Raises:
-        InputError: a folder of another study.
-    """
-    about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
-             "measures": list(task.measure)}
-    file = folder / "study.json"
-    if file.exists():
-        stored = _read(file)
-        if stored != about:
-            raise InputError(f"study: folder {str(folder)!r} holds another study: {stored}; here: {about}")
-    elif folder.exists() and any(folder.iterdir()):
-        raise InputError(f"study: folder {str(folder)!r} is there already and holds no study")
-    else:
-        replace(file, lambda stream: json.dump(about, stream, indent=1))
-    return folder
-
-
-def _there(folder: FilePath, variables: list[str]) -> list[StudyRun]:
-    """Return the runs stored in a folder, one for each set of values.
-
-    Raises:
-        InputError: a file that cannot be read.
-    """
-    found: list[StudyRun] = []
-    for file in sorted(_files(folder)):
-        try:
-            run = StudyRun(**_read(file))
-            right = (set(run.values) == set(variables) and isinstance(run.error, str)
-                     and all(math.isfinite(v) for v in (*run.values.values(), *run.measures.values(), run.seconds)))
-        except (TypeError, AttributeError):
-            right = False
-        if not right:
-            raise InputError(f"study: {str(file)!r} is damaged: it holds no run of this study; remove it, and the run"
-                             f" is made again")
-        found += [run] if all(run.values != other.values for other in found) else []
-    return found
-
-
-def _files(folder: FilePath) -> list[FilePath]:
-    return [file for file in folder.glob("run-*.json") if re.match(r"run-[0-9]{5}[-.]", file.name)]
-
-
-def _read(file: FilePath) -> Any:
-    try:
-        return json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"study: {str(file)!r} is damaged or cannot be read: {error}; remove it, and what it held is"
-                         f" made again") from None

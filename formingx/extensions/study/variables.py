@@ -1,4 +1,4 @@
-"""Sets of values of the variables of a study."""
+"""Sets of values of the variables of a parameter study."""
 
 import itertools
 from collections.abc import Mapping
@@ -8,13 +8,13 @@ from ...errors import InputError, finite, several
 
 
 def design(variables: Any) -> list[dict[str, float]]:
-    """Return the sets of values of a study; see `study`.
+    """Return the sets of values of a parameter study, one for each run.
 
     Args:
-        variables: see `study`.
+        variables: {name: values} for all combinations, or a list of {name: value}, one for each run.
 
     Returns:
-        {name: value} for each run.
+        List of {name: value}.
 
     Raises:
         InputError: variables or values that are not allowed.

@@ -1,0 +1,148 @@
+"""Runs of a parameter study, in this or other processes."""
+
+from __future__ import annotations
+
+import logging
+import math
+import pickle
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent import futures
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from ...errors import InputError
+
+Measure = Callable[[Any], float] | str
+"""A function of the path that returns a number, or the name of a column of the path."""
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """One run of a parameter study.
+
+    Attributes:
+        values: {variable: value}.
+        measures: {name of the measure: number}; empty if the run failed.
+        error: reason for the failure, or "".
+        seconds: duration of the run, s.
+        warnings: texts of the warnings of the run.
+    """
+
+    values: dict[str, float]
+    measures: dict[str, float] = field(default_factory=dict)
+    error: str = ""
+    seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+
+
+class Task(NamedTuple):
+    """Task of a process: builds a run from values of the variables, and measures it.
+
+    Attributes:
+        build: function of the variables that returns a path.
+        measure: {name: function of the path, or name of a column}.
+    """
+
+    build: Callable[..., Any]
+    measure: dict[str, Measure]
+
+    def __call__(self, values: dict[str, float]) -> StudyRun:
+        """Run `build` with values {variable: value}; return its measures, or the reason for its failure."""
+        began, log, log_filter = time.perf_counter(), logging.getLogger("formingx"), _RunLogFilter(values)
+        log.addFilter(log_filter)
+        try:
+            result = self.build(**values)
+            found = {name: float(result.last.measures[measure] if isinstance(measure, str) else measure(result))
+                     for name, measure in self.measure.items()}
+            error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
+        except Exception as failure:                         # the other runs continue after any exception of the script
+            found, error = {}, f"{type(failure).__name__}: {failure}"
+        finally:
+            log.removeFilter(log_filter)
+        return StudyRun(values, {} if error else found, error, time.perf_counter() - began, log_filter.warnings)
+
+
+class _RunLogFilter(logging.Filter):
+    """Log filter that adds the values of a run to its log records and collects its warnings; for one thread.
+
+    Args:
+        values: {variable: value} of the run.
+    """
+
+    def __init__(self, values: dict[str, float]):
+        super().__init__()
+        self._values, self._thread, self.warnings = values, threading.get_ident(), list[str]()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Prefix a record of this thread with the values of the run; return True, so that it is logged."""
+        if record.thread == self._thread:
+            text = record.getMessage()
+            record.msg, record.args = f"run {as_text(self._values)}: {text}", ()
+            if record.levelno >= logging.WARNING:
+                self.warnings.append(text)
+        return True
+
+
+def as_text(numbers: Mapping[str, float]) -> str:
+    """Return numbers and their names as text, such as "depth = 30, radius = 18".
+
+    Args:
+        numbers: {name: value}.
+
+    Returns:
+        The text.
+    """
+    return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
+
+
+def finished(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
+    """Run a task with sets of values, the first one alone, and yield the runs as they finish.
+
+    Args:
+        pool: an executor of `concurrent.futures`.
+        task: the task.
+        cases: {variable: value} of each run.
+
+    Yields:
+        The runs, also those that failed.
+    """
+    for batch in (cases[:1], cases[1:]):
+        jobs: dict[Any, dict] = {pool.submit(task, case): case for case in batch}
+        for job in futures.as_completed(jobs):
+            failure = job.exception()
+            yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
+
+
+def pool_of(executor: futures.Executor | None, workers: int) -> Any:
+    """Return a context manager of an executor for the runs of a study.
+
+    Args:
+        executor: the user's executor, which stays open; None: new processes, which end with the block.
+        workers: number of new processes.
+
+    Returns:
+        The context manager; it yields the executor.
+    """
+    if executor:
+        return nullcontext(executor)
+    from multiprocessing import get_context  # costs time, which others do not spend
+    return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+
+
+def check_importable(task: Task) -> None:
+    """Raise an InputError unless the functions of a task can be sent to another process.
+
+    Args:
+        task: the task.
+
+    Raises:
+        InputError: a function that cannot be imported by name.
+    """
+    try:
+        pickle.dumps(task)
+    except Exception as error:
+        raise InputError(f"study: what is run in processes must be importable by name, no lambda and no function inside"
+                         f" another: {error}; or give an executor that runs here") from None
