@@ -1,4 +1,4 @@
-"""Empty figures, drawn without a screen and shown by notebooks, and the tools of a scene in them."""
+"""Figures of matplotlib without a screen, which notebooks show; drawing of tools; import of pyvista."""
 
 import importlib
 import sys
@@ -10,23 +10,28 @@ import numpy as np
 
 @runtime_checkable
 class Axes(Protocol):
-    """Axes of matplotlib, which is imported where something is drawn."""
+    """Type of matplotlib's axes; a protocol, because matplotlib is imported only where something is drawn."""
 
     def plot(self, *args: Any, **style: Any) -> Any:
-        """Draw a line."""
+        """Draw lines and markers, as matplotlib's `Axes.plot`."""
 
     def set(self, **properties: Any) -> Any:
-        """Set labels, title and limits."""
+        """Set labels, title and limits, as matplotlib's `Axes.set`."""
 
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return an empty figure and its axes, row by row (a single one as itself); it is saved without a screen.
+    """Return an empty matplotlib figure with a grid of plots; `savefig` needs no screen.
 
     Args:
-        columns, rows: numbers of plots.
-        width, height: size of one plot, inches.
+        columns: number of plots side by side.
+        width: width of one plot, inches.
+        height: height of one plot, inches.
         ratios: relative widths of the columns; default equal.
+        rows: number of plots one above the other.
+
+    Returns:
+        The figure, and an array of its axes, row by row; a single plot gives its axes alone.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -43,7 +48,10 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
 
 
 def pyvista() -> Any:
-    """Return the module pyvista, imported without `matplotlib.pyplot`: it is loaded if pyvista uses it, for charts."""
+    """Return the module pyvista, imported without `matplotlib.pyplot`, which is slow to import.
+
+    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use.
+    """
     name = "matplotlib.pyplot"
     if "pyvista" not in sys.modules and name not in sys.modules:
         sys.modules[name] = _LoadedWhenUsed(name)
@@ -55,7 +63,7 @@ def pyvista() -> Any:
 
 
 class _LoadedWhenUsed(types.ModuleType):
-    """A module that is imported when one of its names is used."""
+    """Placeholder for a module of the same name, which is imported when one of its attributes is used."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):                               # asked for by the machinery of imports
@@ -68,9 +76,10 @@ def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> 
 
     Args:
         axes: matplotlib axes.
-        placed: [(tool, its shift (r, z))].
-        low, high: corners (r, z) of the box, length.
-        mirror: True to draw their mirror images at r = 0, too.
+        placed: for each tool the pair (`Tool`, its displacement (r, z), length).
+        low: lower corner (r, z) of the box, length.
+        high: upper corner (r, z) of the box, length.
+        mirror: True to draw the mirror images of the tools at r = 0, too.
     """
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)

@@ -1,6 +1,6 @@
-"""Figures, and axes with their figure, that show themselves at the end of a notebook's cell.
+"""Figures and axes of matplotlib that a notebook shows at the end of a cell.
 
-matplotlib's own do so only if pyplot makes them, which keeps them open and asks for a screen.
+A notebook shows matplotlib's own figures only if pyplot creates them. pyplot keeps them open and asks for a screen.
 """
 
 import io
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 
 class ShownFigure(Figure):
-    """A figure that a notebook shows."""
+    """Figure of matplotlib that a notebook shows as a PNG picture."""
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -19,7 +19,7 @@ class ShownFigure(Figure):
 
 
 class ShownAxes(Axes):
-    """Axes for which a notebook shows their figure."""
+    """Axes of matplotlib for which a notebook shows the figure that contains them."""
 
     def _repr_png_(self) -> bytes | None:
         show = getattr(self.figure, "_repr_png_", None)

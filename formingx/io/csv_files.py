@@ -18,13 +18,13 @@ UNITS = {"length": LENGTHS, "stress": STRESSES, "volume": _VOLUMES}
 
 
 class Table(NamedTuple):
-    """Columns of numbers.
+    """Columns of numbers with n rows, from a CSV file or from arrays.
 
     Attributes:
         name: name of the file, for messages.
-        columns: {name: values, shape (n,)}.
-        units: {name: unit in the header, or None}.
-        kinds: the column `kind` that `Path.to_csv` writes, or None.
+        columns: {name of the column: values, shape (n,)}; nan where the cell is empty or no number.
+        units: {name of the column: its unit in the header, or None}.
+        kinds: the n cells of the column "kind" that `Path.to_csv` writes, or None without this column.
     """
 
     name: str
@@ -33,11 +33,12 @@ class Table(NamedTuple):
     kinds: list[str] | None = None
 
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
-        """Return a column in another unit.
+        """Return a column as it is in the file, or converted to another unit.
 
         Args:
             column: name of the column.
-            requested: a factor, or the name of a unit, which needs a unit in the header; default as in the file.
+            requested: name of the unit of the returned values, or a factor that multiplies the values. A name needs a
+                unit in the header. None: the values of the file, whose header must state no unit.
 
         Returns:
             The values, shape (n,).
@@ -64,10 +65,14 @@ class Table(NamedTuple):
 
 
 def conversion(unit: str, requested: str) -> float:
-    """Return the number of `requested` units in one `unit`.
+    """Return the factor that converts numbers from one unit to another; 10 from "cm" to "mm".
+
+    Args:
+        unit: name of the unit of the numbers.
+        requested: name of the unit to which they are converted.
 
     Raises:
-        InputError: a unit is unknown, or the units are of different kinds.
+        InputError: a unit is unknown, or the units measure different quantities.
     """
     if unit == requested:
         return 1.0
@@ -78,16 +83,20 @@ def conversion(unit: str, requested: str) -> float:
     for name in (unit, requested):
         if name not in names:
             raise InputError(f"unit {name!r} is not known; known: {', '.join(names)}; or give a factor")
-    raise InputError(f"{unit!r} cannot be turned into {requested!r}: they measure different things")
+    raise InputError(f"{unit!r} cannot be turned into {requested!r}: they measure different quantities")
 
 
 def read(file: Any) -> Table:
-    """Return the table in a CSV file.
+    """Return the table in a CSV file; columns without numbers are left out.
 
     The header names the columns, with units in brackets, as in "pressure [psi]".
 
+    Args:
+        file: name of the file.
+
     Raises:
-        InputError: as in `records`. There is no header, fewer than two rows, or a row of another length.
+        InputError: the file cannot be read (`records`). There is no header, fewer than two rows, or a row of another
+            length.
     """
     name = os.fspath(place("table", file))
     cells = records(name)
@@ -111,14 +120,16 @@ def read(file: Any) -> Table:
 
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
-    """Return the cells of a CSV file, with decimal points.
+    """Return the cells of a CSV file as text; decimal commas are replaced by points.
 
     Semicolons or tabs separate cells if the first line contains one outside quotes; otherwise commas do. Lines that
-    begin with # are skipped. Decimal commas become points unless a number contains a point. They are recognised in
-    cells between semicolons, tabs or quotes.
+    begin with # are skipped. Decimal commas are recognised in cells between semicolons, tabs or quotes.
+
+    Args:
+        file: name of the file.
 
     Returns:
-        [(line number, cells)].
+        For each row its line number in the file and its cells.
 
     Raises:
         InputError: the file cannot be read, quotes do not match, or some numbers have commas and others points.
@@ -152,7 +163,10 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """Return [(line number, line)] without empty lines and comment lines (#) outside quotes."""
+    """Return pairs (line number, line) of the lines of a file without empty lines and comments.
+
+    A comment is a line that begins with #. Inside quotes all lines are kept.
+    """
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):
@@ -162,11 +176,11 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
-    """Return a table of arrays.
+    """Return a table made from arrays, without units.
 
     Args:
         name: name of the table, for messages.
-        columns: {name: values, shape (n,)}, n at least 2.
+        columns: {name of a column: values, shape (n,)}, n at least 2.
 
     Raises:
         InputError: a column does not hold numbers, or the lengths differ or are below 2.
@@ -185,9 +199,9 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
 
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:
-    """Return the name and the unit from a cell of the header.
+    """Return the name and the unit of a column from its cell in the header.
 
-    "pressure [psi]" gives ("pressure", "psi"). The unit is None for a dimensionless column.
+    "pressure [psi]" gives ("pressure", "psi"). The unit is None without brackets, and for "", "-" and "1" in them.
     """
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
     if not found or not found[1]:

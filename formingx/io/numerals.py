@@ -1,4 +1,7 @@
-"""Numbers in files: decimal digits, a point, an exponent. Other forms that Python accepts are refused."""
+"""Numbers in text files: decimal digits, a point, an exponent.
+
+Other forms that Python accepts, such as "1_000", are refused.
+"""
 
 import re
 
@@ -8,15 +11,18 @@ _NUMBER = re.compile(rf"(?:{_WHOLE}(?:\.[0-9]*)?|[+-]?\.[0-9]+)(?:[eE]{_WHOLE})?
 
 
 def is_number(word: str) -> bool:
-    """Return True if a word is a number, "nan" and "inf" included."""
+    """Return True if a text without spaces is a number; "nan" and "inf" are numbers."""
     return _NUMBER.fullmatch(word) is not None
 
 
 def number(word: str) -> float:
-    """Return a word as a number.
+    """Return the number that a text stands for.
+
+    Args:
+        word: text without spaces, such as "1.5e-3".
 
     Raises:
-        ValueError: the word is not a number.
+        ValueError: the text is not a number (`is_number`).
     """
     if not is_number(word):
         raise ValueError(f"{word[:40]!r} is not a number")
@@ -24,10 +30,13 @@ def number(word: str) -> float:
 
 
 def whole(word: str) -> int:
-    """Return a word as an integer.
+    """Return the integer that a text stands for.
+
+    Args:
+        word: text without spaces, such as "-12".
 
     Raises:
-        ValueError: the word is not an integer, or has more than 18 digits.
+        ValueError: the text is not an integer, or has more than 18 digits.
     """
     if not re.fullmatch(r"[+-]?[0-9]{1,18}", word):
         raise ValueError(f"{word[:40]!r} is not a whole number")

@@ -13,15 +13,15 @@ from ..errors import place
 
 
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
-    """Write a file under a temporary name, then rename it.
+    """Write a file under a temporary name, then rename it, so that no other program reads an incomplete file.
 
-    An earlier file survives a failure; its mode and owner are kept. Symbolic links are followed. An existing device or
-    pipe is written to directly.
+    If writing fails, an earlier file of that name is kept. A new file gets mode and owner of the earlier one. Symbolic
+    links are followed. An existing device or pipe is written to directly.
 
     Args:
-        file: the file.
-        write: function that writes to a stream.
-        mode: "w" or "wb".
+        file: name of the file; missing folders are created.
+        write: function that writes the content to the stream given to it.
+        mode: "w" for text (UTF-8), "wb" for bytes.
 
     Raises:
         OSError: the file cannot be written; the message names it. No partial file remains.

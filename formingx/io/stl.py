@@ -13,8 +13,9 @@ def volume(points: np.ndarray, triangles: np.ndarray) -> float:
     """Return the volume inside closed surfaces of triangles, length^3.
 
     Args:
-        points: shape (n, 3), length.
-        triangles: numbers of the corners, shape (m, 3), with outward normals.
+        points: corners of the triangles, shape (n, 3), length.
+        triangles: for each triangle the rows of its corners in `points`, shape (m, 3), counter-clockwise seen from
+            outside.
     """
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
@@ -24,9 +25,13 @@ def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
     """Write a surface of triangles as binary STL.
 
     Args:
-        points: shape (n, 3), length.
-        triangles: numbers of the corners, shape (m, 3).
-        file: the file.
+        points: corners of the triangles, shape (n, 3), length.
+        triangles: for each triangle the rows of its corners in `points`, shape (m, 3), counter-clockwise seen from
+            outside.
+        file: name of the file.
+
+    Raises:
+        OSError: the file cannot be written.
     """
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
