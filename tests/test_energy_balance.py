@@ -154,7 +154,7 @@ def test_books_that_are_off_are_said(caplog, monkeypatch):
     for _ in range(2):
         path.work()
         said, = path.findings()
-        assert said.about == "energy" and "off by 2 % of the largest part" in said.text
+        assert said.about == "energy" and "off by 2 % of the largest entry" in said.text
         assert caplog.text.count(said.text) == 1
 
 

@@ -1,4 +1,4 @@
-"""Admissibility check of a state before the run accepts it."""
+"""Check of a state before the run accepts it: can the body have this shape, with these contact forces?"""
 
 from __future__ import annotations
 
@@ -18,25 +18,26 @@ from ...solve.state import State
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of an admissible state, and limits from which a run warns.
+    """Limits beyond which a state is inadmissible, and limits from which a run warns.
 
     Attributes:
-        volume: root mean square of J - 1. (Creases at clamped rims and at corners of coarse blocks stay below 0.17.)
-        inverted_elements: fraction of the elements that may have a point with J <= 0.
+        volume: largest root mean square of J - 1, J: volume ratio. Creases at clamped rims and at corners of coarse
+            blocks stay below 0.17.
+        inverted_elements: largest fraction of the elements that have a point with J <= 0.
         allowed_elements: number of such elements that is always allowed, because corners are singular.
-        depth: depth of the body in a tool, over the thickness and over the length of an edge. Only a depth beyond both
-            is inadmissible.
-        penetration: penetration of contact points over the local wall. Above this limit the body did not follow the
-            tool. (Williams' plug on coarse elements reaches 0.051.)
+        depth: largest depth of the body in a tool. A state is inadmissible if the depth exceeds this factor times the
+            thickness and times the length of an element edge.
+        penetration: largest penetration of contact points, over the local wall. Beyond it the body did not follow the
+            tool. Williams' plug on coarse elements reaches 0.051.
         warning_error: relative change of a tool force by penetration from which a run warns.
-        largest_error: relative change of a tool force by penetration from which a state is inadmissible.
-        largest_energy_ratio: bound of this change, over the fraction of the strain energy that penetration stores. It
-            applies to a body that is pressed flat.
-        difference_step: step of a central difference quotient in arc length.
-        negligible_penetration: penetration over the thickness below which a state is always admissible, as at a first
-            touch.
-        pole_stretch: largest pole stretch; it is 1e150 for a negative wall.
-        tensile_force: tensile force on a frictionless tool, over the compressive forces on it.
+        largest_error: largest relative change of a tool force by penetration.
+        largest_energy_ratio: upper bound of the estimated change of force, over the fraction of the strain energy that
+            penetration stores. It applies to a body that is pressed flat.
+        difference_step: step in arc length of a central difference quotient.
+        negligible_penetration: penetration over the thickness below which the change of force is not limited, as at a
+            first touch.
+        pole_stretch: largest pole stretch; the column is 1e150 for a negative wall.
+        tensile_force: largest tensile force on a frictionless tool, over the compressive forces on it.
     """
 
     volume: float = 0.25
@@ -57,13 +58,13 @@ _LIMITS = Limits()
 
 
 class Depth(NamedTuple):
-    """Penetration of a body into a tool.
+    """Deepest point of a body in a tool.
 
     Attributes:
-        ratio: depth over the allowed depth.
-        depth: penetration depth, length.
-        place: deformed position, shape (2,) or (3,), length.
-        contact: the `FaceContact`.
+        ratio: `depth` over the allowed depth.
+        depth: distance of the point from the surface of the tool, length.
+        place: deformed position of the point, shape (2,) or (3,), length.
+        contact: the `FaceContact` with the tool.
         name: name of the tool, or of the face that touches it.
     """
 
@@ -75,15 +76,15 @@ class Depth(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Message about a contact point in three dimensions."""
+        """Depth, tool and position of a contact point in three dimensions, as a sentence without a full stop."""
         position = ", ".join(f"{v:.5g}" for v in self.place)
         return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({position})"
 
 
 class AdmissibilityCheck:
-    """Check whether a body can have the states of one problem.
+    """Checks the states of one problem; an inadmissible state satisfies the equations, but no real body has it.
 
-    Inadmissible are, for example, inverted elements, a face inside a tool, or forces that penetration falsifies.
+    Examples are states with inverted elements, with a face inside a tool, or with forces that penetration falsifies.
 
     Args:
         problem: the discretised problem.
@@ -126,7 +127,7 @@ class AdmissibilityCheck:
         return found
 
     def _reasons(self, state: State) -> Iterator[str]:
-        """Yield every reason why a state is inadmissible."""
+        """Yield each reason why a state is inadmissible, as text; collective."""
         measures = state.measures
         for name, value in measures.items():
             if not np.isfinite(value):
@@ -153,8 +154,8 @@ class AdmissibilityCheck:
                        f" elements are too large for the tool")
             for deep in self._excess_penetration(edges, state):
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
-                       f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the wall that is left there: give"
-                       f" Contact a penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
+                       f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the remaining wall: give Contact a"
+                       f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 error = _force_error(contact, state, self._images)
                 depth = resultants.penetration(contact, state.x, state.control)
@@ -169,7 +170,13 @@ class AdmissibilityCheck:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
     def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Yield the deepest point in each tool: of the contact's own face (a warning), or of any face."""
+        """Yield for each tool in a section the deepest point of the boundary, if it is deeper than allowed.
+
+        Args:
+            edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
+            state: the state.
+            own: True to examine the face of the contact alone, with the limit of a warning.
+        """
         points, length = along(edges), _lengths(edges)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
@@ -182,10 +189,12 @@ class AdmissibilityCheck:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, contact.contact.label)
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
-        """Yield the deepest contact point in each tool in three dimensions, if it is deeper than allowed.
+        """Yield for each tool in three dimensions the deepest contact point, if it is deeper than allowed; collective.
 
         Args:
-            allowed: function of a contact that returns the allowed penetration, shape (n,) or a number, length.
+            state: the state.
+            allowed: function of a `FaceContact` that returns the allowed penetration of its n contact points, shape
+                (n,) or a number, length.
         """
         if self._problem.scene.kinematics.components < 3:
             return
@@ -199,7 +208,12 @@ class AdmissibilityCheck:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
-        """Yield contact points whose penetration is too large compared with the local wall."""
+        """Yield for each tool the contact point with the largest penetration over the local wall, if it is too large.
+
+        Args:
+            edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
+            state: the state.
+        """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.rest
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
@@ -214,28 +228,36 @@ class AdmissibilityCheck:
 
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
-    """Return the penetration of points, shape (m, n, components), into a tool, shape (m, n), length."""
+    """Return the depths of points in the tool of a contact in a state, shape (m, n), length; negative outside it.
+
+    Args:
+        contact: the `FaceContact`.
+        points: deformed positions, shape (m, n, components), length.
+        state: the state.
+    """
     positions = points - contact.travelled(state.control)
     return contact.contact.tool.signed_distance(positions.reshape(-1, positions.shape[-1])).reshape(positions.shape[:2])
 
 
 def _allowed_penetration(contact: Any) -> np.ndarray:
-    """Return the allowed penetration of contact points, shape (n,), length.
+    """Return the allowed penetration of the n points of a `FaceContact` in three dimensions, shape (n,), length.
 
-    It is infinite for lagged points that touch since this step: no force acts on them yet.
+    It is infinite for points that first touched in the last step of a lagged contact: no force acts on them yet.
     """
     allowed = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, allowed)
 
 
 def _force_error(contact: Any, state: State, images: int) -> float:
-    """Return the relative change of the force F on a moving tool by penetration; collective.
+    """Return the estimated relative change of the force F on a tool by penetration; collective.
 
     With the energy E of penetration, the tool advances by 2 E/F into the body. The change of force is this distance
-    times dF/dtravel. It is 0 for a fixed tool.
+    times dF/dtravel. For a fixed tool 0 is returned.
 
     Args:
-        images: number of images of the modelled body in the whole part, to which `strain_energy` belongs.
+        contact: the `FaceContact` with the tool.
+        state: the state, with the tangent of the path and the column "strain_energy" of the whole part.
+        images: number of images of the modelled body in the whole part.
     """
     if not contact.contact.driven:
         return 0.0
@@ -254,12 +276,22 @@ def _force_error(contact: Any, state: State, images: int) -> float:
 
 
 def _penalty_advice(contact: Any, error: float) -> str:
-    """Return advice on a larger penalty, as text."""
+    """Return advice on a larger penalty as text.
+
+    Args:
+        contact: the `FaceContact`.
+        error: relative change of the tool force by penetration (`_force_error`).
+    """
     return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warning_error * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
-    """Return True if the body pulls at a frictionless tool along its travel; collective."""
+    """Return True if the body pulls a frictionless moving tool along its travel; collective.
+
+    Args:
+        contact: the `FaceContact`.
+        state: the state.
+    """
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False

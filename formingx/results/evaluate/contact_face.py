@@ -1,4 +1,4 @@
-"""Contact of a tool with a face of the body, point by point: pressure, friction, gap; force on the tool."""
+"""Contact of a tool with a face of the body, point by point: pressure, friction and gap; forces on the tools."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class ContactTable(Sheet):
     """Contact quantities at the n contact points (nodes or Gauss points) of a face, ordered by reference radius.
 
     Attributes:
-        reference_points: reference positions (R, Z), shape (n, 2), length.
-        points: deformed positions (r, z), shape (n, 2), length.
-        gap: distance from the tool, negative inside it, shape (n,), length.
+        reference_points: reference positions (R, Z) of the points, shape (n, 2), length.
+        points: deformed positions (r, z) of the points, shape (n, 2), length.
+        gap: distance of each point from the tool, negative inside it, shape (n,), length.
         pressure: contact pressure per deformed area, shape (n,), stress.
         friction: tangential traction of the body on the tool per deformed area, along the tool's profile, shape (n,),
             stress.
@@ -46,7 +46,9 @@ class ContactTable(Sheet):
 
 
 class ContactFace:
-    """The face of one contact (`FaceContact`) with the points of all ranks in one order; collective.
+    """Evaluates the contact pressure, friction and gap of one `FaceContact`; each method gives the points of all ranks.
+
+    Collective.
 
     Args:
         path: the path whose states are evaluated.
@@ -69,7 +71,7 @@ class ContactFace:
             self._reference_tangents = _tangents(self.reference_points[self._edges])
 
     def of(self, state: Any) -> ContactTable:
-        """Return the contact quantities in a state; without pressure if the tool is inactive."""
+        """Return the contact quantities in a state; pressure and friction are 0 if the tool is inactive."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
@@ -88,7 +90,7 @@ class ContactFace:
         return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed over reference area at each contact point; between two edges the mean of both.
+        """Return deformed over reference area at each contact point; a node of two edges gets the mean of both.
 
         Args:
             points: deformed positions of the contact points, shape (n, 2), length.
@@ -105,13 +107,23 @@ class ContactFace:
         return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
 
     def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (reference positions, further columns) of the points of all ranks, ordered by R, then Z."""
+        """Return the contact points of all ranks with data, ordered by R, then Z; collective.
+
+        Args:
+            columns: data at the n contact points of this rank, shape (n,) or (n, k) each.
+
+        Returns:
+            Reference positions, shape (m, 2), length, and the data side by side, shape (m, columns), for the m points.
+        """
         rows = gathered(self._path.problem.comm, np.column_stack([self._contact.points, *columns]))
         rows, n = rows[np.lexsort((rows[:, 1], rows[:, 0]))], self._contact.points.shape[1]
         return rows[:, :n], rows[:, n:]
 
     def _edge_points(self) -> np.ndarray:
-        """Return ends and middle of every edge of the face, shape (m, 3, 2), on all ranks; ghost edges occur twice."""
+        """Return the reference positions of both ends and the middle of each edge of the face, shape (m, 3, 2), length.
+
+        The edges of all ranks are returned; ghost edges occur twice. Collective.
+        """
         mesh = self._path.problem.scene.mesh
         X = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(self._contact.contact.on)))
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
@@ -156,6 +168,13 @@ def tool_forces(path: Any) -> dict[str, np.ndarray]:
 
 
 def _tangents(points: np.ndarray) -> np.ndarray:
-    """Return dx/ds at the two ends and the middle of three-node edges, shape (m, 3, 2)."""
+    """Return dx/ds at the two ends and the middle of m edges; s runs from 0 to 1 along an edge.
+
+    Args:
+        points: positions x of the first end, the last end and the middle, shape (m, 3, 2), length.
+
+    Returns:
+        Shape (m, 3, 2), length.
+    """
     a, b, m = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)

@@ -14,12 +14,12 @@ _TURN = 40.0
 
 
 class Edge(NamedTuple):
-    """Convex edge of a tool between two neighbouring contact points, at least one of which slides.
+    """Convex edge or fillet of a tool between two neighbouring contact points, at least one of which slides.
 
     Attributes:
         turn: angle between the tool normals at the two points, degrees.
         tool: name of the tool, or of the face that touches it.
-        point: position (r, z) between the two points, length.
+        point: deformed position (r, z) half-way between the two points, length.
     """
 
     turn: float
@@ -28,9 +28,13 @@ class Edge(NamedTuple):
 
 
 def coarsest(path: Any, state: Any) -> Edge | None:
-    """Return the edge at which the tool normal turns most from one contact point to the next; collective.
+    """Return the edge of a tool at which the tool normal turns most from one contact point to the next; collective.
 
-    Neighbours are points that follow each other by R, then Z. Supported points count as not sliding.
+    Neighbours are points that follow each other by R, then Z. Points with constrained displacements do not slide.
+
+    Args:
+        path: the computed `Path`.
+        state: a state on its last mesh.
 
     Returns:
         The edge, or None if the body slides over no edge.
@@ -63,7 +67,14 @@ def coarsest(path: Any, state: Any) -> Edge | None:
 
 
 def findings(edge: Edge | None) -> list[Finding]:
-    """Return a warning on the coarsest edge over which the body slides; [] if its elements are small enough."""
+    """Return a warning if the elements are too large for the sharpest edge over which the body slides.
+
+    Args:
+        edge: result of `coarsest`.
+
+    Returns:
+        A list with the warning; empty if the tool normal turns by less than 40 degrees.
+    """
     if edge is None or edge.turn < _TURN:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="

@@ -20,8 +20,8 @@ class Corner(NamedTuple):
     """Corner of a tool that the body must fill.
 
     Attributes:
-        at: middle of the corner (r, z), length.
-        radius: fillet radius, length.
+        at: middle of the corner (r, z), before the tool moves, length.
+        radius: radius of the fillet in the corner, length; 0 for a sharp corner.
     """
 
     at: tuple[float, float]
@@ -30,12 +30,12 @@ class Corner(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Filling(Sheet):
-    """The remaining gaps in the k corners of a tool, in n states.
+    """Remaining gaps in the k corners of a tool, in n states.
 
     Attributes:
-        corners: corners of the tool.
-        control: {name of the pressure, or of another control: its values, shape (n,)}.
-        gaps: largest distance from each corner to the body, shape (n, k), length.
+        corners: the k corners, in the order of the tool's profile.
+        control: {column: its values, shape (n,)} for each pressure; without a pressure, for each controlled quantity.
+        gaps: largest distance of the points of each corner from the body, shape (n, k), length.
         comm: MPI communicator of the run.
     """
 
@@ -46,25 +46,23 @@ class Filling(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the files: {name: values, shape (n,)}."""
+        """Columns of the table: {name: values, shape (n,)}; the first corner is "corner_1_gap"."""
         return self.control | {f"corner_{k}_gap": gap for k, gap in enumerate(self.gaps.T, 1)}
 
     @property
     def pressure(self) -> np.ndarray:
-        """Values of the control, usually a pressure, shape (n,)."""
+        """Values of the first entry of `control`, usually a pressure, shape (n,)."""
         return next(iter(self.control.values()))
 
     def pressure_at(self, gap: float, corner: int | None = None) -> float:
-        """Return the pressure at which a gap is reached, interpolated linearly between states.
-
-        Beyond this pressure the gap remains smaller.
+        """Return the pressure from which on the gap stays below a value, interpolated linearly between states.
 
         Args:
             gap: remaining gap, length.
-            corner: number of a corner in `corners`; default all of them.
+            corner: index of a corner in `corners`, from 0; default the largest gap of all corners.
 
         Returns:
-            The value of the control, stress for a pressure.
+            The value of `pressure`, stress, or the value of another control in its unit.
 
         Raises:
             InputError: the gap is not reached, or there is no such corner.
@@ -74,7 +72,7 @@ class Filling(Sheet):
             raise InputError(f"pressure_at: corner = {corner!r}: must be from 0 to {len(self.corners) - 1}")
         remaining = self.gaps.max(1) if corner is None else self.gaps[:, corner]
         if remaining[-1] > gap:
-            raise InputError(f"pressure_at: gap = {gap:g} is not reached: {remaining[-1]:.6g} is left at the end")
+            raise InputError(f"pressure_at: gap = {gap:g} is not reached: {remaining[-1]:.6g} remains at the end")
         wider = np.flatnonzero(remaining > gap)
         if not len(wider):
             return float(self.pressure[0])
@@ -84,10 +82,10 @@ class Filling(Sheet):
 
 
 def filling(path: Any, contact: Any) -> Filling:
-    """Return the filling of the corners of a tool (`Path.filling`).
+    """Return the remaining gaps in the corners of a tool, state by state (`Path.filling`); collective.
 
     Args:
-        path: the computed `Path`.
+        path: the computed `Path` of a run on one mesh.
         contact: the `FaceContact` of the tool.
 
     Raises:
@@ -113,10 +111,13 @@ def filling(path: Any, contact: Any) -> Filling:
 
 
 def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
-    """Return the arcs and sharp corners of a tool that open towards the body.
+    """Return the concave fillets and sharp concave corners of a tool, which the body must fill.
+
+    Args:
+        tool: the tool, before it moves.
 
     Returns:
-        Pairs (corner, points on it), points of shape (m, 2), length.
+        For each corner a pair (`Corner`, points (r, z) on it, shape (m, 2), length).
     """
     found = []
     pieces = list(tool.pieces)

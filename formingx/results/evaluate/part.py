@@ -17,28 +17,31 @@ from .wall import Wall
 
 @dataclass(frozen=True, repr=False)
 class Part(PartNumbers):
-    """Whole part to its rim or its trim, also if a half is modelled; in plane strain per unit depth.
+    """Key numbers of the whole part up to its rim or its trim, also if a half is modelled.
+
+    In plane strain, volume, area, weight and capacity are per unit depth.
 
     Attributes:
-        volume: volume between the two faces without a bulging rim, length^3.
+        volume: volume between the two faces, without the bulge of the rim, length^3.
         area: area of the middle surface, length^2.
         draw_ratio: area over the reference area of the same material (areal draw ratio).
         mean_wall: volume over area, length.
         min_wall: minimum wall, length.
-        min_wall_radius: reference radius of the minimum wall, length.
-        min_wall_at: its place (r, z) on the middle line, length.
-        min_wall_height: its height (as in `Wall`), length.
-        min_wall_reference: its reference position: ("R", radius), for a parison ("Z", height on the inner face).
+        min_wall_radius: reference radius R of the place of the minimum wall, length.
+        min_wall_at: deformed position (r, z) of this place on the middle line, length.
+        min_wall_height: height of this place (`Wall.height`), length.
+        min_wall_reference: reference position of this place on the bottom face: ("R", radius), and for a parison, on
+            the inner face, ("Z", height).
         uniformity: minimum wall over mean wall, 1 for a uniform part.
-        variation: coefficient of variation of the wall over the middle surface: standard deviation over mean.
+        variation: coefficient of variation of the wall over the middle surface: standard deviation over mean value.
         weight: weight in grams, or None without a density. It uses the volume before thermal expansion, so it does not
             change with the temperature.
         walls: {height: wall at this height}, length.
-        scrap: volume beyond the trim over the volume of the whole sheet.
-        capacity: volume inside the inner face, up to planes across its ends, length^3. A closed bottle counts whole, a
-            pot up to its rim or trim.
-        basis: basis of volume, area, weight and capacity as text, such as a unit of depth. It also tells if only a half
-            was modelled; "" for an axisymmetric part.
+        scrap: fraction of the volume of the whole sheet that lies beyond the trim.
+        capacity: volume that the part holds: the volume inside the inner face, up to planes across its ends, length^3.
+            A closed bottle counts whole, a pot up to its rim or trim.
+        basis: reference of volume, area, weight and capacity as text, such as "the part, per mm of depth"; "" for an
+            axisymmetric part that is modelled whole.
         units: units of the printed values.
     """
 
@@ -77,7 +80,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     Args:
         wall: the wall in a state.
         axisymmetric: False in plane strain.
-        density: density, g/cm3.
+        density: density of the material for the weight, g/cm3; None: no weight.
         trim: radius, or ("height", h), at which the part is cut off, length.
         heights: heights at which the wall is given, too, length.
         units: units of the script.
@@ -115,11 +118,11 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
-    """Return the fraction of each strip between nodes that belongs to the part, 0 to 1, shape (n - 1,).
+    """Return the fraction of each strip between two nodes that lies before the trim, 0 to 1, shape (n - 1,).
 
     Args:
-        wall: the wall at n nodes.
-        trim: radius, or ("height", h), at which the part is cut off, length.
+        wall: the wall at n nodes, from the axis to the rim.
+        trim: radius, or ("height", h), at which the part is cut off, length; None: not cut.
 
     Raises:
         InputError: the part does not reach the trim.
@@ -140,7 +143,13 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume inside the inner face, over the strips between nodes that belong to the part, length^3."""
+    """Return the volume inside the inner face of a part, length^3; in plane strain per unit depth.
+
+    Args:
+        wall: the wall at n nodes.
+        inside: fraction of each strip between two nodes that belongs to the part, shape (n - 1,).
+        axisymmetric: False in plane strain.
+    """
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside
@@ -150,7 +159,13 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
 
 
 def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes between two lines, from each pair of points to the next, shape (m - 1,), length^3."""
+    """Return the volumes of the strips between two lines, shape (m - 1,), length^3; in plane strain per unit depth.
+
+    Args:
+        bottom: points (r, z) of a line, shape (m, 2), length.
+        top: points of the other line opposite them, shape (m, 2), length.
+        axisymmetric: False in plane strain.
+    """
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
     for a, b in zip(corners, corners[1:] + corners[:1]):
@@ -159,17 +174,33 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarr
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes between the axis and lines from a to b, shape (n, 2); positive if b is above a, shape (n,)."""
+    """Return the volumes between the axis r = 0 and straight lines, shape (n,), length^3; positive if b is above a.
+
+    Args:
+        a: first end (r, z) of each line, shape (n, 2), length.
+        b: second end of each line, shape (n, 2), length.
+        axisymmetric: False in plane strain, where the volumes are per unit depth.
+    """
     (r, z), (s, w) = a.T, b.T
     return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
 
 
 def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the areas swept by the pieces of a line about the axis (plane strain: their lengths), shape (m - 1,)."""
+    """Return the areas that the pieces of a polyline sweep about the axis, shape (m - 1,), length^2.
+
+    Args:
+        line: points (r, z), shape (m, 2), length.
+        axisymmetric: False in plane strain, where the lengths of the pieces are returned.
+    """
     length = np.hypot(*np.diff(line, axis=0).T)
     return np.pi * (line[1:, 0] + line[:-1, 0]) * length if axisymmetric else length
 
 
 def _sums(fine_values: np.ndarray, nodes: int) -> np.ndarray:
-    """Return sums of finely spaced values over each piece between two of n nodes, shape (n - 1,)."""
+    """Return the sums of values over the pieces between neighbouring nodes, shape (nodes - 1,).
+
+    Args:
+        fine_values: values on equal numbers of subdivisions of each piece, in order, shape (k,).
+        nodes: number of nodes.
+    """
     return fine_values.reshape(nodes - 1, -1).sum(1)

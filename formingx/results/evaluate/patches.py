@@ -12,18 +12,18 @@ import numpy as np
 
 _POWERS = np.array([(i, n - i) for n in range(4) for i in range(n, -1, -1)])
 """Exponents of (R, Z) in a cubic, shape (10, 2)."""
-_CHUNK = 2048  # cells at a time: some 30 MB
-_KEPT = 2**25  # numbers: operators of the fits are kept for the next state if they take less (256 MB)
+_CHUNK = 2048  # number of cells that are fitted at a time, in about 30 MB
+_KEPT = 2**25  # matrices of the fits are stored for the next state if they have fewer entries than this (256 MB)
 
 
 class Patches:
-    """Patches of m cells out of n, with the quadrature points of all n cells.
+    """Least-squares fits of cubics to values at quadrature points, on the patches of m of the n cells of a mesh.
 
     Args:
-        points: quadrature points (R, Z), shape (n, q, 2), length.
-        corners: numbers of the corners of the cells, shape (n, 3).
+        points: q quadrature points (R, Z) of each of the n cells, shape (n, q, 2), length.
+        corners: node numbers of the corners of each cell, shape (n, 3).
         layer: number of the layer of each cell, shape (n,).
-        mine: numbers of the cells to fit, shape (m,).
+        mine: numbers of the m cells whose patches are fitted, shape (m,).
     """
 
     def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, mine: np.ndarray):
@@ -46,10 +46,10 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Return the coefficients of the cubics fitted to values on the patches of the m cells, shape (m, 10, k).
+        """Return the coefficients of the cubics fitted to k fields on the patches of the m cells, shape (m, 10, k).
 
         Args:
-            values: values at the quadrature points of all cells, shape (n, q, k).
+            values: values of the fields at the quadrature points of all n cells, shape (n, q, k).
         """
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
         for chunk in self._chunks():
@@ -58,10 +58,13 @@ class Patches:
         return found
 
     def _operator(self, chunk: slice) -> np.ndarray:
-        """Return the least-squares matrices from values at the points of patches to coefficients of cubics.
+        """Return matrices that map the values at the points of each patch to the coefficients of its cubic.
+
+        Args:
+            chunk: slice of the m cells.
 
         Returns:
-            Shape (cells, 10, points).
+            Shape (cells of the slice, 10, points of the largest patch).
         """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
@@ -75,20 +78,20 @@ class Patches:
         return operator
 
     def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return the values of the fitted cubics, shape (m, p, k).
+        """Return the values of the fitted cubics of k fields at points, shape (m, p, k).
 
         Args:
             coefficients: coefficients from `fit`, shape (m, 10, k).
-            points: points (R, Z) in each fitted cell, shape (m, p, 2), length.
+            points: p points (R, Z) of each of the m cells, shape (m, p, 2), length.
         """
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
-        """Return the ten monomials of a cubic for some of the patches, shape (cells, ..., 10).
+        """Return the ten monomials of a cubic in scaled coordinates at points, shape (cells, ..., 10).
 
         Args:
-            chunk: slice of the patches.
-            points: points of each patch, shape (cells, ..., 2).
+            chunk: slice of the m cells.
+            points: points (R, Z) for each cell of the slice, shape (cells, ..., 2), length.
         """
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[chunk][between]) / self._size[chunk][between]
@@ -96,5 +99,5 @@ class Patches:
         return powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
     def _chunks(self) -> list[slice]:
-        """Return slices of the fitted cells, small enough for the memory."""
+        """Return slices that divide the m cells into groups of at most `_CHUNK`, to limit the memory."""
         return [slice(k, k + _CHUNK) for k in range(0, len(self._patch), _CHUNK)]

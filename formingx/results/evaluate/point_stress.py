@@ -10,13 +10,15 @@ import numpy as np
 
 
 class FaceStress(NamedTuple):
-    """Cauchy stress on a face at n points.
+    """Cauchy stress on faces through n points, in the deformed body.
+
+    With the unit normal (n_r, n_z) of a face, its tangent is (n_z, -n_r).
 
     Attributes:
-        normal: normal traction, continuous across an interface, shape (n,), stress.
-        shear: shear traction, continuous across an interface, shape (n,), stress.
-        meridional: stress along the face in the section, shape (n,), stress.
-        hoop: hoop stress, shape (n,), stress.
+        normal: normal traction, positive in tension, continuous across an interface, shape (n,), stress.
+        shear: traction along the tangent, continuous across an interface, shape (n,), stress.
+        meridional: normal stress in the direction of the tangent, shape (n,), stress.
+        hoop: hoop stress, in plane strain the stress out of plane, shape (n,), stress.
     """
 
     normal: np.ndarray
@@ -27,12 +29,12 @@ class FaceStress(NamedTuple):
 
 @dataclass(frozen=True)
 class Stress:
-    """Stresses and stretches at n points. Components are ordered r, z, hoop (in plane strain out of plane).
+    """Stresses and stretches at n points. Tensor components are ordered r, z, hoop; in plane strain r, z, out of plane.
 
     Attributes:
         points: reference positions (R, Z), shape (n, 2), length.
-        deformation_gradient: F, shape (n, 3, 3).
-        second_piola: S, second Piola-Kirchhoff stress, shape (n, 3, 3), stress.
+        deformation_gradient: deformation gradient F, shape (n, 3, 3).
+        second_piola: second Piola-Kirchhoff stress S, shape (n, 3, 3), stress.
 
     >>> pole = path.stress().at([(0.0, 0.15)])
     >>> pole.principal_stretches.round(1).tolist(), pole.principal_stresses[:, 0].round(1).tolist()
@@ -45,12 +47,15 @@ class Stress:
 
     @cached_property
     def first_piola(self) -> np.ndarray:
-        """First Piola-Kirchhoff stress P = F S (row: force, column: reference normal), shape (n, 3, 3), stress."""
+        """First Piola-Kirchhoff stress P = F S, shape (n, 3, 3), stress; P N is the force on a unit area with normal N.
+
+        The area and N belong to the reference configuration.
+        """
         return self.deformation_gradient @ self.second_piola
 
     @cached_property
     def cauchy(self) -> np.ndarray:
-        """Cauchy stress P F^T / J, positive in tension, shape (n, 3, 3), stress."""
+        """Cauchy stress P F^T / J, positive in tension, shape (n, 3, 3), stress; J = det F."""
         F = self.deformation_gradient
         return self.first_piola @ F.transpose(0, 2, 1) / (_det(F) * F[:, 2, 2])[:, None, None]
 
@@ -61,7 +66,7 @@ class Stress:
 
     @property
     def principal_stretches(self) -> np.ndarray:
-        """Larger and smaller principal stretch in the section, and the hoop stretch, shape (n, 3)."""
+        """Larger and smaller principal stretch in the section, then the hoop stretch, shape (n, 3)."""
         F = self.deformation_gradient
         larger = (np.hypot(F[:, 0, 0] + F[:, 1, 1], F[:, 0, 1] - F[:, 1, 0])
                   + np.hypot(F[:, 0, 0] - F[:, 1, 1], F[:, 0, 1] + F[:, 1, 0])) / 2
@@ -78,7 +83,10 @@ class Stress:
         """Return the Cauchy stress on faces through the points.
 
         Args:
-            normal: reference normals of the faces, shape (2,) or (n, 2).
+            normal: normals (N_R, N_Z) of the faces in the reference configuration, shape (2,) or (n, 2).
+
+        Returns:
+            The stress on the deformed faces.
         """
         N = np.broadcast_to(np.asarray(normal, dtype=float), self.points.shape)
         n = np.linalg.solve(self.deformation_gradient[:, :2, :2].transpose(0, 2, 1), N[..., None])[..., 0]
@@ -92,5 +100,5 @@ class Stress:
 
 
 def _det(F: np.ndarray) -> np.ndarray:
-    """Return the determinant in the section plane of deformation gradients (n, 3, 3), shape (n,)."""
+    """Return the determinant of the first two rows and columns of deformation gradients F (n, 3, 3), shape (n,)."""
     return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]

@@ -1,4 +1,4 @@
-"""Outline and thickness of a sheet against reference radius and arc length."""
+"""Outline and thickness of a sheet in a state, from the axis to the rim."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from ...errors import InputError, finite
 from ...forms.probes import Probe, probe
 
 FACES = (("bottom", "top"), ("inner", "outer"))
-"""Names of the two faces of a sheet or of a wall."""
+"""Names of the boundaries that are the two faces of a sheet, or of the wall of a parison."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """Outline of a sheet in one state, at the n nodes of its bottom face from the axis to the rim.
+    """Outline of a sheet in one state: n pairs of opposite points on its two faces, from the axis to the rim.
 
-    For the wall of a parison or a sphere, the bottom is the inner face and the top the outer face.
+    The bottom points are the nodes of the bottom face. A top point lies where the reference normal of the bottom face
+    meets the top face. For the wall of a parison or a sphere, the bottom is the inner face and the top the outer face.
 
     Attributes:
-        reference_bottom: reference positions (R, Z) on the bottom face, shape (n, 2), length.
-        reference_top: reference positions (R, Z) opposite them on the top face, shape (n, 2), length.
+        reference_bottom: reference positions (R, Z) of the bottom points, shape (n, 2), length.
+        reference_top: reference positions (R, Z) of the top points, shape (n, 2), length.
         bottom: deformed positions (r, z) of the bottom points, shape (n, 2), length.
         top: deformed positions (r, z) of the top points, shape (n, 2), length.
 
@@ -38,32 +39,38 @@ class Profile:
 
     @property
     def reference_radius(self) -> np.ndarray:
-        """Reference radius R on the bottom face, shape (n,), length."""
+        """Reference radius R of the bottom points, shape (n,), length."""
         return self.reference_bottom[:, 0]
 
     @property
     def reference_length(self) -> np.ndarray:
-        """Arc length of the reference middle line from the axis, shape (n,), length; R for a flat sheet."""
+        """Arc length from the axis along the reference middle line to each point, shape (n,), length.
+
+        It is R for a flat sheet.
+        """
         return _length_along((self.reference_bottom + self.reference_top) / 2)
 
     @property
     def original_thickness(self) -> np.ndarray:
-        """Reference distance between the two points, shape (n,), length."""
+        """Distance between bottom and top point in the reference configuration, shape (n,), length."""
         return np.hypot(*(self.reference_top - self.reference_bottom).T)
 
     @property
     def thickness(self) -> np.ndarray:
-        """Deformed distance between the two points, shape (n,), length; larger than the wall of a sheared sheet."""
+        """Distance between bottom and top point in the deformed sheet, shape (n,), length.
+
+        In a sheared sheet it exceeds the wall thickness.
+        """
         return np.hypot(*(self.top - self.bottom).T)
 
     @property
     def thickness_ratio(self) -> np.ndarray:
-        """Deformed over reference distance between the two points, shape (n,)."""
+        """Deformed over reference distance between bottom and top point, shape (n,)."""
         return self.thickness / self.original_thickness
 
     @property
     def wall_ratio(self) -> np.ndarray:
-        """Wall thickness over original thickness, shape (n,)."""
+        """`wall_thickness` over `original_thickness`, shape (n,)."""
         return self.wall_thickness / self.original_thickness
 
     @property
@@ -73,16 +80,16 @@ class Profile:
 
     @property
     def middle(self) -> np.ndarray:
-        """Midpoints (r, z) between top and bottom, shape (n, 2), length."""
+        """Deformed positions (r, z) half-way between bottom and top points, shape (n, 2), length: the middle line."""
         return (self.top + self.bottom) / 2
 
     @property
     def arc_length(self) -> np.ndarray:
-        """Arc length of the deformed middle line from the axis, shape (n,), length."""
+        """Arc length of the deformed middle line from the axis to each point, shape (n,), length."""
         return _length_along(self.middle)
 
     def thickness_ratio_at(self, radius: float) -> float:
-        """Return the thickness ratio at a reference radius, interpolated linearly between the nodes.
+        """Return `thickness_ratio` at a reference radius, interpolated linearly between the bottom points.
 
         Args:
             radius: reference radius, length.
@@ -100,7 +107,7 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Return the shortest distances of points from a polyline.
 
     Args:
-        points: shape (m, 2), length.
+        points: positions, shape (m, 2), length.
         line: corners of the polyline, shape (n, 2), length.
 
     Returns:
@@ -131,10 +138,10 @@ class Profiles:
         return Profile(faces.points[:n].copy(), faces.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
-        """Return the probe that evaluates displacements at the points of both faces.
+        """Return the `Probe` that evaluates displacements at the bottom points, then at the top points.
 
         Raises:
-            InputError: the mesh has no pair of faces, or three dimensions.
+            InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
         """
         mesh = self._problem.scene.first.mesh
         if self._problem.scene.kinematics.components == 3:
@@ -151,11 +158,14 @@ class Profiles:
 
 
 def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
-    """Return points along the parabolas through three-node edges, `parts` to an edge.
+    """Return points along the curved edges of quadratic elements, which are parabolas through three nodes.
 
     Args:
-        line: nodes of the edges (end, middle, end, ...), shape (n, 2), length.
-        parts: pieces per edge.
+        line: nodes along the line of edges: end, middle, end, middle, ..., end, shape (n, 2), length.
+        parts: number of pieces of each edge.
+
+    Returns:
+        Points in order, shape (parts (n - 1) / 2 + 1, 2), length.
     """
     a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
     xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
@@ -164,10 +174,14 @@ def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
 
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return for each node of a face the opposite point, where its normal meets the other face, shape (n, 2).
+    """Return for each node of a face the point at which its normal meets the other face, shape (n, 2), length.
 
-    The ends of both faces belong together. A normal beside an oblique rim may miss the other face: then its nearest end
-    is taken.
+    The ends of one face are opposite the ends of the other. If a normal beside an oblique rim misses the other face,
+    the nearest end of that face is returned.
+
+    Args:
+        line: nodes along the face: end, middle, end, ..., shape (n, 2), length.
+        other: nodes along the other face in the same direction, shape (m, 2), length.
     """
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)
@@ -194,10 +208,10 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors scaled to unit length, shape (n, 2)."""
+    """Return vectors, shape (n, 2), scaled to unit length."""
     return vectors / np.hypot(*vectors.T)[:, None]
 
 
 def _length_along(points: np.ndarray) -> np.ndarray:
-    """Return the arc length from the first point of a polyline, shape (n,), length."""
+    """Return the arc lengths from the first point of a polyline to each of its points (n, 2), shape (n,), length."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

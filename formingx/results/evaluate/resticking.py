@@ -1,4 +1,4 @@
-"""Check of sticking points that separate from their tool and stick again elsewhere.
+"""Check of sticking contact points that separate from their tool and stick again elsewhere.
 
 The wall between such points depends on the step lengths.
 """
@@ -13,20 +13,20 @@ from ...findings import Finding
 from ...ranks import gathered
 
 _WALL = 3e-3
-"""Relative change of the wall by the step lengths above which there is a finding."""
+"""Relative change of the wall, due to the step lengths, above which there is a finding."""
 
 _LARGE = 0.1
-"""Relative change of the wall from which the finding gives no number, because neighbouring points move, too."""
+"""Relative change of the wall from which the finding says "or more", because neighbouring points move, too."""
 
 
 class Resticking(NamedTuple):
-    """The point that moved most along its tool while it was open between two closures.
+    """Contact point with the largest distance along a tool between successive positions at which it stuck.
 
     Attributes:
         tool: name of the tool, or of the face that touches it.
-        points: number of points whose gaps closed again.
+        points: number of points on this tool that separated and stuck again.
         shift: sum of the distances between successive sticking positions, over the tributary length of the point.
-        point: reference position of the point, shape (2,), length.
+        point: reference position (R, Z) of the point, length.
     """
 
     tool: str
@@ -36,14 +36,16 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the point with the largest shift between sticking positions; collective.
+    """Return the contact point with the largest distance between successive sticking positions; collective.
 
-    A point that sticks again elsewhere changes the strain beside it by `shift`. Whether a point separates may depend on
-    small changes of the forces, so `shift` also estimates the error due to the step lengths. In a remeshed run only the
-    states on the last mesh are examined.
+    A point that sticks again elsewhere changes the strain beside it by `Resticking.shift`. Whether a point separates
+    may depend on small changes of the forces. So this number also estimates the error due to the step lengths.
+
+    Args:
+        path: the computed `Path`. In a remeshed run only the states on the last mesh are examined.
 
     Returns:
-        The point, or None if no gap closed again.
+        The point, or None if no point stuck again.
     """
     found = []
     for number, contact in enumerate(c for c in path.problem.contacts if c.remembers):   # they come first in memory
@@ -61,13 +63,11 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return for each locally owned point the distances between successive sticking positions, summed, shape (n,).
-
-    They are divided by the tributary length of the point.
+    """Return `Resticking.shift` of the n contact points that this rank owns, shape (n,).
 
     Args:
         contact: the `FaceContact`.
-        touches: history variables of its points in successive states.
+        touches: history variables of its points in successive states, with `distance` (n,) and `position` (n, 2).
     """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
@@ -80,7 +80,11 @@ def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
 
 
 def findings(item: Resticking | None) -> list[Finding]:
-    """Return a warning on points that stick again elsewhere."""
+    """Return a warning in a list if the wall depends on points that stick again elsewhere; else an empty list.
+
+    Args:
+        item: result of `furthest`.
+    """
     if item is None or item.shift < _WALL:
         return []
     size = f"by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else f"by {100 * _LARGE:.0f} % or more"

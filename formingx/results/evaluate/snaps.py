@@ -1,4 +1,4 @@
-"""Check of snap-through with history variables: the state reached after a jump depends on the path to it."""
+"""Check of snap-through of bodies with history variables: the state after a jump depends on the way to it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _WALL = 0.05
 
 
 class Snap(NamedTuple):
-    """Snap-through of a run in which the wall changed most.
+    """Snap-through of a run in which the wall changed most, and the place where it changed most.
 
     Attributes:
         jumps: number of snap-throughs in the run.
-        state: number of the state after this one, in the path.
-        before: wall over original thickness before it, where the wall changed most.
-        after: wall over original thickness after it, at the same place.
+        state: number of the state of the path that follows this snap-through.
+        before: wall over original thickness at this place before the snap-through.
+        after: wall over original thickness at this place after the snap-through.
         point: reference radius of this place, length.
     """
 
@@ -32,7 +32,7 @@ class Snap(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Change of the wall over the wall before the jump."""
+        """Relative change of the wall at this place, |after / before - 1|."""
         return abs(self.after / self.before - 1)
 
 
@@ -42,8 +42,11 @@ def largest(path: Any) -> Snap | None:
     Only paths with friction or a viscoelastic material are examined. There the state after a snap-through depends on
     the history.
 
+    Args:
+        path: the computed `Path`.
+
     Returns:
-        The snap-through, or None if there was none or the body has no wall.
+        The snap-through, or None if there was none or the body is not a sheet.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:
@@ -64,12 +67,16 @@ def largest(path: Any) -> Snap | None:
 
 
 def findings(snap: Snap | None) -> list[Finding]:
-    """Return a warning on the largest jump of the wall."""
+    """Return a warning in a list if the wall changed by 5 % or more in a snap-through; else an empty list.
+
+    Args:
+        snap: result of `largest`.
+    """
     if snap is None or snap.change < _WALL:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
     return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall went"
                     f" from {snap.before:.4g} to {snap.after:.4g} of the original at R = {snap.point:.5g}. With"
-                    f" friction or relaxing material where it comes to rest depends on the way there, so all that"
-                    f" follows is only as certain as runs with other steps agree: compare StepControl(target=4) and"
-                    f" StepControl(target=8).")]
+                    f" friction or a relaxing material, the equilibrium where it comes to rest depends on the motion"
+                    f" to it. Later states are certain only if runs with other steps agree: compare"
+                    f" StepControl(target=4) and StepControl(target=8).")]

@@ -1,16 +1,16 @@
 r"""Stresses and stretches of a state, layer by layer: nothing is averaged over an interface.
 
-With the energy density W of `solid` (material and volume term):
+With the energy density W per reference volume, the sum of material and volume term:
 
 .. math::
     P = \partial W / \partial F, \qquad S = F^{-1} P, \qquad \sigma = F S F^T / J
 
 F and S are projected (L2) on piecewise linear fields, one for each layer. All other quantities follow from them point
-by point. S does not rotate with the sheet: a projection of the Cauchy stress would spoil the small stress normal to an
-inflated sheet by the large one along it.
+by point. S does not rotate with the sheet. A projection of the Cauchy stress would falsify the small stress normal to
+an inflated sheet by the large stress along the sheet.
 
 The error of the stresses is estimated as by Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337
-(doi:10.1002/nme.1620240206): as the distance to a smoother field. This field comes from cubics fitted to F and S
+(doi:10.1002/nme.1620240206): as the difference from a smoother field. This field comes from cubics fitted to F and S
 (`patches`), whose order is higher. Projected fields are no more accurate than the stresses of the elements.
 """
 
@@ -48,7 +48,11 @@ log = logging.getLogger("formingx")
 
 
 class StressField:
-    """Stresses of one state: smoothed (`at`), or as computed (`at_quadrature_points`).
+    """Stresses of one state: projected on smooth fields (`at`), or as computed (`at_quadrature_points`).
+
+    Args:
+        recovery: the `Stresses` of the problem.
+        state: the state.
 
     >>> field = path.stress(path.at(fx.pole_height(6.0)))
     >>> field.at([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
@@ -85,13 +89,13 @@ class StressField:
         return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
-        """Return the projected stresses at points of each of this rank's m cells, each from its own layer.
+        """Return the projected stresses at k points in each of this rank's m cells, from the layer of the cell.
 
         Args:
-            reference: k points of the reference cell, shape (k, 2).
+            reference: the points in the reference cell of the elements, shape (k, 2).
 
         Returns:
-            The stresses at m k points; `points` is left empty.
+            The stresses at the m k points, cell by cell; their attribute `points` is 0.
         """
         recovery = self._recovery
         owned = len(own_cells(recovery.problem.forms.domain))
@@ -108,6 +112,9 @@ class StressField:
 
         Args:
             layer: name of a layer; optional if there is only one.
+
+        Raises:
+            InputError: the layer is unknown, or there are several and `layer` is None.
         """
         return self._recovery.raw(self._state, self._recovery.layer(layer))
 
@@ -133,7 +140,7 @@ class StressField:
         return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """Return `StressError.mean` in this rank's cells, shape (m,), stress; collective."""
+        """Return `StressError.mean` of the m cells that this rank owns, estimated, shape (m,), stress; collective."""
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
@@ -143,8 +150,11 @@ class StressField:
 
         Args:
             layer: name of a layer; default all.
-            radii: two reference radii. Only cells with their middle between them are examined, for example without a
-                clamped rim and its stress peak.
+            radii: two reference radii, length. Only cells with their middle between them are examined, for example
+                without a clamped rim and its stress peak.
+
+        Returns:
+            The stress peak.
 
         Raises:
             InputError: the layer is unknown, or no cell lies between the radii.
@@ -192,11 +202,14 @@ class Stresses:
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
-        """Return the cells that contain points of a layer; the last result is cached; collective.
+        """Return the cells of a layer that contain points; the last result is stored; collective.
 
         Args:
             points: reference positions (R, Z), shape (n, 2), length.
             layer: name of the layer.
+
+        Returns:
+            The cells and the positions in them.
         """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
@@ -206,7 +219,7 @@ class Stresses:
         return before[1]
 
     def layer(self, name: str | None) -> str:
-        """Return the name of a layer, or of the only one for None.
+        """Check the name of a layer and return it; for None the name of the only layer.
 
         Raises:
             InputError: there is no such layer, or there are several and `name` is None.
@@ -219,9 +232,9 @@ class Stresses:
         return name
 
     def project(self, state: Any) -> np.ndarray:
-        """Return nodal values of the deformation gradient F and the second Piola-Kirchhoff stress S; collective.
+        """Return nodal values of the deformation gradient F and the second Piola-Kirchhoff stress S of a state.
 
-        They are projected on piecewise linear fields, one for each layer.
+        F and S are projected on piecewise linear fields, one for each layer. Collective.
 
         Returns:
             Entries of F and S, shape (nodes, layers, _COUNT), ghosts included.
@@ -230,7 +243,7 @@ class Stresses:
             return self._projected()
 
     def _projected(self) -> np.ndarray:
-        """Return the projected entries of F and S at the nodes, shape (nodes, layers, _COUNT)."""
+        """Return the nodal values of `project` for the present unknowns of the problem; collective."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -244,12 +257,12 @@ class Stresses:
         return nodes
 
     def raw(self, state: Any, layer: str) -> Stress:
-        """Return the stresses as computed at the quadrature points of a layer, of all ranks; collective."""
+        """Return the stresses of a state as computed at the quadrature points of a layer, of all ranks; collective."""
         points, values, _ = self._at_quadrature(state, layer)
         return _unpack(*(gathered(self.problem.comm, v).reshape(-1, v.shape[-1]) for v in (points, values)))
 
     def fit(self, state: Any) -> Fitted:
-        """Return deformation gradient and stress fitted to their values at the quadrature points; collective."""
+        """Return the stresses of a state in this rank's cells, and their fit to patches of cells; collective."""
         comm, parts = self.problem.comm, [self._at_quadrature(state, layer) for layer in self.cells]
         order = np.argsort(np.concatenate([self._owned(layer) for layer in self.cells]))
         points, values, volume = (np.concatenate([part[k] for part in parts])[order] for k in range(3))
@@ -267,6 +280,9 @@ class Stresses:
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest fitted principal stress at the corners of each of this rank's m cells.
 
+        Args:
+            fitted: result of `fit`.
+
         Returns:
             The stresses, shape (m,), and the positions (R, Z) of the corners, shape (m, 2), length.
         """
@@ -278,7 +294,14 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Return for each of the m locally owned cells True if it lies in a layer (None: any layer), shape (m,)."""
+        """Return True for each of this rank's m cells that lies in a layer, shape (m,).
+
+        Args:
+            name: name of the layer; None: all layers.
+
+        Raises:
+            InputError: the layer is unknown.
+        """
         owned = own_cells(self.problem.forms.domain)
         return np.isin(owned, self.cells[self.layer(name)]) if name is not None else np.ones(len(owned), dtype=bool)
 
@@ -287,11 +310,11 @@ class Stresses:
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return data at the q quadrature points of this rank's m cells of a layer.
+        """Return F, S and volumes at the q quadrature points of each of this rank's m cells of a layer in a state.
 
         Returns:
-            Reference positions, shape (m, q, 2), length; entries of F and S, shape (m, q, _COUNT); reference volumes,
-            shape (m, q).
+            Reference positions (R, Z), shape (m, q, 2), length. Entries of F and S, shape (m, q, _COUNT). Reference
+            volumes of the points, shape (m, q), length^3, in plane strain length^2.
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -317,7 +340,14 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
-        """Return [(entries of S (UFL), quadrature metadata)]: of the material, and of the volume term."""
+        """Return the parts of the second Piola-Kirchhoff stress S of layers: material, then volume term.
+
+        Args:
+            names: names of the layers, which have one material.
+
+        Returns:
+            For each part a pair (entries of S as UFL expressions, quadrature metadata of its integral).
+        """
         F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(names, F):
@@ -326,7 +356,7 @@ class Stresses:
         return parts
 
     def _prepare(self) -> None:
-        """Create spaces, forms and the mass matrix of the projection."""
+        """Create function space, forms and mass matrix of the projection of F and S; collective."""
         problem, forms, mesh = self.problem, self.problem.forms, self.problem.scene.mesh
         bodies, domain = forms.bodies, forms.domain            # raises an error for a membrane
         self.cells = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
@@ -365,7 +395,7 @@ class Stresses:
         self._solver.setErrorIfNotConverged(True)
 
     def _idle(self) -> list:
-        """Return boundary conditions that set the unknowns of nodes outside each layer to 0."""
+        """Return boundary conditions that set the nodal values of each layer's field outside this layer to 0."""
         n = len(self.cells)
         if n == 1:
             return []
@@ -380,13 +410,18 @@ class Stresses:
 
 
 def _cauchy(values: np.ndarray) -> np.ndarray:
-    """Return the Cauchy stress, shape (m, q, 3, 3), from the entries of F and S, shape (m, q, _COUNT)."""
+    """Return the Cauchy stress, shape (m, q, 3, 3), stress, from the entries of F and S, shape (m, q, _COUNT)."""
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
-    """Return the `Stress` at points from the entries of F and S, shape (n, _COUNT)."""
+    """Return the `Stress` at points.
+
+    Args:
+        points: reference positions (R, Z), shape (n, 2), length.
+        values: entries of F (`BLOCK`), then of S (`_S`), shape (n, _COUNT).
+    """
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]

@@ -16,12 +16,12 @@ RESOLVED = 0.05
 class StressError(NamedTuple):
     """Estimated errors of the Cauchy stress in n cells of all ranks.
 
-    |.| is the Frobenius norm, sigma_h the computed and sigma* the fitted stress. Volumes are reference volumes:
-    axisymmetric of the whole ring, in plane strain of unit depth.
+    |.| is the Frobenius norm, sigma_h the computed stress and sigma* the more accurate one: the fitted or the exact
+    stress. Volumes belong to the reference configuration and to the whole ring, in plane strain to unit depth.
 
     Attributes:
         points: reference positions (R, Z) of the middles of the cells, shape (n, 2), length.
-        volume: volumes of the cells, shape (n,).
+        volume: volumes of the cells, shape (n,), length^3.
         cells: root of the integral of |sigma* - sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
         stress: root of the integral of |sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
     """
@@ -33,36 +33,36 @@ class StressError(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """Root mean square, in each cell, of the difference between fitted and computed stress, shape (n,), stress."""
+        """Root mean square of |sigma* - sigma_h| in each cell, shape (n,), stress."""
         return self.cells / np.sqrt(self.volume)
 
     @property
     def total(self) -> float:
-        """Root of the integral over all cells of the squared difference between fitted and computed stress.
-
-        Its unit is stress * volume^(1/2).
-        """
+        """Root of the integral of |sigma* - sigma_h|^2 over all cells, stress * volume^(1/2)."""
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
         """Relative error of the stress, between 0 and 1; 0 without stress.
 
-        It is `total` over the root of the integral of the squared computed stress and the squared error.
+        It is `total` over the root of the integral of |sigma_h|^2 + |sigma* - sigma_h|^2.
         """
         scale = np.hypot(np.linalg.norm(self.stress), self.total)
         return float(self.total / scale) if scale > 0 else 0.0
 
 
 class StressPeak(NamedTuple):
-    """The largest principal Cauchy stress, and the place where the estimated error allows a larger one.
+    """Largest principal Cauchy stress, and the cell in which the estimated error allows the largest one.
+
+    The error of a cell is the largest |sigma* - sigma_h| at its quadrature points (Frobenius norm; sigma_h: computed,
+    sigma*: fitted stress).
 
     Attributes:
         value: largest fitted principal stress at a corner of a cell, stress.
         point: reference position (R, Z) of this corner, shape (2,), length.
-        error: largest |sigma* - sigma_h| at a quadrature point of the adjacent cells, stress.
-        doubtful: principal stress in the cell where principal stress plus error is largest, stress.
-        doubtful_point: reference position (R, Z) of the corner of this cell, shape (2,), length.
+        error: largest error of the cells at this corner, stress.
+        doubtful: largest principal stress in the cell where principal stress plus error is largest, stress.
+        doubtful_point: reference position (R, Z) of the corner of this cell at which it occurs, shape (2,), length.
         doubtful_error: error of this cell, stress.
     """
 
@@ -75,12 +75,12 @@ class StressPeak(NamedTuple):
 
     @classmethod
     def among(cls, sigma: np.ndarray, corners: np.ndarray, error: np.ndarray) -> StressPeak:
-        """Return the peak over n cells.
+        """Return the stress peak among n cells.
 
         Args:
-            sigma: largest principal stress in each cell, shape (n,), stress.
-            corners: corner (R, Z) where it occurs, shape (n, 2), length.
-            error: largest error in each cell, shape (n,), stress.
+            sigma: largest principal stress at the corners of each cell, shape (n,), stress.
+            corners: reference position (R, Z) of the corner at which it occurs, shape (n, 2), length.
+            error: error of each cell, shape (n,), stress.
         """
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
         same_corner = np.hypot(*(corners - corners[top]).T) <= 1e-9 * np.abs(corners).max()
@@ -89,7 +89,7 @@ class StressPeak(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """True if principal stress plus error is everywhere at most 1.05 times the largest principal stress."""
+        """True if principal stress plus error exceeds the largest principal stress by at most 5 % in every cell."""
         return self.doubtful + self.doubtful_error - self.value <= RESOLVED * abs(self.value)
 
     def __str__(self) -> str:
@@ -102,19 +102,21 @@ class StressPeak(NamedTuple):
 
 
 def _show(point: np.ndarray) -> str:
-    """Return a point as text."""
+    """Return a reference position, shape (2,), as text."""
     return f"(R, Z) = ({point[0]:.4g}, {point[1]:.4g})"
 
 
 class Fitted(NamedTuple):
-    """Fitted deformation gradient F and second Piola-Kirchhoff stress S of m locally owned cells.
+    """Computed and fitted Cauchy stress at the q quadrature points of each of the m cells that this rank owns.
+
+    The fit is made to the deformation gradient F and the second Piola-Kirchhoff stress S.
 
     Attributes:
-        points: reference positions (R, Z) of the q quadrature points of each cell, shape (m, q, 2), length.
-        volume: reference volumes of the quadrature points, shape (m, q).
+        points: reference positions (R, Z) of the quadrature points, shape (m, q, 2), length.
+        volume: reference volumes of the quadrature points, shape (m, q), length^3.
         raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
         smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.
-        cubics: coefficients of the fitted cubics (`Patches`), shape (m, 10, k).
+        cubics: coefficients of the cubics fitted to the k entries of F and S (`Patches`), shape (m, 10, k).
     """
 
     points: np.ndarray
@@ -124,10 +126,11 @@ class Fitted(NamedTuple):
     cubics: np.ndarray
 
     def error(self, exact: Callable | None = None) -> StressError:
-        """Return the errors of the cells of all ranks (`StressField.error`); collective.
+        """Return the errors of the stress in this rank's cells (`StressField.error`).
 
         Args:
-            exact: exact Cauchy stress as a function of reference positions; default the fitted one.
+            exact: exact Cauchy stress, shape (n, 3, 3), as a function of reference positions, shape (n, 2); default
+                the fitted stress.
 
         Raises:
             InputError: `exact` is not a function, or returns another shape.

@@ -1,4 +1,4 @@
-"""Check of a membrane for compression: without bending stiffness it wrinkles.
+"""Check of a membrane for compression, under which it wrinkles, because it has no bending stiffness.
 
 Tension field theory describes the wrinkled state (Steigmann, Proc. R. Soc. London A 429 (1990) 141). It is not
 implemented here.
@@ -18,16 +18,16 @@ from ...physics.models import Membrane
 from ...ranks import gathered
 
 _COMPRESSED = 1e-3
-"""Compressive resultant over shear modulus times thickness above which the state of a membrane is invalid."""
+"""Compressive resultant, over shear modulus times thickness, above which the state of a membrane is invalid."""
 
 
 class Resultant(NamedTuple):
-    """Smallest principal stress resultant of a membrane.
+    """Smallest principal stress resultant (force per deformed length) of a membrane in a state.
 
     Attributes:
-        direction: "meridional" or "hoop".
-        value: the resultant over shear modulus times thickness.
-        point: reference position (R, Z) on the mid-surface, length.
+        direction: direction of the force, "meridional" or "hoop".
+        value: the resultant over shear modulus times reference thickness, negative in compression.
+        point: reference position (R, Z) of its place on the mid-surface, length.
     """
 
     direction: str
@@ -36,17 +36,20 @@ class Resultant(NamedTuple):
 
     @property
     def compressed(self) -> bool:
-        """True if the resultant is compressive beyond round-off."""
+        """True if the resultant is compressive by more than 0.001 times shear modulus times thickness."""
         return self.value < -_COMPRESSED
 
 
 class Tension:
-    r"""Smallest principal stress resultant of a membrane per deformed length.
+    r"""Computes the principal stress resultants of a membrane, forces per deformed length.
 
-    For F = diag(l1, l3, l2) and a layer of reference thickness h:
+    A layer of reference thickness h has the meridional stretch l1, the hoop stretch l2, the stretch l3 of the thickness
+    and the energy density W:
 
     .. math::
         P = \partial W / \partial F, \qquad N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33})
+
+    The resultants of all layers are added up.
 
     Args:
         problem: discretised problem of a scene whose model is a `Membrane`.
@@ -66,24 +69,29 @@ class Tension:
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def smallest(self, state: Any) -> Resultant:
-        """Return the smallest resultant in a state, in plane strain only along the section; collective."""
+        """Return the smallest resultant in a state; in plane strain only resultants in the section; collective."""
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
         return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
 
     def hoop(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the hoop resultants along a membrane, from the axis to the rim; collective.
+        """Return the hoop resultants along a membrane in a state, from the axis to the rim; collective.
 
         Returns:
-            Reference positions (R, Z), shape (n, 2), length, and resultants per reference length, shape (n,).
+            Reference positions (R, Z) of n points, shape (n, 2), length; hoop forces per reference length of the
+            section, shape (n,), stress length.
         """
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
         return values[:, 2:4], values[:, 4]
 
     def _values(self, state: Any) -> np.ndarray:
-        """Return rows (both principal resultants, R, Z, hoop resultant per reference length) at quadrature points."""
+        """Return data at the n quadrature points of all ranks in a state, shape (n, 5); collective.
+
+        The columns are the meridional and the hoop resultant over shear modulus times thickness, R and Z (length), and
+        the hoop force per reference length (stress length).
+        """
         problem, domain = self._problem, self._problem.forms.domain
         with problem.state_context(state):
             cells = own_cells(domain)
@@ -92,10 +100,13 @@ class Tension:
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
-    """Return the first state of a path in which a membrane is compressed; collective.
+    """Return the first state of a path in which a membrane in a section is compressed; collective.
+
+    Args:
+        path: the computed `Path`.
 
     Returns:
-        Number of the state and its smallest resultant, or None.
+        Number of the state and its smallest resultant; None without compression or without a membrane.
     """
     k = 0
     for segment in path.segments:
@@ -110,7 +121,11 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
 
 
 def findings(first: tuple[int, Resultant] | None) -> list[Finding]:
-    """Return a finding on the first compression of a membrane (`first_compression`)."""
+    """Return a finding on the first compression of a membrane in a list; empty without compression.
+
+    Args:
+        first: result of `first_compression`.
+    """
     if first is None:
         return []
     k, (direction, value, point) = first

@@ -1,4 +1,4 @@
-"""Volume ratio J of the elements, and findings on it."""
+"""Findings on elements that do not keep their volumes; J = det F is the volume ratio at a point."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ BOUND = 5e-3
 """Root mean square of J - 1 above which a report warns; a run warns above four times this value."""
 
 _NEAR = 2.0
-"""Distance from a clamped face, over its length, within which the singular corner affects J."""
+"""Distance from a clamped face, over the length of the face, within which its singular corners affect J."""
 
 _FURTHEST = 2.0
-"""J, or 1/J, at a point beside the quadrature points above which a report warns."""
+"""Largest J, and largest 1/J, at a point away from the quadrature points; beyond it a report warns."""
 
 
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
-    """Return the findings on the volume error of a state.
+    """Return a finding in a list if the elements do not keep their volumes in a state; else an empty list.
 
     Args:
-        error: root mean square of J - 1.
+        error: root mean square of J - 1 over the body.
         where: name of the state, for the message.
-        far_error: the same away from clamped faces (`away_from_clamps`); None if unknown or without clamps.
+        far_error: root mean square of J - 1 away from clamped faces (`away_from_clamps`); None if it is unknown or
+            nothing is clamped.
     """
     if error <= BOUND:
         return []
@@ -39,10 +40,13 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
 
 
 def away_from_clamps(path: Any) -> float | None:
-    """Return the root mean square of J - 1 in the last state away from clamped faces; collective.
+    """Return the root mean square of J - 1 in the last state of a path away from clamped faces; collective.
 
-    The effect of the singular corners of a clamped face decays over its length, the wall of a sheet (Saint-Venant).
-    Points nearer than `_NEAR` times this length are left out.
+    The effect of the singular corners of a clamped face decays over the length of the face, which is the wall of a
+    sheet (Saint-Venant). Points nearer to a clamped face than twice this length are left out.
+
+    Args:
+        path: the computed `Path`.
 
     Returns:
         The error, or None without clamped faces.
@@ -52,7 +56,14 @@ def away_from_clamps(path: Any) -> float | None:
 
 
 def _clamped(path: Any) -> tuple[np.ndarray, float]:
-    """Return the nodes of the clamped faces of a solid, shape (n, 2), and `_NEAR` times the longest face, length."""
+    """Return the nodes of the clamped faces of a solid, and twice the length of the longest of these faces.
+
+    Args:
+        path: the computed `Path`.
+
+    Returns:
+        Reference positions, shape (n, 2), length, and the distance, length. Both are empty or 0 without such a face.
+    """
     scene = path.problem.scene
     clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
     faces = [scene.mesh.nodes_of(name) for name in clamped]
@@ -61,7 +72,13 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def of_point(path: Any) -> list[Finding]:
-    """Return the findings on the point of the last state at which J differs most from 1; collective."""
+    """Return a finding in a list if J is above 2 or below 1/2 at a point of the last state; else an empty list.
+
+    Collective.
+
+    Args:
+        path: the computed `Path`.
+    """
     furthest = path.problem.furthest_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _FURTHEST < J < _FURTHEST:
@@ -69,5 +86,5 @@ def of_point(path: Any) -> list[Finding]:
     faces, reach = _clamped(path)
     singular = len(faces) and np.hypot(*(faces - furthest.point).T).min() < reach
     return [Finding("note" if J > 0 or singular else "warning", "element",
-                    f"J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g}, {furthest.point[1]:.5g}):"
-                    f" the stress in that element is meaningless.")]
+                    f"The volume ratio J is {J:.3g} in the last state at (R, Z) = ({furthest.point[0]:.5g},"
+                    f" {furthest.point[1]:.5g}): the stress in that element is meaningless.")]

@@ -23,9 +23,9 @@ class Wall(Sheet):
     """Wall of a sheet in one state, at the n nodes of the bottom (inner) face from the axis to the rim.
 
     Attributes:
-        profile: reference and deformed positions of both faces.
-        layers: {name of a layer: its fraction of the wall, shape (n,)}, from the bottom up, along the material line
-            across the sheet.
+        profile: reference and deformed positions of opposite points on both faces.
+        layers: {name of a layer: its fraction of the wall, shape (n,)}, from the bottom up. The fractions are measured
+            along the material line from a bottom point to the opposite top point.
         comm: MPI communicator of the run.
     """
 
@@ -40,27 +40,27 @@ class Wall(Sheet):
 
     @property
     def arc_length(self) -> np.ndarray:
-        """Arc length of the deformed middle line from the axis, shape (n,), length."""
+        """Arc length of the deformed middle line from the axis to each point, shape (n,), length."""
         return self.profile.arc_length
 
     @property
     def r(self) -> np.ndarray:
-        """Radius of the middle line, shape (n,), length."""
+        """Deformed radius r of the points on the middle line, shape (n,), length."""
         return self.profile.middle[:, 0]
 
     @property
     def z(self) -> np.ndarray:
-        """Z coordinate of the middle line, shape (n,), length."""
+        """Deformed coordinate z of the points on the middle line, shape (n,), length."""
         return self.profile.middle[:, 1]
 
     @property
     def height(self) -> np.ndarray:
-        """Axial distance from the pole; without a pole, from the lowest point, shape (n,), length."""
+        """Axial distance of the middle line from the pole, shape (n,), length; without a pole from its lowest point."""
         return np.abs(self.z - self.z[0]) if abs(self.r[0]) <= 1e-9 * np.ptp(self.r) else self.z - self.z.min()
 
     @cached_property
     def wall(self) -> np.ndarray:
-        """Shortest distance from the bottom to the top face, shape (n,), length."""
+        """Wall thickness: shortest distance from each bottom point to the top face, shape (n,), length."""
         return self.profile.wall_thickness
 
     @property
@@ -70,16 +70,18 @@ class Wall(Sheet):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the files: {name: values, shape (n,)}."""
+        """Columns of the table: {name: values, shape (n,)}; with several layers also "wall_of_" each layer."""
         each = {f"wall_of_{name}": share * self.wall for name, share in self.layers.items()}
         return {"reference_radius": self.reference_radius, "arc_length": self.arc_length, "r": self.r, "z": self.z,
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}
 
     def at_height(self, height: float) -> float:
-        """Return the wall at a height of the middle line, length; the smallest if it passes the height several times.
+        """Return the wall at a height, interpolated linearly between nodes, length.
+
+        If the middle line passes the height several times, the smallest wall is returned.
 
         Args:
-            height: height as in `Wall.height`, length.
+            height: height of the middle line (`Wall.height`), length.
 
         Raises:
             InputError: the middle line does not reach the height.
@@ -94,7 +96,7 @@ class Wall(Sheet):
 
 
 class Walls:
-    """Computes the `Wall` of states of a path.
+    """Computes the `Wall` of the states of a path.
 
     Args:
         path: the path whose states are evaluated.
@@ -123,15 +125,14 @@ class Walls:
 
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
-    """Return the k interfaces between layers along the material lines across a sheet.
+    """Return the points at which the lines from bottom to top points of a sheet cross the k interfaces of its layers.
 
     Args:
         mesh: the mesh.
-        profile: outline of the sheet, n nodes.
+        profile: outline of the sheet with n pairs of opposite points.
 
     Returns:
-        Names of the layers from the bottom up, and the reference positions where each material line crosses each
-        interface, shape (k, n, 2), length.
+        Names of the layers from the bottom up, and the reference positions of the crossings, shape (k, n, 2), length.
 
     Raises:
         InputError: the layers do not lie above each other.
@@ -155,7 +156,12 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
-    """Return {(layer, layer): edges of their interface, reference positions, shape (m, 2, 2)}, equal on all ranks."""
+    """Return the interfaces between layers as straight pieces, equal on all ranks; collective.
+
+    Returns:
+        {(name of a layer, name of the other layer): reference positions of both ends of each piece, shape (m, 2, 2),
+        length}.
+    """
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
     layer = np.full(len(_compat.cell_nodes(domain)), -1)
@@ -177,9 +183,15 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return the parameters s at which lines start + s direction meet straight pieces, shape (n,).
+    """Return the parameters s at which lines x = start + s direction first meet straight pieces, shape (n,).
 
-    The pieces have shape (m, 2, 2). s is nan if a line meets none of them within 0 <= s <= 1.
+    Args:
+        start: starts of the lines, shape (n, 2), length.
+        direction: directions of the lines, shape (n, 2), length.
+        pieces: both ends of each piece, shape (m, 2, 2), length.
+
+    Returns:
+        The parameters; nan for a line that meets no piece within 0 <= s <= 1.
     """
     a, edge = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
@@ -193,7 +205,7 @@ def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> n
 
 
 def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
-    """Return the mean reference distance of a layer's nodes from the bottom face, to order two layers."""
+    """Return the mean distance of a layer's nodes from the bottom face in the reference configuration, length."""
     cells = mesh.cells.find(mesh.layers[layer])
     points = gathered(mesh.comm, of_cells(mesh.domain, cells))
     return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.reference_bottom).mean())

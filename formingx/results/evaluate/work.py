@@ -1,9 +1,10 @@
 """Energy balance of a run: work done on the body by each load and tool, stored and dissipated energy.
 
-Between two states of one stage the body moves on the cubic through both states and their tangents. The work of loads is
-integrated along it by Gauss quadrature. Reactions of supports and tools are not smooth on such an interpolated body. So
-a reaction is also interpolated by a cubic in arc length: from its values and its slopes along the two tangents. If a
-point is about to touch, the slope at that end is left out (parabola). In a flow and in a jump, straight lines are used.
+Between two states of one stage the body is assumed to move on the cubic through both states and their tangents. The
+work of loads is integrated along this curve by Gauss quadrature. Reactions of supports and tools are not smooth on the
+interpolated body. So each reaction is also interpolated by a cubic in arc length, from its values and its slopes along
+the two tangents. If a point is about to touch, the slope at that end is left out, which gives a parabola. Straight
+lines are used in a snap-through, and in steps in which the process time is independent of the control.
 
 If the energies of a step do not balance, the step is halved: a state in its middle is solved for from its start. The
 halving is repeated until the change is negligible.
@@ -24,60 +25,26 @@ from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...findings import Finding, tell
 from ...solve.newton import Failure
+from .step_polynomials import GAUSS, Polynomial, integral, interpolate
 
 _LOSSES = "friction", "jumps", "bonds"
-_GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
+_MATERIAL_LOSSES = "dissipated_energy", "damage_energy"
 _RAMP_EDGE = 0.06          # distance from the outer edge of the contact ramp, over its half width, that counts as 0
 _SMALL = 1e-5              # half the step of a central difference quotient in arc length
-_STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest energy
-_RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry
+_STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest strain energy of the run
+_RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry of the balance
 _HALVINGS = 6              # largest number of halvings of a step
 _SPLITS = 0.5, 0.35, 0.65  # positions in a step at which it is split
 
 
-class _Line(NamedTuple):
-    """Polynomial in s, 0 <= s <= 1.
-
-    Attributes:
-        coefficients: numbers or arrays, in ascending order of powers.
-    """
-
-    coefficients: tuple
-
-    def at(self, s: float) -> Any:
-        """Return the value at s."""
-        return sum(c * s**k for k, c in enumerate(self.coefficients))
-
-    def slope(self, s: float) -> Any:
-        """Return the derivative at s."""
-        return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
-
-
-def _interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> _Line:
-    """Return the polynomial from a to b with the given slopes at its ends: cubic, parabola or straight line."""
-    change = b - a
-    if start is None and end is None:
-        return _Line((a, change))
-    if end is None:
-        return _Line((a, start, change - start))
-    if start is None:
-        return _Line((a, 2 * change - end, end - change))
-    return _Line((a, start, 3 * change - 2 * start - end, start + end - 2 * change))
-
-
-def _integral(f: _Line, y: _Line) -> float:
-    """Return the integral of f dy, exact for two cubics."""
-    return float(sum(w * np.sum(f.at(s) * y.slope(s)) for s, w in zip(*_GAUSS)))
-
-
 class _Reaction(NamedTuple):
-    """Reaction of a driven support or a tool in a state.
+    """Reaction of a driven support or a tool in a state, on the body as modelled.
 
     Attributes:
-        force: force along the travel.
-        slope: derivative of the force by arc length.
-        travel: travel, length.
-        travel_slope: derivative of the travel by arc length.
+        force: force of the support or tool on the body along its travel, stress length^2.
+        slope: derivative of the force with respect to arc length.
+        travel: travel of the support or tool, length.
+        travel_slope: derivative of the travel with respect to arc length.
     """
 
     force: float
@@ -119,7 +86,18 @@ class EnergyBalance:
 
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _HALVINGS) -> dict[str, float]:
-        """Return the energies of a step, computed through states between its ends; `estimate` is without them."""
+        """Return the energies of a step, computed with further states between its ends.
+
+        Args:
+            a: state at the start of the step.
+            b: state at its end.
+            estimate: {entry: energy added in the step}, computed without further states.
+            small: change of the sum of energies below which halving ends.
+            times: largest number of halvings.
+
+        Returns:
+            {entry: energy added in the step}; `estimate` if no state is found between the ends.
+        """
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return estimate
@@ -130,7 +108,10 @@ class EnergyBalance:
         return {name: found.get(name, 0.0) + second.get(name, 0.0) for name in {**found, **second}}
 
     def _middle(self, a: Any, b: Any) -> Any:
-        """Return a state near the middle of a step, solved for from the start of the step, or None."""
+        """Return a state near the middle of the step from state a to state b, or None if none is found; collective.
+
+        It is solved for from a, with its history variables.
+        """
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
             return None
@@ -153,17 +134,20 @@ class EnergyBalance:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """Return True for a step in which the process time is independent of the control."""
+        """Return True if the process time passes, independent of the control, in the step from state a to state b."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _step_energies(self, a: Any, b: Any) -> dict[str, float]:
-        """Return the energies added in a step."""
+        """Return {entry: energy added to the whole part in the step from state a to state b}."""
         images = self._problem.scene.symmetry_factor
         found = {name: images * value for name, value in self._body_energies(a, b).items()}
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
-        """Return the energies added in a step to the body as modelled, without losses of jumps."""
+        """Return {entry: energy added to the body as modelled in the step from state a to state b}.
+
+        The energy lost in a snap-through is not included.
+        """
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
@@ -182,25 +166,31 @@ class EnergyBalance:
         # a tool that touches the body from the start has a kink in its force: no tangent
         start = None if straight or a.kind == "start" and self._at_ramp_edge(a) else h
         end = None if straight else h
-        x = _interpolate(a.x, b.x, start and h * a.direction, end and h * b.direction)
-        control = _interpolate(a.control, b.control, start and h * a.slope, end and h * b.slope)
+        x = interpolate(a.x, b.x, start and h * a.direction, end and h * b.direction)
+        control = interpolate(a.control, b.control, start and h * a.slope, end and h * b.slope)
         found |= self._load_work(a, x, control)
         after = self._reactions(b)
         end = None if end is None or after and self._at_ramp_edge(b) else h
         for name, before in self._reactions(a).items():
             (f, df, y, dy), (g, dg, z, dz) = before, after[name]
-            force = _interpolate(f, g, start and h * df, end and h * dg)
-            found[name] = _integral(force, _interpolate(y, z, start and h * dy, end and h * dz))
+            force = interpolate(f, g, start and h * df, end and h * dg)
+            found[name] = integral(force, interpolate(y, z, start and h * dy, end and h * dz))
         return found
 
-    def _load_work(self, a: Any, x: _Line, control: _Line) -> dict[str, float]:
-        """Return the work of loads, and of fading unbalanced forces, along a line from a state."""
+    def _load_work(self, a: Any, x: Polynomial, control: Polynomial) -> dict[str, float]:
+        """Return the work of each load, and of fading unbalanced forces, in a step, as {entry: work}.
+
+        Args:
+            a: state at the start of the step.
+            x: unknowns in the step, polynomial from 0 to 1.
+            control: control in the step, polynomial from 0 to 1.
+        """
         problem = self._problem
         names = [name for name, _ in self._loads]
         found = dict.fromkeys(names, 0.0)
         with problem.state_context(a):
             n, fading = problem.n_owned, problem.fading_forces
-            for s, w in zip(*_GAUSS):
+            for s, w in zip(*GAUSS):
                 rate = x.slope(s)[:n]
                 problem.look_at(x.at(s), control.at(s))
                 for name, form in self._loads:
@@ -211,13 +201,13 @@ class EnergyBalance:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return the cached reactions of driven supports and tools in a state, {entry: reaction}."""
+        """Return {entry: reaction} of driven supports and tools in a state; each state is evaluated once."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]
 
     def _compute_reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return the reactions of driven supports and tools in a state."""
+        """Compute {entry: reaction} of driven supports and tools in a state; collective."""
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
         scale = forms.stress * forms.volume / forms.length
@@ -249,7 +239,15 @@ class EnergyBalance:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the owned unknowns of a contact face, shape (n, 2); only of closed points if contacts share it."""
+        """Return the numbers of the displacement unknowns of a contact face, locally owned, shape (n, 2).
+
+        If several contacts share the face, only the unknowns of the closed points are returned.
+
+        Args:
+            contact: the `FaceContact`.
+            fields: all unknowns, locally owned entries.
+            control: the control.
+        """
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]
@@ -257,14 +255,20 @@ class EnergyBalance:
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _at_ramp_edge(self, state: Any) -> bool:
-        """Return True if a contact point lies at the gap at which the tool begins to resist."""
+        """Return True if a contact point lies at the outer edge of the contact ramp, where the tool begins to resist.
+
+        Collective.
+        """
         with self._problem.state_context(state) as problem:
             x, control = state.x[: problem.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _RAMP_EDGE)
                               for c in problem.present]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
-        """Return the energy dissipated by friction: mean traction times inelastic slip of the closed points."""
+        """Return the energy that friction dissipates on the body as modelled in the step from state a to state b.
+
+        It is the mean traction times the inelastic slip, summed over the areas of the closed points.
+        """
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
         if a.setting != b.setting or not contacts:
@@ -279,7 +283,10 @@ class EnergyBalance:
         return lost
 
     def _heat(self, a: Any, b: Any) -> float:
-        """Return the stored energy added by a change of temperature at constant displacement (trapezoidal rule)."""
+        """Return the stored energy that the change of temperature adds in the step from state a to state b.
+
+        The displacements are constant: those of a and those of b, with equal weights (trapezoidal rule).
+        """
         cold, warm = a.memory[-1], b.memory[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
@@ -288,38 +295,58 @@ class EnergyBalance:
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:
-        """Return the stored energy in a state."""
+        """Return the energy stored in the body as modelled in a state."""
         with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
-        """Return the energy stored in adhesive tools."""
+        """Return the energy stored in the contacts with adhesive tools in a state."""
         with self._problem.state_context(state) as p:
             return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.pulls)
 
     def _sum(self, values: Any) -> float:
-        """Return the sum over all ranks."""
+        """Return the sum of an array, or of a number, over all entries and ranks; collective."""
         return float(self._problem.comm.allreduce(float(np.sum(values)), MPI.SUM))
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """Return the external work and the negative losses of a row."""
+    """Return the energies of a step as gains of the body: external work, and losses with a minus sign.
+
+    Args:
+        row: {entry: energy added in the step}.
+    """
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
 def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
-    """Return the unbalanced energy of a row between two states."""
-    stored = [b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in ("strain_energy", "dissipated_energy")]
-    return sum(_gains(row)) - sum(stored)
+    """Return the unbalanced energy of a step from state a to state b: gains minus stored and dissipated energy.
+
+    Args:
+        row: {entry: energy added in the step}.
+        a: state at the start of the step.
+        b: state at its end.
+    """
+    names = "strain_energy", *_MATERIAL_LOSSES
+    return sum(_gains(row)) - sum(b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in names)
 
 
 def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
-    """Return the friction traction on the contact points in a state."""
+    """Return the friction traction at the n contact points of a `FaceContact` in a state, shape (n,), stress."""
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
 
 def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarray:
-    """Return the slip of points that moved straight from x to `end`, shape (n, 2), while they touched, shape (n,)."""
+    """Return the slip of n contact points that move along straight lines, while they touch the tool, shape (n,).
+
+    Args:
+        law: the contact law.
+        x: positions relative to the tool at the start of the step, shape (n, 2).
+        touch: history variables of the points at the start of the step.
+        end: positions relative to the tool at the end of the step, shape (n, 2).
+
+    Returns:
+        Slip so far, in the units of `touch.slip`.
+    """
     nearest, outer_edge = law.nearest(end), -law.theta
     touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
     approach = nearest.distance - history.distance
@@ -331,7 +358,7 @@ def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarr
 
 
 def _entry_name(scene: Any, item: Any) -> str:
-    """Return the name of an item in the energy balance."""
+    """Return the name of the entry of a load, support or contact of a scene in the energy balance."""
     if item in scene.contacts:
         return Tooling(scene.contacts, 0, 1.0).names[scene.contacts.index(item)]
     if item in scene.supports:
@@ -344,7 +371,10 @@ def _entry_name(scene: Any, item: Any) -> str:
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """Return the energy balance of a run, and log a warning if it does not close (`Path.work`)."""
+    """Return the energy balance of a run, and log a warning if it does not close (`Path.work`); collective.
+
+    The warning is added to the findings of the path.
+    """
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
     tell(new, path.problem.comm.rank)
@@ -353,33 +383,43 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return a finding on an energy balance that does not close within `_RUN_IMBALANCE` of its largest entry."""
+    """Return a finding in a list if an energy balance is off by more than 0.5 % of its largest entry; else [].
+
+    Args:
+        balanced: result of `balance`.
+    """
     size = max(float(np.abs(values).max()) for values in balanced.values())
     unbalanced = np.abs(balanced["unbalanced"])
     k = int(np.argmax(unbalanced))
     if unbalanced[k] <= _RUN_IMBALANCE * size:
         return []
     return [Finding("warning", "energy", f"The energy balance is off by {100 * unbalanced[k] / size:.2g} % of the"
-                    f" largest part, up to state {k} ({100 * _RUN_IMBALANCE:g} % is usual): the states are too few for"
-                    f" the work between them, contact is too soft, or the run is off. Use shorter steps,"
+                    f" largest entry, up to state {k} ({100 * _RUN_IMBALANCE:g} % is usual): the states are too few for"
+                    f" the work between them, contact is too soft, or the run is not accurate. Use shorter steps,"
                     f" StepControl(largest=...), and see path.work().")]
 
 
 def balance(path: Any) -> dict[str, np.ndarray]:
-    """Return the entries of the energy balance (`Path.work`).
+    """Return the entries of the energy balance of a run without a warning (`Path.work`); collective.
+
+    Args:
+        path: the computed `Path`.
+
+    Returns:
+        {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
 
     Raises:
         InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
     """
     if "strain_energy" not in path.columns:
-        raise InputError("Path.work: is not available with K-BKZ: what it stores is no function of its state")
-    ledgers = [EnergyBalance(segment).rows() for segment in path.segments]
-    names = dict.fromkeys(name for rows in ledgers for name in rows)
+        raise InputError("Path.work: is not available with K-BKZ: its stored energy is no function of its state")
+    balances = [EnergyBalance(segment).rows() for segment in path.segments]
+    names = dict.fromkeys(name for rows in balances for name in rows)
     empty = [np.zeros(len(segment.states)) for segment in path.segments]
-    found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(ledgers, empty)]))
+    found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(balances, empty)]))
              for name in names}
     lost: dict[str, np.ndarray] = {name: found.pop(name) for name in _LOSSES if name in found}
-    lost |= {name: path[name] for name in ("dissipated_energy", "damage_energy") if name in path.columns}
+    lost |= {name: path[name] for name in _MATERIAL_LOSSES if name in path.columns}
     stored = path["strain_energy"] - path["strain_energy"][0]
     zero = np.zeros(len(path))
     if len(path.segments) > 1:

@@ -1,0 +1,50 @@
+"""Polynomials in one parameter, which interpolate quantities between the start and the end of a step."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+GAUSS = tuple((1 + s) / 2 for s in (-(0.6**0.5), 0.0, 0.6**0.5)), (5 / 18, 8 / 18, 5 / 18)
+"""Points and weights of Gauss quadrature with three points on 0 <= s <= 1."""
+
+
+class Polynomial(NamedTuple):
+    """Polynomial in a parameter s, 0 <= s <= 1.
+
+    Attributes:
+        coefficients: coefficients in ascending order of powers, numbers or arrays of one shape.
+    """
+
+    coefficients: tuple
+
+    def at(self, s: float) -> Any:
+        """Return the value of the polynomial at s, a number or an array."""
+        return sum(c * s**k for k, c in enumerate(self.coefficients))
+
+    def slope(self, s: float) -> Any:
+        """Return the derivative of the polynomial at s, a number or an array."""
+        return sum(k * c * s ** (k - 1) for k, c in enumerate(self.coefficients) if k)
+
+
+def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomial:
+    """Return the polynomial with given values, and possibly slopes, at its ends: a cubic, parabola or straight line.
+
+    Args:
+        a: value at s = 0, a number or an array.
+        b: value at s = 1.
+        start: derivative at s = 0; None: not given.
+        end: derivative at s = 1; None: not given.
+    """
+    change = b - a
+    if start is None and end is None:
+        return Polynomial((a, change))
+    if end is None:
+        return Polynomial((a, start, change - start))
+    if start is None:
+        return Polynomial((a, 2 * change - end, end - change))
+    return Polynomial((a, start, 3 * change - 2 * start - end, start + end - 2 * change))
+
+
+def integral(f: Polynomial, y: Polynomial) -> float:
+    """Return the integral of f dy over 0 <= s <= 1, exact if f and y are cubics."""
+    return float(sum(w * np.sum(f.at(s) * y.slope(s)) for s, w in zip(*GAUSS)))
