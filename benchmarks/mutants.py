@@ -117,7 +117,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("solve/snap_through.py", "        problem.memory = kept\n        raise", "        raise", "details"),
     ("measures/forces.py", "self._by_control)\n            return (force - target) / self._scale, slope",
      "self._by_control)\n            return (force - target) / self._scale, 0.0", "process time derivatives"),
-    ("solve/process.py", "rate[-1] = np.sign(change) * scale / stage.speed", "rate[-1] = scale / stage.speed",
+    ("solve/pieces.py", "rate[-1] = np.sign(change) * scale / stage.speed", "rate[-1] = scale / stage.speed",
      "process time"),
     ("solve/measure_control.py", "best = found if found.time < best.time else best", "best = found",
      "details"),

@@ -374,7 +374,7 @@ AT_REST = Stage("up", control="air", until=fx.pressure(0.1))
     (lambda: run(plugged(), plug("a", 1e12)), "travel = 1e.12: it is 1e.11 times the length of the body, 10"),
     (lambda: fx.Process(plugged()).run([plug("a", 1.0)], progress=np.zeros((2, 2))), "must be True or False"),
     (lambda: Stage("a", amplitudes={"air": [(0, 0, 1)]}), r"must be \[\(time, value\)"),
-    (lambda: Stage("a", amplitudes={}), "must be {thing"),
+    (lambda: Stage("a", amplitudes={}), "must be {item"),
     (lambda: Stage("a", amplitudes={"air": [(0, 0), (1, 1)]}, until=fx.pressure(1)), "until a process_time"),
     (lambda: run(plugged()), "at least one Stage"),
     (lambda: run(plugged(), AT_REST, AT_REST), "two stages are called 'up'"),

@@ -23,7 +23,7 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     Between such states the determinant of the tangent changes its sign, and the control has no limit point. The sign at
     a state is known from `State.orientation`. States solved for at fixed control have no orientation: two
     factorisations for each piece between limit points then show whether the sign changed. They miss an even number of
-    changes. A problem with a history has no other path, and the list is empty. Collective.
+    changes. For a problem with history variables the list is empty. Collective.
 
     Args:
         curve: solver of the path.
@@ -58,7 +58,10 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def _needs_no_sign(curve: Curve, states: Sequence[State]) -> bool:
-    """Return True if the states tell all branch points: they have orientations, or a history, which allows none."""
+    """Return True if branch points follow from the states alone, without a factorisation.
+
+    Their orientations give them; a problem with history variables has none.
+    """
     return curve.problem.has_history or any(state.orientation for state in states)
 
 
@@ -74,7 +77,7 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
 
 
 def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states whose orientations differ: another path branches off between them.
+    """Return the pairs of neighbouring states with different `State.orientation`: a branch point lies between them.
 
     Limit points are left out, since the sign of the determinant there is round-off. So are pairs across a jump or
     across the start of a stage. Where a run reversed its direction along the path, the orientation changes its sign
@@ -117,7 +120,8 @@ def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], in
 def _changes(states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
     """Return the pairs of neighbouring states between which the determinant changes its sign without a limit point.
 
-    `sign` returns the sign of the determinant at a state. Bisection finds one pair in each piece between limit points.
+    sign: function that returns the sign of the determinant at a state. Bisection finds at most one pair in each piece
+    between limit points.
     """
     pieces: list[list[State]] = [[]]
     for state in states:

@@ -23,8 +23,9 @@ class Limits:
     """Limits above or below which a number of the last good state counts as a cause of the failure.
 
     Attributes:
-        before: number of states between the last good state and the one with which its condition number is compared.
-        singular: growth of the condition number between them that indicates a singular tangent.
+        before: number of states between the last good state and an earlier one. The condition numbers of both are
+            compared.
+        singular: ratio of these condition numbers that indicates a singular tangent.
         round_off: condition number that leaves hardly any of 16 digits.
         slowing: slope of the control over its largest value on the path. Below it a limit point is extrapolated from
             the last slopes.
@@ -184,6 +185,9 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
         attempt: end of the failed iteration; None: no iteration failed.
         pace: progress of a run that used up its steps, as text; "" for other failures.
         target: target of the controlled quantity, in the user's units, or None.
+
+    Returns:
+        The diagnosis, with its findings.
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),
@@ -203,13 +207,14 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 
 def limits_passed(problem: Equations, states: Sequence[State]) -> str:
-    """Return a sentence with the controls of the limit points among some states; "" if there are none.
-
-    The sentence begins with a space, to follow another one in a message.
+    """Return a sentence on the limit points of a path, for a message.
 
     Args:
-        problem: the equations.
-        states: the states.
+        problem: the equations, which give the controlled quantity in the user's units.
+        states: the states of the path.
+
+    Returns:
+        The sentence with the values at the limit points, after a space; "" without limit points.
     """
     shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
     if not shown:
@@ -229,6 +234,9 @@ def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagno
         why: the failure, a sentence.
         diagnosis: diagnosis of the failure.
         hint: advice as text, used if the diagnosis has none.
+
+    Returns:
+        The error, with the diagnosis.
     """
     best = int(np.argmin([abs(value - aim.until.value) for value in aim.values]))
     at = f", at {record.describe(states[best])}" * (states[best] is not record.last)

@@ -80,9 +80,12 @@ class Run:
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
         """Follow the path from a state, or from the last recorded one, until the last target is met.
 
-        max_steps: number of states after which the run gives up; None: when many states came no nearer to the target.
-        start: first state of the run; None: continue from the last recorded state.
-        may_turn: a continued run with a new target may go back along the path to it.
+        Args:
+            max_steps: number of states after which the run gives up; None: when many states came no nearer to the
+                target.
+            progress: True to show a progress bar.
+            start: first state of the run; None: continue from the last recorded state.
+            may_turn: True if a continued run with a new target may go back along the path to it.
 
         Raises:
             ConvergenceError: the target cannot be reached. The error has no `path` yet; the record holds the states.
@@ -93,7 +96,7 @@ class Run:
         self._progress = Progress(self.problem.comm, f"{self._label}to {self.aim.until}", progress)
         try:
             if start is None:
-                kept = self._go_on(may_turn)
+                kept = self._continue(may_turn)
             else:
                 self._accept(self.aim.facing(start, first=not record.states))
             self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._falls)
@@ -147,9 +150,9 @@ class Run:
 
     @property
     def _jumps_soon(self) -> bool:
-        """True if the body snaps through once some steps have failed, not only when the smallest step has failed.
+        """True if the body snaps through after some failed steps; False: only after the smallest step has failed.
 
-        False for a pressure with a history, since slip during the motion matters.
+        False for a pressure on a body with history variables, since slip during the motion matters.
         """
         return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
@@ -168,12 +171,11 @@ class Run:
         """States of this run, in order."""
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
-    def _go_on(self, may_turn: bool) -> dict[str, Any]:
-        """Continue a run: take its states, those with the step data of the last one, from the record.
+    def _continue(self, may_turn: bool) -> dict[str, Any]:
+        """Take the states with the step data of the last one from the record, to continue their run.
 
-        If the run goes back along the path, its first state is the last one. (It does not go back to a pressure, which
-        may be reached further along the path, too.) Return the data (`State.stepping`) with which the run continues;
-        empty if no state has any.
+        Return the data with which it continues (`State.stepping`); empty if no state has any. With `may_turn` the run
+        may go back along the path, except to a pressure, which may be reached further along the path, too.
         """
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
@@ -207,11 +209,10 @@ class Run:
                                   accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
-        """Return the next states, in order: the end of a step, or a target within reach, and the states inside this
-        step.
+        """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
         A failure halves the step. If short steps fail, or the path leads back, the body snaps through. It does so only
-        after the smallest step near a snap-through without equilibrium, and at a first state with a history.
+        after the smallest step near a snap-through without equilibrium, and at a first state with history variables.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -236,7 +237,7 @@ class Run:
             except Failure as failure:
                 self.step.length, end = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
-                good, failed = self.step.failed(), failed + (not isinstance(failure, _Astray))
+                good, failed = self.step.failed(), failed + (not isinstance(failure, _OtherState))
                 self._failed(failure.reason, self.step.length)
                 self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
                 early = (self._jumps_soon and failed > 1 and length < lengths[0]
@@ -262,9 +263,10 @@ class Run:
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
               reach: float, end: float | None = None) -> list[State]:
-        """Return the states of one step of a length, or to a target within reach; raise `Failure` or `Cutback`.
+        """Return the states of one step from `old`, of a given arc length, or to a target within reach.
 
         bound: output quantity of the target. reach: arc length to it. end: control at the end of the step, or None.
+        A step that fails raises `Failure`, and a step that is too long raises `Cutback`.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
@@ -278,16 +280,16 @@ class Run:
                 new = self.curve.step(old, length, self._predictor, behind, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
-                raise _Astray("the target was met on a distant part of the path", [])
+                raise _OtherState("the target was met on a distant part of the path", [])
             new.met = target
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
             part = min(max(cut.part, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
-            raise Cutback(cut.why, part) if cut.part else _Astray(cut.why, [])
+            raise Cutback(cut.why, part) if cut.part else _OtherState(cut.why, [])
         if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
-            raise _Astray("the iteration fell back to a part of the path that was passed already", [])
+            raise _OtherState("the iteration fell back to a part of the path that was passed already", [])
         error, memory = self._error_in_time(new), self.problem.memory
         try:
             new = separated(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
@@ -341,12 +343,11 @@ class Run:
             return []
 
     def _jump(self, old: State, length: float, step: float = 0.0, onward: float = 0.0) -> State:
-        """Return the state after a snap-through from `old`, by a predictor of this length on its tangent; raise
-        `Failure`.
+        """Return the state after a snap-through from `old`; raise `Failure` if there is none.
 
-        step: length of the last successful step; onward: sign of the work of the controlled load, see `snap_through`.
-        With length 0, contact with a history may settle at one control and not at another next to it: others are tried,
-        too. A fading force is removed at once, since no process has it as a load of its own.
+        length: arc length of the predictor on the tangent of `old`. step: length of the last successful step. onward:
+        sign of the work of the controlled load, see `snap_through`. With length 0, contact with history variables may
+        settle at one control but fail at the next: several are tried. A fading force is removed at once.
         """
         fading, settings = self.problem.setting.fading, self.settings.snap_through
         others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
@@ -371,7 +372,7 @@ class Run:
         return new
 
     def _found_no_rest_near(self, old: State) -> bool:
-        """Return True if a snap-through from about the control of a state, which costs most, reached no equilibrium."""
+        """Return True if an earlier snap-through from about the control of this state reached no equilibrium."""
         return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
 
     def _solutions(self, old: State) -> int:
@@ -394,8 +395,7 @@ class Run:
             self._give_up(why)
 
     def _sorted_into(self, old: State, new: State) -> list[State]:
-        """Return the states of a step in order: limit point and targets inside it, then its end `new`; raise
-        `Failure`."""
+        """Return the limit point and the targets inside a step, then its end `new`, in order; raise `Failure`."""
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:
@@ -436,8 +436,7 @@ class Run:
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
-        """Raise the error of a run that cannot reach its target, with a diagnosis; `why`: the reason, without a full
-        stop."""
+        """Raise the `ConvergenceError` of a run that ends before its target, for the reason `why`, with a diagnosis."""
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
@@ -445,5 +444,5 @@ class Run:
         raise not_reached(self.record, self.states, self.aim, f"{why}.", found, hint)
 
 
-class _Astray(Failure):
-    """Failure of a step that found another state than the one sought; a shorter step will do better."""
+class _OtherState(Failure):
+    """Failure of a step that found a state on another part of the path; a shorter step can succeed."""

@@ -8,7 +8,7 @@ grip, a plug that is not there yet) leaves unbalanced forces. They fade to zero 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -23,15 +23,16 @@ from .equations import Array, Measure
 from .measure_control import Flow
 from .newton import Failure, relative
 from .path_following import Run
+from .pieces import driving, end_of, next_knot, straight
 from .record import Record
-from .stage import Plan, Stage
+from .stage import Plan
 from .state import State
 from .stepping import SAME_TIME, StepControl
 
 _IN_TIME = StepControl(length=1e-3, smallest=1e-13)
 """Step control for a material that relaxes: after the first steps the time integration error sets the step length."""
 
-_HELD = replace(_IN_TIME, target=8)
+_CONTACT_IN_TIME = replace(_IN_TIME, target=8)
 """Step control for a body in contact while only time passes: its contact points hardly move, so more Newton
 iterations per step are allowed. The time integration error sets the step length."""
 
@@ -47,11 +48,11 @@ class Execution:
     Args:
         record: record of the states.
         plans: plans of the stages.
-        unsure: plans whose tools must be checked again at the start of their stage.
+        unsure: plans whose tools must be checked again at the start of their stage, since travels are unknown before.
         look: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
             its value in the user's units.
-        step: step control of stages that have none of their own.
-        balanced: out-of-balance forces, relative to the support forces, that are negligible.
+        step: step control of stages that have none of their own; None: the default.
+        balanced: norm of the unbalanced forces, relative to the support forces, below which they are negligible.
         accuracy: tolerance of the relative time integration error.
     """
 
@@ -90,7 +91,7 @@ class Execution:
                 if self.record.ended:
                     break
                 if any(plan is p for p in self._unsure):     # the travels of its tools are known now
-                    self._look(plan, self._stands)
+                    self._look(plan, self._present_value)
             if plan.in_flow:
                 self._flow(plan.numbers, piece > 0)
             elif plan.by_time:
@@ -98,7 +99,7 @@ class Execution:
             elif plan.numbers:
                 self._drive(plan.numbers, piece > 0)
             elif not self.record.states or self.record.last.setting["stage"] < k:
-                self._take_up(self._resumed(self._standing()[2]))
+                self._accept_known(self._resumed(self._present()[2]))
             if self.record.ended:
                 break
 
@@ -128,29 +129,34 @@ class Execution:
         return [(target, bound) for target, bound in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
-    def _standing(self) -> tuple[StepData, Array, float]:
-        """Return (step data, unknowns, control) of the last accepted state, or of the unloaded body; unknowns
-        locally owned."""
+    def _present(self) -> tuple[StepData, Array, float]:
+        """Return (step data, unknowns, control) of the last accepted state, or else of the unloaded body.
+
+        The unknowns are locally owned entries, shape (n,).
+        """
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
 
-    def _stands(self, number: int) -> float:
+    def _present_value(self, number: int) -> float:
         """Return the present value of an item, in the user's units; `number` is its number in the scene."""
-        setting, _, control = self._standing()
+        setting, _, control = self._present()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the present stage; `base`, `rate`: see `StepData`.
+        """Set new step data in the problem for a piece of the present stage.
 
-        piece: number of the piece. control: at the present state. fading: unbalanced forces fade as it goes to 1.
+        base, rate: amplitudes as functions of the control, see `StepData`. piece: number of the piece. control: value
+        of the control at the present state. fading: unbalanced forces decrease to 0 as the control goes to 1.
         """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
-        self.problem.enter(setting, self._standing()[1], control)
+        self.problem.enter(setting, self._present()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the present state of the process as the first state of a piece; `control` is its value in the new
-        step data."""
+        """Return the present state of the process as the first state of a piece.
+
+        control: value of the control at this state under the new step data.
+        """
         if not self.record.states:
             return begin(self.curve)
         try:
@@ -158,30 +164,32 @@ class Execution:
         except Failure as failure:
             raise ConvergenceError(f"{self._stage.label} cannot begin: {failure.reason}") from None
 
-    def _take_up(self, state: State) -> None:
-        """Accept a state that is known without an iteration, as a completed step."""
+    def _accept_known(self, state: State) -> None:
+        """Accept a state that needs no iteration, and complete its step in the record."""
         self.record.accept(state)
         self.record.complete_step(StepControl(), changed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
-        """Follow the path until the last target is met, with one control throughout; return the pairs of open targets.
+        """Follow the path until the last target is met, and return the targets that are still open.
 
-        targets: pairs (target, output quantity). control: at the present state, where the piece starts; None: continue
-        a piece. requested: another target that ends the piece.
+        targets: pairs (target, output quantity). control: value of the control at the present state, where the piece
+        starts; None: continue a piece. requested: another target that ends the piece, or None.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
-            held = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
-            step = step or (_HELD if held else _IN_TIME)     # a piece that has begun continues with its own steps
+            only_time = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
+            step = step or (_CONTACT_IN_TIME if only_time else _IN_TIME)    # a continued piece has its own steps
         run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, requested)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
         return run.aim.open
 
     def _change(self, begun: bool) -> None:
-        """Run piece 0 of the present stage: change the active items while unbalanced forces fade; `begun`: continue
-        the piece."""
-        before, x, control = self._standing()
+        """Run piece 0 of the present stage: change the active items while unbalanced forces decrease to 0.
+
+        begun: True to continue the piece.
+        """
+        before, x, control = self._present()
         start: float | None = None
         if not begun:
             for i in set(before.inactive) - set(self._inactive):
@@ -197,15 +205,15 @@ class Execution:
             self._trace([(target, target.bind(self.problem))], start)
 
     def _out_of_balance(self, x: Array) -> bool:
-        """Return True if the unbalanced forces at the unknowns x, locally owned, are not negligible."""
+        """Return True if the unbalanced forces exceed `balanced`; x: unknowns, locally owned entries, shape (n,)."""
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _drive(self, numbers: list[int], begun: bool) -> None:
-        """Run piece 1 of a stage in which one item is the control; `begun`: continue the piece.
+        """Run piece 1 of a stage in which the amplitude of one item is the control.
 
-        numbers: numbers of the controlled item and of the items that move with it.
+        numbers: numbers of the controlled item and of the items that move with it. begun: True to continue the piece.
         """
         control = None if begun else self._enter_driving(numbers)
         self._trace(self._left_to_meet(), control)
@@ -227,7 +235,7 @@ class Execution:
 
     def _amplitudes(self) -> list[float]:
         """Return the present dimensionless amplitudes of all items, then the process time."""
-        setting, _, control = self._standing()
+        setting, _, control = self._present()
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _flow(self, numbers: list[int], begun: bool) -> None:
@@ -245,6 +253,9 @@ class Execution:
         """Return (target of the prescribed quantity, function of time for its value, times to meet exactly) of a stage.
 
         The stage begins at the process time `now`. The times are its start, the corners and the end of the amplitude.
+
+        Raises:
+            InputError: the amplitude begins later than the stage, or ends before it.
         """
         stage, end = self._stage, self._stage.until
         if stage.constant and stage.duration:
@@ -268,7 +279,7 @@ class Execution:
 
         tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue, or 0.
         """
-        before, _, control = self._standing()
+        before, _, control = self._present()
         stage, through = self._stage, self._left_to_meet()
         now = before.base[-1] if piece else self.problem.time_at(control)
         end = end_of(stage, tables, now)
@@ -292,15 +303,18 @@ class Execution:
         self._enter(base, rate, piece, 0.0)
 
     def _line(self, then: float, through: _Targets, begun: bool) -> _Targets:
-        """Run a piece of the tables to its end at time `then`; return the pairs (target, output quantity) still open.
+        """Run a piece of the tables to its end at time `then`, and return the targets that are still open.
 
-        through: the pairs to meet in the piece. begun: continue the piece.
+        through: pairs (target, output quantity) to meet in the piece. begun: True to continue the piece.
+
+        Raises:
+            ConvergenceError: a target that ends the stage was not met within its duration.
         """
         if self.problem.setting.rests and not self.problem.relaxes:     # only time passes, without an effect
             if not begun:
-                self._take_up(self._resumed(0.0))
+                self._accept_known(self._resumed(0.0))
             if self.record.last.control < 1.0:
-                self._take_up(replace(self.record.last, control=1.0, kind="target", measures={}, history=[]))
+                self._accept_known(replace(self.record.last, control=1.0, kind="target", measures={}, history=[]))
             return through
         target, requested = process_time(then), self._stage.until if self._stage.waits else None
         left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, requested)
@@ -313,8 +327,14 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
-        """Raise an InputError if tables contradict the process time `now`, or the values of their items, at their
-        start."""
+        """Check tables against the present process time and the present values of their items.
+
+        tables: [(number of the item, knots (time, value), shape (n, 2))]. now: process time. end: process time at the
+        end of the stage.
+
+        Raises:
+            InputError: a table contradicts them, or the stage ends in the past.
+        """
         caller = self._stage.label
         if end <= now:
             raise InputError(f"{caller}: ends at time {end:g}, but the process time is {now:g} already: time cannot go"
@@ -324,7 +344,7 @@ class Execution:
             if first[0] < now - SAME_TIME * abs(now):
                 raise InputError(f"{caller}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
-            stands = self._stands(i)
+            stands = self._present_value(i)
             size = max(np.abs(table[:, 1]).max(), self.problem.scales[i])
             if first[0] <= now + SAME_TIME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{caller}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
@@ -332,7 +352,15 @@ class Execution:
 
 
 def is_done(record: Record, plans: list[Plan]) -> bool:
-    """Return True if the last state of a run is the end of the last stage; `plans`: the plans of all stages."""
+    """Return True if a run of a process has reached the end of its last stage.
+
+    Args:
+        record: record of the run.
+        plans: the plans of all stages.
+
+    Returns:
+        True if the last state is the end.
+    """
     last, plan = record.last, plans[-1]
     if last.setting["stage"] < len(plans) - 1:
         return False
@@ -346,70 +374,16 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
     return bool(last.time >= end - SAME_TIME * abs(end))
 
 
-def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
-            clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """Return (base, rate, present control) of step data in which the amplitude of one item is the control.
-
-    Args:
-        amplitudes: present amplitudes of all items, then the process time.
-        scales: for each item, its value in the user's units over its amplitude.
-        numbers: numbers of the controlled item and of the items that move with it.
-        stage: the stage, whose speed or duration relates the process time to the control.
-        clocked: True if process time passes while the control changes.
-    """
-    base, rate = list(amplitudes), [0.0] * len(amplitudes)
-    control, scale = base[numbers[0]], scales[numbers[0]]
-    for number in numbers:
-        base[number], rate[number] = 0.0, 1.0
-    until = stage.until
-    if clocked and until is not None and (stage.speed or stage.duration):
-        goal = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
-        change = goal - control
-        if change and stage.speed:
-            rate[-1] = np.sign(change) * scale / stage.speed
-        elif change and stage.duration:
-            rate[-1] = stage.duration / change
-        base[-1] -= rate[-1] * control
-    return base, rate, control
-
-
-def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
-             then: float) -> tuple[list[float], list[float]]:
-    """Return (base, rate) of step data between the times `now` and `then`, where the tables are straight lines.
-
-    The control is proportional to the time. The amplitudes and scales are as in `driving`. tables: [(number of the
-    item, knots (time, value), shape (n, 2))].
-    """
-    base, change = list(amplitudes), [0.0] * len(amplitudes)
-    for i, table in tables:
-        first, value = table[0]
-        if now < first - SAME_TIME * abs(first):            # straight from the present value to the first knot
-            part = min((then - now) / (first - now), 1.0)
-            change[i] = part * (value / scales[i] - base[i])
-        else:                                               # a constant piece inherits no round-off from before
-            base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
-            change[i] = ahead - base[i]
-    most = max(map(abs, change))
-    base[-1], change[-1] = now, then - now
-    return base, [c / (most or 1.0) for c in change]
-
-
-def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
-    """Return the process time at which a stage with tables or with a duration ends; `now`: process time at its
-    start."""
-    return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
-        table[-1, 0] for _, table in tables)
-
-
-def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
-    """Return the first time of a knot after `now` in any of the tables, but at most `end`."""
-    return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])
-
-
 def begin(curve: Curve) -> State:
     """Return the first state of a path: the body at control 0, in equilibrium with all other loads.
 
     Newton's method starts from the unloaded state. If it fails, the constant loads are increased gradually.
+
+    Args:
+        curve: solver of the path.
+
+    Returns:
+        The state, of kind "start".
 
     Raises:
         ConvergenceError: no equilibrium was found.

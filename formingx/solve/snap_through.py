@@ -98,6 +98,9 @@ class SnapThrough:
         Args:
             limit: limits of a step by contact, or None. Where all contacts with friction stick, only the last length
                 counts, since shorter steps succeed.
+
+        Returns:
+            Arc lengths, in decreasing order; one snap-through is tried at each.
         """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
@@ -106,6 +109,9 @@ class SnapThrough:
 
         Args:
             iterations: Newton iterations of the step so far.
+
+        Returns:
+            0.5 or 1.0; 1.0 is no restriction.
         """
         return 0.5 if iterations > self.iterations else 1.0
 
@@ -115,7 +121,7 @@ class NoEquilibrium(Failure):
 
 
 class ViscousDrag:
-    """Viscous forces eta V (x - origin) on the body, locally owned entries, shape (n,); 0 at constrained unknowns.
+    """Viscous forces eta V (x - origin) on the body; they are 0 at constrained unknowns.
 
     Args:
         viscosity: the viscosity of the problem, with the matrix V.
@@ -159,7 +165,7 @@ class _Motion:
         lost: energy dissipated so far, dimensionless.
         solved: number of viscous solutions so far.
         rest: unbalanced forces, relative to the support forces.
-        near: unbalanced forces below which equilibrium is tried.
+        trial_force: unbalanced forces, relative to the support forces, below which equilibrium is tried.
         settles: True if equilibrium should be tried next.
     """
 
@@ -172,11 +178,11 @@ class _Motion:
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
         self.state, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.near = np.inf, settings.near_rest   # unbalanced forces; their limit for trying equilibrium
+        self.rest, self.trial_force = np.inf, settings.near_rest
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
 
-    def goes_on(self, eta: float) -> bool:
+    def continues(self, eta: float) -> bool:
         """Return True while eta and the distance moved by the body are within their bounds."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
@@ -212,7 +218,7 @@ class _Motion:
         if not self.solved and far > settings.again:
             return self._hold_back(far)
         before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
-        self.settles = self.rest < min(self.near, before)
+        self.settles = self.rest < min(self.trial_force, before)
         self._lose(origin, x, pull)                         # from the last or the predicted position
         self._pull, self.state = pull, new
         self.problem.advance(x, self.control)
@@ -223,10 +229,9 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """Return the factor by which eta grows after a rejected solution: `grows`, or the one of the settings if this
-        is 0.
+        """Return the factor by which eta grows after a rejected solution, and keep eta from falling after the next one.
 
-        After the next solution eta does not fall.
+        grows: the factor; 0: the factor of the settings.
         """
         self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
@@ -245,14 +250,14 @@ class _Motion:
                 state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
             if self.rest > self._settings.at_rest:
-                self.settles, self.near = False, 0.3 * self.rest
+                self.settles, self.trial_force = False, 0.3 * self.rest
                 return None
             if not self.problem.has_history:                # another branch starts here
                 raise
             state = self.curve.resume(self.state.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
         if self._goes_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
-            self.settles, self.near = False, 0.3 * self.rest
+            self.settles, self.trial_force = False, 0.3 * self.rest
             return None
         self._lose(self.state.x, state.x, np.zeros(len(state.x)))
         energy, length = self.problem.units
@@ -260,8 +265,7 @@ class _Motion:
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """Return True if the work of the controlled load from state a to state b has the wrong sign; `onward` is the
-        right one."""
+        """Return True if the work of the controlled load from state a to state b has not the sign `onward`."""
         return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
 
     def _lose(self, a: Array, x: Array, pull: Array) -> None:
@@ -318,7 +322,7 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
     origin = old.x + change / old.slope * old.direction if ahead else old.x
     eta, solutions = settings.eta, solutions or settings.solutions
     try:
-        while motion.solved < solutions and motion.goes_on(eta):
+        while motion.solved < solutions and motion.continues(eta):
             if curve.iterations > settings.iterations:
                 log.info("no jump within %d Newton iterations of this step: shorter steps are tried", curve.iterations)
                 raise Failure(f"a jump took more than {settings.iterations} Newton iterations", [])
@@ -352,6 +356,9 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
     Args:
         problem: the equations.
         falls: True if the controlled quantity decreases towards 0, as a pressure that is released.
+
+    Returns:
+        Name of the rule.
     """
     if problem.drives == "time":
         return "snap_through"
@@ -371,6 +378,9 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
         old: the state.
         at_limit_point: the rule at limit points, as `at_limit_points` returns.
         sense: 1 or -1, direction of the control at the start of the run.
+
+    Returns:
+        True if a snap-through should start here.
     """
     if at_limit_point not in ("snap_through",
                               "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
@@ -388,6 +398,9 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
         passed: earlier states of the path, in order.
         old: the state from which the step started.
         new: the new state.
+
+    Returns:
+        True if `new` lies on that piece, within a tenth of the step.
     """
     near = 0.1 * curve.distance(old, new)
     states = [] if old.kind == "jump" else passed[::-1]
@@ -402,7 +415,7 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 
 
 def separated(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """Return a new state at the same control, without contact points in tension at tools in three dimensions.
+    """Separate the contact points in tension from tools in three dimensions, and solve again at the same control.
 
     Args:
         curve: solver of the path.
@@ -410,6 +423,9 @@ def separated(curve: Curve, limit: StepLimit, old: State, new: State, jump: Call
         old: the state from which the step started.
         new: the state found by the step.
         jump: function that returns the state after a snap-through from a state, where the body snaps off its tool.
+
+    Returns:
+        The state, without contact points in tension.
 
     Raises:
         Failure: no such state was found.

@@ -180,7 +180,7 @@ class Stage:
             InputError: the argument is not of this form, or its times do not increase.
         """
         if not isinstance(amplitudes, Mapping) or not amplitudes:
-            raise InputError(f"{self.label}: amplitudes = {amplitudes!r}: must be {{thing: [(time, value), ...]}}")
+            raise InputError(f"{self.label}: amplitudes = {amplitudes!r}: must be {{item: [(time, value), ...]}}")
         tables = []
         for item, knots in amplitudes.items():
             table = f"{self.label}: the table of {item!r}"
@@ -253,7 +253,7 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         if number in inactive and item.direction is None:        # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.together(number)[0] for number in numbers}) < len(numbers):
-        raise InputError(f"{caller}: one thing has two tables")
+        raise InputError(f"{caller}: one item has two tables")
     present = [item for i, item in enumerate(scene.items) if i not in inactive]
     try:
         supports = [item for item in present if item in scene.supports]

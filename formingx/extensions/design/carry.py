@@ -25,7 +25,7 @@ from ...forms.schedule import StepData
 from ...measures.targets import Target
 from ...results.path import Path
 from ...solve.newton import Failure, fixed
-from ...solve.process import driving, end_of, next_knot, straight
+from ...solve.pieces import driving, end_of, next_knot, straight
 from ...solve.stage import Plan, plan
 from ...solve.state import State
 from .perturbed_runs import PerturbedRun, settle

@@ -1,0 +1,100 @@
+"""Step data of the pieces of a stage: one controlled item, or tables of amplitudes against time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .equations import Array
+from .stage import Stage
+from .stepping import SAME_TIME
+
+
+def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
+            clocked: bool = True) -> tuple[list[float], list[float], float]:
+    """Return step data in which the amplitude of one item is the control.
+
+    Args:
+        amplitudes: present amplitudes of all items, then the process time.
+        scales: for each item, its value in the user's units over its amplitude.
+        numbers: numbers of the controlled item and of the items that move with it.
+        stage: the stage, whose speed or duration relates the process time to the control.
+        clocked: True if process time passes while the control changes.
+
+    Returns:
+        (`StepData.base`, `StepData.rate`, present value of the control).
+    """
+    base, rate = list(amplitudes), [0.0] * len(amplitudes)
+    control, scale = base[numbers[0]], scales[numbers[0]]
+    for number in numbers:
+        base[number], rate[number] = 0.0, 1.0
+    until = stage.until
+    if clocked and until is not None and (stage.speed or stage.duration):
+        goal = until.value / scale if until.name.endswith(("pressure", "travel")) else np.inf
+        change = goal - control
+        if change and stage.speed:
+            rate[-1] = np.sign(change) * scale / stage.speed
+        elif change and stage.duration:
+            rate[-1] = stage.duration / change
+        base[-1] -= rate[-1] * control
+    return base, rate, control
+
+
+def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
+             then: float) -> tuple[list[float], list[float]]:
+    """Return step data between two times, between which all tables are straight lines.
+
+    The control is proportional to the time from 0 on. Its scale makes the largest rate of an amplitude 1.
+
+    Args:
+        amplitudes: present amplitudes of all items, then the process time.
+        scales: for each item, its value in the user's units over its amplitude.
+        tables: [(number of the item, knots (time, value), shape (n, 2))].
+        now: process time at the start.
+        then: process time at the end.
+
+    Returns:
+        (`StepData.base`, `StepData.rate`).
+    """
+    base, change = list(amplitudes), [0.0] * len(amplitudes)
+    for i, table in tables:
+        first, value = table[0]
+        if now < first - SAME_TIME * abs(first):            # straight from the present value to the first knot
+            part = min((then - now) / (first - now), 1.0)
+            change[i] = part * (value / scales[i] - base[i])
+        else:                                               # a constant piece inherits no round-off from before
+            base[i], ahead = (float(np.interp(t, *table.T)) / scales[i] for t in (now, then))
+            change[i] = ahead - base[i]
+    most = max(map(abs, change))
+    base[-1], change[-1] = now, then - now
+    return base, [c / (most or 1.0) for c in change]
+
+
+def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
+    """Return the process time at which a stage with tables or with a duration ends.
+
+    Args:
+        stage: the stage.
+        tables: [(number of the item, knots (time, value), shape (n, 2))].
+        now: process time at its start.
+
+    Returns:
+        Process time.
+    """
+    return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
+        table[-1, 0] for _, table in tables)
+
+
+def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
+    """Return the time of the next knot in any table.
+
+    Args:
+        tables: [(number of the item, knots (time, value), shape (n, 2))].
+        now: present process time.
+        end: process time at the end of the stage.
+
+    Returns:
+        The first time of a knot after `now`, at most `end`.
+    """
+    return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])
