@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.extensions.fits.tested import MeasuredRange, mode_of, principal
+from formingx.extensions.fits.tested import MeasuredRange, nearest_test, principal
 
 RUBBER = fx.NeoHookean(c10=0.2)
 
@@ -19,26 +19,26 @@ def outside(tested, mode, stretch):
 
 
 def test_a_uniaxial_test_covers_uniaxial_tension_alone():
-    tested = MeasuredRange.of({"uniaxial": np.linspace(1, 4, 9)})
+    tested = MeasuredRange.from_stretches({"uniaxial": np.linspace(1, 4, 9)})
     assert not outside(tested, "uniaxial", 3.9) and outside(tested, "uniaxial", 5.0)
     assert outside(tested, "pure_shear", 1.5) and outside(tested, "equibiaxial", 1.2)
-    assert not outside(tested, "equibiaxial", 1.005) and tested.of_one_mode            # small strains are all alike
+    assert not outside(tested, "equibiaxial", 1.005) and tested.single_mode            # small strains are all alike
     assert tested.distance(strain("uniaxial", 8.0))[0] == pytest.approx(np.log(2) * np.hypot(1, 0.5))
 
 
 def test_compression_is_equibiaxial_tension():
     """A block pressed to l is stretched l^(-1/2) in both other directions."""
-    tested = MeasuredRange.of({"uniaxial": (0.25, 1.0)})
+    tested = MeasuredRange.from_stretches({"uniaxial": (0.25, 1.0)})
     assert not outside(tested, "equibiaxial", 1.9) and outside(tested, "equibiaxial", 2.5)
     assert outside(tested, "uniaxial", 1.5)
-    assert mode_of(*strain("uniaxial", 0.3)[0]) == "equibiaxial"
+    assert nearest_test(*strain("uniaxial", 0.3)[0]) == "equibiaxial"
 
 
 def test_between_two_modes_and_beyond_them():
-    tested = MeasuredRange.of({"uniaxial": (1.0, 4.0), "equibiaxial": (1.0, 3.0)})
+    tested = MeasuredRange.from_stretches({"uniaxial": (1.0, 4.0), "equibiaxial": (1.0, 3.0)})
     assert not outside(tested, "pure_shear", 2.0) and outside(tested, "pure_shear", 4.5)
-    assert tested.distance(strain("pure_shear", 2.0))[0] == 0 and not tested.of_one_mode
-    biaxial = MeasuredRange.of({"biaxial": np.array([[2.0, 3.0], [1.5, 1.0]])})
+    assert tested.distance(strain("pure_shear", 2.0))[0] == 0 and not tested.single_mode
+    biaxial = MeasuredRange.from_stretches({"biaxial": np.array([[2.0, 3.0], [1.5, 1.0]])})
     assert not biaxial.outside(principal(np.array([[1.5], [2.0]])))[0]                  # whatever the order
 
 

@@ -42,7 +42,7 @@ class Search:
 SEARCH = Search()
 
 
-def lack(what: str, requested: float | None, found: float) -> str:
+def missed_target(what: str, requested: float | None, found: float) -> str:
     """Return a text that reports a missed target.
 
     Args:
@@ -85,7 +85,7 @@ class WallTarget:
     damping = SEARCH.damping
 
     def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, volume: float | None):
-        self.inside, self.volume = inside_of(run, within), volume
+        self.inside, self.volume = mask_of_range(run, within), volume
         self.wanted: np.ndarray | None = None
         if wall is not None:
             s = run.profile.reference_length[self.inside]
@@ -275,7 +275,7 @@ def _range(values: np.ndarray) -> str:
     return f"{values.mean():.4g}" + (f" on the mean ({low:.4g} to {high:.4g})" if high - low > 1e-9 * high else "")
 
 
-def inside_of(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
+def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
     """Return the mask of the nodes of the bottom face whose reference lengths lie in a range.
 
     Args:

@@ -17,7 +17,7 @@ from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
-from .aim import SEARCH, MeasuredWallTarget, WallTarget, inside_of, lack
+from .aim import SEARCH, MeasuredWallTarget, WallTarget, mask_of_range, missed_target
 from .answer import Answer
 from .parameters import Parameters
 from .run import DesignRun
@@ -208,8 +208,8 @@ class Design:
                 break
             before = gained
             log.info("design: run %d, cost %.3g", len(taken), target.cost(best))
-        lacks = [lack("volume", target.volume, best.volume), target.shortfall(best)]
-        return Answer(first, best, taken, notes, target.inside, why, predicted, "\n".join(filter(None, lacks)),
+        missed = [missed_target("volume", target.volume, best.volume), target.shortfall(best)]
+        return Answer(first, best, taken, notes, target.inside, why, predicted, "\n".join(filter(None, missed)),
                       target.wanted, target.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
@@ -235,7 +235,7 @@ class Design:
         least, most = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: runs", runs)
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
-        inside = inside_of(first, within)
+        inside = mask_of_range(first, within)
         unit = min(least, first.wall[inside].min())
         best, taken, predicted, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
         notes: list[str] = []
@@ -278,4 +278,4 @@ class Design:
                 break
         thinnest = best.wall[inside].min()
         return Answer(first, best, taken, notes, inside, why, predicted,
-                      lack("minimum wall", least, min(thinnest, least)))
+                      missed_target("minimum wall", least, min(thinnest, least)))

@@ -16,7 +16,7 @@ from ...forms.carry import shapes_of
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from ...ranks import gathered
-from .tested import MeasuredRange, mode_of, principal
+from .tested import MeasuredRange, nearest_test, principal
 
 _SHARE = 0.005             # share of a layer's volume that may lie outside the tests without a warning
 
@@ -33,7 +33,7 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
     """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
-        if tested.undetermined and tested.of_one_mode:
+        if tested.undetermined and tested.single_mode:
             yield Finding("warning", about, f"its tests ({tested}) do not determine {', '.join(tested.undetermined)}:"
                           f" in another mode of deformation its stress is a guess",
                           "fit it to tests of another mode too, or choose a law with fewer constants")
@@ -85,7 +85,7 @@ def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
         largest: largest logarithmic strain of the deformation.
         middle: middle logarithmic strain.
     """
-    mode = mode_of(largest, middle)
+    mode = nearest_test(largest, middle)
     found = tested.ranges.get(mode.replace(" ", "_"))
     if found is not None:
         return f"that is nearest to {mode} tension, tested at stretches from {found[0]:.3g} to {found[1]:.3g}"

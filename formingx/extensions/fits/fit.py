@@ -19,7 +19,7 @@ from .measured import read_tests
 from .points import Points
 from .tested import MeasuredRange
 from .uncertainty import Uncertainty, uncertainty
-from .weights import of_numbers
+from .weights import numbered_weights
 
 _FIRST = 20
 """Largest number of evaluations of the residual from each first guess."""
@@ -157,7 +157,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
     best, found = _fitted(material, points, terms)
     misfit = points.stress(best.response, best.parameters.values()) - points.measured
     return _result(best, dict(best.parameters), points.parts, misfit, points.measured, found,
-                   MeasuredRange.of(points.stretches_of, found.undetermined), points.data)
+                   MeasuredRange.from_stretches(points.stretches_of, found.undetermined), points.data)
 
 
 def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
@@ -175,7 +175,7 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
     """
     tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
     many = len(tests) if isinstance(tests, list | tuple) else 0
-    relaxing, constants, used, found = fitted(material, tests, terms, relative, of_numbers(weights, many), within)
+    relaxing, constants, used, found = fitted(material, tests, terms, relative, numbered_weights(weights, many), within)
     misfits, measured, parts, n = [], [], {}, 0
     stretches: dict[str, list] = {}
     rates = []
@@ -190,8 +190,9 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
         rates.append(np.abs(np.diff(np.log(test.stretches)))[steps > 0] / steps[steps > 0])
     moved = np.concatenate(rates)
     moved = moved[moved > 0]
-    tested = MeasuredRange.of({mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
-                              (float(moved.min()), float(moved.max())) if len(moved) else None)
+    tested = MeasuredRange.from_stretches(
+        {mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
+        (float(moved.min()), float(moved.max())) if len(moved) else None)
     return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, tests)
 
 

@@ -13,7 +13,7 @@ from ..kbkz.kbkz import KBKZ
 from .fit import IN_TIME
 from .fit_in_time import TimedTest, checked_tests
 from .uncertainty import Uncertainty, uncertainty
-from .weights import scales
+from .weights import divisors
 
 _PER_DECADE = 2.0
 """Number of relaxation times for each decade of frequency."""
@@ -109,7 +109,7 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
         raise InputError(f"fit: terms = {terms!r}: {material} has its times already")
     used = checked_tests(tests, within)
     measured = [test.stress[np.isfinite(test.stress)] for test in used]
-    sizes, row = scales(measured, relative, weights), np.concatenate(measured)
+    sizes, row = divisors(measured, relative, weights), np.concatenate(measured)
     law, names = type(material.damping), list(material.damping.bounds)
     low, high = np.array(list(material.damping.bounds.values())).T
     if len(row) < len(names):

@@ -19,7 +19,7 @@ from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
 from ...materials.relaxing import RelaxingMaterial
 from .uncertainty import Uncertainty, uncertainty
-from .weights import in_range, scales
+from .weights import divisors, in_range
 
 _PER_DECADE = 16
 """Number of relaxation times per decade at which the stress of a branch is computed; a cubic spline connects them."""
@@ -179,7 +179,7 @@ class _Data:
         measured = [np.isfinite(t.stress) for t in self.tests]
         self.stress = np.concatenate([t.stress[m] for t, m in zip(self.tests, measured)])
         self.scale = np.abs(self.stress).max()
-        self.sizes = scales([t.stress[m] for t, m in zip(self.tests, measured)], relative, weights)
+        self.sizes = divisors([t.stress[m] for t, m in zip(self.tests, measured)], relative, weights)
         steps = np.concatenate([np.diff(t.times) for t in self.tests])
         longest = max(t.times[-1] - t.times[0] for t in self.tests)
         if not longest > 0:
@@ -265,9 +265,9 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
                          f" limit lies beyond them")
     cost, start, x = min(trials, key=lambda trial: trial[0])
     best = cast(RelaxingMaterial, start.with_constants(start.constants_at(x)))
-    rest = [] if (relaxed := best.equilibrium) is None else list(relaxed.parameters.values())
+    constants = [] if (relaxed := best.equilibrium) is None else list(relaxed.parameters.values())
     ordered = sorted(best.branches, key=lambda pair: pair[1])
-    best = cast(RelaxingMaterial, best.with_constants([*rest, *np.ravel(ordered)]))
+    best = cast(RelaxingMaterial, best.with_constants([*constants, *np.ravel(ordered)]))
     return best, float(np.sqrt(2 * cost / len(data.stress)))
 
 
@@ -277,8 +277,8 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
     The given material counts only if it has n branches. For the arguments see `_refined`.
     """
     from scipy.optimize import nnls
-    rest = material.equilibrium
-    shape = data.relaxed(rest)[:, None] / data.sizes[:, None]
+    equilibrium = material.equilibrium
+    shape = data.relaxed(equilibrium)[:, None] / data.sizes[:, None]
     row = np.linspace(data.log_tau[0], data.log_tau[-1], len(data.log_tau) // 4)
     columns = np.hstack([shape, data.branch(row) / data.sizes[:, None]])
     weight, *spectrum = nnls(columns, data.stress / data.sizes)[0]
@@ -290,7 +290,7 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
     for log_tau in (np.interp((np.arange(n) + 0.5) / n, share, row), np.linspace(*ends, n + 2)[1:-1]):
         mu = nnls(np.hstack([shape, data.branch(log_tau) / data.sizes[:, None]]), data.stress / data.sizes)[0]
         pairs = [(max(m, 1e-3 * mu[1:].max(initial=1e-3 * data.scale)), t) for m, t in zip(mu[1:], np.exp(log_tau))]
-        found.append(type(material)(_scaled(rest, max(mu[0], 1e-3, 1e-2 * weight), data.largest_I1), pairs))
+        found.append(type(material)(_scaled(equilibrium, max(mu[0], 1e-3, 1e-2 * weight), data.largest_I1), pairs))
     return found + [material] * (len(material.branches) == n)
 
 

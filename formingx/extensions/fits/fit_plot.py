@@ -24,8 +24,8 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
     Raises:
         InputError: one matplotlib axes for relaxation tests and other tests together.
     """
-    held = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
-    count = 1 + (any(held) and not all(held))
+    constant = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
+    count = 1 + (any(constant) and not all(constant))
     if axes is None:
         axes = figure(count)[1]
     panels = np.ravel(axes)
@@ -35,10 +35,10 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
     if isinstance(data, dict):
         _stretched(material, data, panels[0])
     else:
-        _timed(material, data, held, panels)
+        _timed(material, data, constant, panels)
     label = "nominal stress" + f" ({unit})" * bool(unit)
     for i, panel in enumerate(panels):
-        in_time = any(held) and i == 0
+        in_time = any(constant) and i == 0
         panel.set(xlabel=f"time ({unit_of_time})" if in_time else "stretch", ylabel=label)
         panel.legend()
     return axes
@@ -70,16 +70,16 @@ def _biaxial(material: Any, columns: Any, panel: Any) -> None:
         panel.plot(l1, np.where(np.isfinite(P), found, np.nan), "x", ms=5, color=points.get_color())
 
 
-def _timed(material: Any, tests: Any, held: list[bool], panels: Any) -> None:
+def _timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None:
     """Draw stresses of tests in time, with curves of the material.
 
     Args:
         material: the fitted material.
         tests: the tests in time.
-        held: True for each test at constant stretch: it is drawn over the logarithmic time, else over the stretch.
+        constant: True for each test at constant stretch: it is drawn over the logarithmic time, else over the stretch.
         panels: matplotlib axes; tests at constant stretch are drawn on the first, the others on the last.
     """
-    for i, (test, still) in enumerate(zip(tests, held), 1):
+    for i, (test, still) in enumerate(zip(tests, constant), 1):
         panel = panels[0] if still else panels[-1]
         t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
         x, label = (t - t[0], f"stretch {l[0]:g}") if still else (l, _rate(t, l))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError, known
 from ...materials import homogeneous
-from .weights import in_range, of_names, scales
+from .weights import divisors, in_range, named_weights
 
 
 class Points:
@@ -41,7 +41,7 @@ class Points:
         tests = {mode: _checked(mode, columns) for mode, columns in data.items()}
         if all(np.all(l[0] == 1) and np.all(l[1] == 1) for l, _ in tests.values()):
             raise InputError("fit: data: every stretch is 1: nothing is strained")
-        weight = of_names(weights, list(tests))
+        weight = named_weights(weights, list(tests))
         kept = {mode: _kept(mode, l, P, within) for mode, (l, P) in tests.items()}
         stresses = [P[np.isfinite(P)] for _, P in kept.values()]
         largest = max((np.abs(P).max() for P in stresses if len(P)), default=0.0)
@@ -52,13 +52,14 @@ class Points:
                              f" unit")
         used = {mode: (l, P, w) for (mode, (l, P)), w in zip(kept.items(), weight) if np.any(np.isfinite(P))}
         self.measured = np.concatenate([P[np.isfinite(P)] for _, P, _ in used.values()])
-        self.sizes = scales([P[np.isfinite(P)] for _, P, _ in used.values()], relative, [w for *_, w in used.values()])
+        self.sizes = divisors([P[np.isfinite(P)] for _, P, _ in used.values()], relative,
+                              [w for *_, w in used.values()])
         self.stretches_of = {mode: l if mode == "biaxial" else l[0] for mode, (l, *_) in used.items()}
         self.parts, n = {}, 0
         for mode, (_, P, _) in used.items():
             self.parts[mode] = slice(n, n := n + int(np.isfinite(P).sum()))
         self._stretches = np.concatenate([l for l, *_ in used.values()], axis=1)
-        self._there = np.concatenate([np.isfinite(P) for _, P, _ in used.values()], axis=1)
+        self._measured_mask = np.concatenate([np.isfinite(P) for _, P, _ in used.values()], axis=1)
         self._rows = np.concatenate([np.full(P.shape[1], k) for k, (_, P, _) in enumerate(used.values())])
         l1, l2 = self._stretches
         self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
@@ -87,13 +88,13 @@ class Points:
             shape = self._in_order(np.stack([l1 - 1 / (l1**3 * l2**2), l2 - 1 / (l2**3 * l1**2)]))
         return float(np.median(self.measured[shape != 0] / shape[shape != 0]))
 
-    def _in_order(self, both: np.ndarray) -> np.ndarray:
+    def _in_order(self, values: np.ndarray) -> np.ndarray:
         """Return values in the order of `measured`, shape (m,).
 
         Args:
-            both: values in the first and the second direction at all n points, shape (2, n).
+            values: values in the first and the second direction at all n points, shape (2, n).
         """
-        return np.concatenate([both[:, self._rows == k][self._there[:, self._rows == k]]
+        return np.concatenate([values[:, self._rows == k][self._measured_mask[:, self._rows == k]]
                                for k in range(len(self.parts))])
 
 

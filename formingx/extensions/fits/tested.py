@@ -44,8 +44,8 @@ class MeasuredRange:
     rates: tuple[float, float] | None = None
 
     @classmethod
-    def of(cls, stretches: Mapping[str, Any], undetermined: tuple[str, ...] = (),
-           rates: tuple[float, float] | None = None) -> MeasuredRange:
+    def from_stretches(cls, stretches: Mapping[str, Any], undetermined: tuple[str, ...] = (),
+                       rates: tuple[float, float] | None = None) -> MeasuredRange:
         """Return the range of tests with given stretches.
 
         Args:
@@ -115,7 +115,7 @@ class MeasuredRange:
         return found
 
     @property
-    def of_one_mode(self) -> bool:
+    def single_mode(self) -> bool:
         """True if all tested strains lie on one line with zero strain, as for tests of one mode."""
         return len(self._corners) < 3
 
@@ -149,7 +149,7 @@ def with_tests(material: Material, **stretches: Any) -> Material:
     uniaxial 1 to 3
     """
     other = copy.copy(instance("with_tests: material", material, Material, "a material"))
-    other.tested = MeasuredRange.of(stretches)
+    other.tested = MeasuredRange.from_stretches(stretches)
     return other
 
 
@@ -166,7 +166,7 @@ def principal(stretches: Any) -> np.ndarray:
     return -np.sort(-np.stack([*e, -e[0] - e[1]]), axis=0)[:2].T
 
 
-def mode_of(largest: float, middle: float) -> str:
+def nearest_test(largest: float, middle: float) -> str:
     """Return the name of the test whose mode of deformation is nearest to given strains.
 
     Args:

@@ -12,7 +12,7 @@ _LEAST = 0.02
 """Smallest divisor of a relative misfit, over the largest stress of its test."""
 
 
-def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
+def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
     """Return the stress by which the misfit of each measured stress is divided.
 
     Args:
@@ -37,7 +37,7 @@ def scales(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.n
     return np.concatenate(found)
 
 
-def of_names(weights: Any, names: list[str]) -> list[float]:
+def named_weights(weights: Any, names: list[str]) -> list[float]:
     """Return the weights of named tests, checked.
 
     Args:
@@ -60,7 +60,7 @@ def of_names(weights: Any, names: list[str]) -> list[float]:
     return [_weight(f"fit: weights[{name!r}]", weights.get(name, 1.0)) for name in names]
 
 
-def of_numbers(weights: Any, count: int) -> list[float]:
+def numbered_weights(weights: Any, count: int) -> list[float]:
     """Return the weights of numbered tests, checked.
 
     Args:
