@@ -72,7 +72,7 @@ class Comparison:
 
     @property
     def beyond(self) -> int:
-        """Number of points of their curve that lie beyond the ends of our curve, and are not compared."""
+        """Number of points of the other program beyond the ends of the run's curve, which are not compared."""
         return len(self.theirs) - len(self.pairs[0])
 
     def __str__(self) -> str:
@@ -102,7 +102,10 @@ class Comparison:
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """Draw our and their curve (first column over second), and the differences over the arc length of our curve.
+        """Draw the curves of the run and of the other program, and their differences.
+
+        The curves are drawn as the first column over the second, the differences over the arc length of the run's
+        curve.
 
         Returns:
             The matplotlib figure.
@@ -126,7 +129,7 @@ class Comparison:
     def to_csv(self, file: Any, comm: Any = MPI.COMM_WORLD) -> None:
         """Write a CSV file with a row for each compared point (rank 0 writes).
 
-        A row has for every column their value, our value, and their difference.
+        A row has for every column the value of the other program, the value of the run, and the difference.
 
         Args:
             file: path of the CSV file.
@@ -283,17 +286,17 @@ def _rises(values: np.ndarray) -> bool:
 
 
 def _steepest(points: np.ndarray, k: int) -> float:
-    """Return the largest change of any column between two points, shape (n, c), over the change of column k."""
+    """Return the largest slope of a curve over column k, in any column, between successive points, shape (n, c)."""
     steps = np.abs(np.diff(points, axis=0))
     return float((steps.max(1) / steps[:, k]).max())
 
 
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
-    """Return the difference of one column.
+    """Return the difference of one column between two curves, with its maximum and root mean square.
 
     Args:
-        values: differences at the compared points, shape (k,).
-        size: range of our column.
+        values: differences at the k compared points, shape (k,).
+        size: range of the column in our curve.
         partners: partners of these points on our curve, each column divided by its range, shape (k, c).
     """
     s = arc_length(partners)

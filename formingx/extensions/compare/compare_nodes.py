@@ -147,11 +147,11 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         known("compare_nodes: column", name, ("node", *_columns(path)))
 
     def take(name: str) -> np.ndarray:
-        """Return their values of a column in our unit, by our name of the column."""
+        """Return the other program's values of a column, in the unit of the run, by our name of the column."""
         return table.take(names.get(name, name), units.get(name))
 
     def take_nodes() -> np.ndarray:
-        """Return their node numbers; raise an InputError unless they are whole."""
+        """Return the other program's node numbers; raise an InputError unless they are whole."""
         numbers = take("node")
         if np.any(numbers != np.round(numbers)):
             raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")

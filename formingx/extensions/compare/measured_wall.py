@@ -172,6 +172,8 @@ class MeasuredWall:
 class WallComparison:
     """Measured wall thickness of a formed part and the computed one at the same m points; its text is a table.
 
+    The arguments but `comm` are attributes.
+
     Args:
         length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length.
         reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
@@ -179,13 +181,6 @@ class WallComparison:
         computed: computed thicknesses, shape (m,), length.
         away: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
         comm: MPI communicator of the run.
-
-    Attributes:
-        length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length.
-        reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
-        measured: measured thicknesses, shape (m,), length.
-        computed: computed thicknesses, shape (m,), length.
-        away: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
     """
 
     def __init__(self, length: np.ndarray, reference_length: np.ndarray, measured: np.ndarray, computed: np.ndarray,

@@ -84,7 +84,10 @@ class Answer:
 
     @property
     def cv(self) -> tuple[float, float]:
-        """Standard deviation over mean of the wall at the nodes that count, in the first and in the best run."""
+        """Standard deviation over mean of the wall thickness, in the first and in the best run of the search.
+
+        Only the nodes in the searched range of reference lengths count.
+        """
         return unevenness(self.before.wall[self.inside]), unevenness(self.best.wall[self.inside])
 
     def at_bounds(self) -> list[str]:

@@ -37,17 +37,17 @@ class Confidence:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Standard errors: {parameter: standard error}."""
+        """Standard error of each fitted parameter: {parameter: standard error}."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist()))
 
     @property
     def correlation(self) -> np.ndarray:
-        """Correlation matrix of the n parameters, shape (n, n)."""
+        """Correlation matrix of the n fitted parameters, shape (n, n)."""
         size = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(size, size)
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Return the confidence interval of each parameter by Student's t distribution.
+        """Return the confidence interval of each fitted parameter by Student's t distribution.
 
         Args:
             confidence: confidence level, between 0 and 1.
@@ -67,12 +67,18 @@ class Confidence:
 
     @property
     def undetermined(self) -> list[str]:
-        """Names of the parameters that the wall does not determine: standard error above a quarter of the range."""
+        """Names of the parameters that the measured wall does not determine.
+
+        Their standard error exceeds a quarter of their range.
+        """
         return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _OPEN * size]
 
     @property
     def indistinguishable(self) -> list[tuple[str, str, float]]:
-        """Pairs of undetermined parameters with similar effects on the wall: (name, name, correlation above 0.9)."""
+        """Pairs of undetermined parameters with similar effects on the wall: (name, name, correlation).
+
+        The absolute value of the correlation exceeds 0.9.
+        """
         n, C, open_ = len(self.names), self.correlation, self.undetermined
         return [(self.names[i], self.names[j], float(C[i, j])) for i in range(n) for j in range(i)
                 if abs(C[i, j]) > _ALIKE and {self.names[i], self.names[j]} <= {*open_}]
@@ -94,7 +100,7 @@ def confidence(run: Any, measured: Any) -> Confidence:
     With the computed walls h and the measured walls w at m points, and the n parameters p, the covariance is
 
     .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial h_i}{\partial p_j}, \quad
-        s^2 = \frac{1}{m - n} \sum_i \residual(\frac{h_i}{w_i} - 1\right)^2
+        s^2 = \frac{1}{m - n} \sum_i \left(\frac{h_i}{w_i} - 1\right)^2
 
     Args:
         run: the run with the fitted parameters.

@@ -104,7 +104,7 @@ class Design:
     def _run(self, vector: np.ndarray) -> DesignRun:
         """Compute the run for the n numbers of the parameters, shape (n,)."""
         scene, end = self._make(vector)
-        scene = copy.copy(scene)                             # the script's scene is residual as it is
+        scene = copy.copy(scene)                             # the script's scene is left as it is
         scene.one_by_one = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,

@@ -155,7 +155,7 @@ class PerturbedRun:
         return float(equation(self.problem.x, self.control, self.gradient)[0])
 
     def destroy(self) -> None:
-        """Free the PETSc objects (collective)."""
+        """Free the PETSc objects of the perturbed run; collective."""
         self.F.destroy()
         self.gradient.destroy()
         self.problem.destroy()

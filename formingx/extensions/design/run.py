@@ -65,7 +65,9 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map of the first-order change of the quantity for a tenth of the range of each parameter.
+        """Draw a heat map of the derivatives of the output quantity by all parameters.
+
+        It shows the change of the quantity, to first order, if a parameter changes by a tenth of its range.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -115,7 +117,7 @@ class DesignRun:
 
     @cached_property
     def profile(self) -> Profile:
-        """Outline of the part in the last state."""
+        """Outline of the formed part in the last state of the run."""
         return self.path.profile()
 
     @cached_property
@@ -133,7 +135,7 @@ class DesignRun:
 
     @property
     def volume(self) -> float:
-        """Reference volume of the whole part, length^3 (in plane strain per unit depth)."""
+        """Reference volume of the whole body of the run, length^3; in plane strain per unit depth, length^2."""
         return _volume(self.path.problem)
 
     @cached_property
@@ -304,7 +306,7 @@ class DesignRun:
 
 
 def _volume(problem: Any) -> float:
-    """Return the reference volume of the whole part, length^3, also if a half of it is modelled."""
+    """Return the reference volume of the whole body of a problem, length^3, also if a half of it is modelled."""
     return float(problem.scene.symmetry_factor * problem.forms.volume)
 
 

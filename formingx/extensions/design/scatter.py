@@ -39,22 +39,22 @@ class Band:
 
     @property
     def low(self) -> np.ndarray:
-        """Lower edge of the band, shape (m,)."""
+        """Lower edge of the confidence band of the m values, shape (m,)."""
         return self.value - self._width
 
     @property
     def high(self) -> np.ndarray:
-        """Upper edge of the band, shape (m,)."""
+        """Upper edge of the confidence band of the m values, shape (m,)."""
         return self.value + self._width
 
     @property
     def _width(self) -> np.ndarray:
-        """Half width of the band, shape (m,)."""
+        """Half width of the confidence band of the m values, shape (m,)."""
         from scipy.stats import norm
         return norm.ppf((1 + self.confidence) / 2) * self.deviation
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
-        """Draw the values and their band over `coordinates`.
+        """Draw the values of the output quantity and their confidence band over `coordinates`.
 
         Args:
             axes: matplotlib axes; default a new figure.

@@ -52,7 +52,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
         path: the computed `Path`.
 
     Yields:
-        A finding for each layer of which at least 0.5 % of the volume is deformed beyond the tests.
+        A finding for each layer of which 0.5 % of the volume or more is deformed beyond the tests.
     """
     problem, scene = path.problem, path.problem.scene
     known = dict(_tested(scene))

@@ -254,7 +254,7 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         return found.cost, guess, found.x
 
     def cost(trial: tuple) -> float:
-        """Return the cost of a result of `refined`, to sort by it."""
+        """Return the first element of a result of `refined`, its cost, to sort by it."""
         return trial[0]
 
     trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)

@@ -34,7 +34,7 @@ class Spectrum(NamedTuple):
 
     @property
     def viscosity(self) -> float:
-        """Zero-shear viscosity, the sum of modulus times relaxation time; stress times time."""
+        """Zero-shear viscosity of the melt, sum of modulus times relaxation time over the pairs; stress times time."""
         return math.fsum(G * tau for G, tau in self.pairs)
 
 
@@ -116,7 +116,7 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
         raise InputError(f"fit: {len(row)} points cannot fix the {len(names)} constants of {law.__name__}")
 
     def with_damping(damping: Damping) -> KBKZ:
-        """Return a copy of the material with another damping."""
+        """Return the melt with another damping; spectrum and equilibrium are unchanged."""
         return KBKZ(material.spectrum, damping, material.equilibrium, irreversible=material.integral.irreversible)
 
     def stress(x: np.ndarray) -> np.ndarray:

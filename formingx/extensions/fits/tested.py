@@ -116,7 +116,7 @@ class MeasuredRange:
 
     @property
     def single_mode(self) -> bool:
-        """True if all tested strains lie on one line with zero strain, as for tests of one mode."""
+        """True if all tests are of one mode: their strains lie on one line through zero strain."""
         return len(self._corners) < 3
 
     @cached_property

@@ -23,7 +23,7 @@ class _OfFile(SolidTool):
 
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
-    """Return the tool for its description in a checkpoint, {name of an attribute: value}."""
+    """Return the tool that a checkpoint stores as {attribute of the tool: value}, such as {"name": "mould.stl"}."""
     if "profile" not in shape:
         return _OfFile(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])

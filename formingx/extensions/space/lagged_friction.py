@@ -214,7 +214,15 @@ class LaggedFriction(LaggedStick):
         return rows, self._distances(x[rows])
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and normals at positions x, shape (n, 3); 0 for open points."""
+        """Return distances and normals of the points in contact, to predict them to first order in the next iteration.
+
+        Args:
+            x: positions relative to the tool, shape (n, 3), length.
+            old: history variables of the last accepted state.
+
+        Returns:
+            Distances and normals at x; 0 for open points. All slips are 0.
+        """
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
         rows, distances = self.contact_distances(x, old)

@@ -55,7 +55,7 @@ class PartInSpace(PartNumbers):
 
     @property
     def rows(self) -> list[tuple[str, str]]:
-        """Rows of a table of the part: (name of a number, its value with unit as text)."""
+        """Rows of a table of the formed part, (label, value with its unit), both as text."""
         deformed, reference = (", ".join(f"{v:.4g}" for v in position) for position in (
             self.min_wall_at, self.min_wall_reference))
         return self._rows(f"(x, y, z) = ({deformed}), from (X, Y) = ({reference})", []) + (

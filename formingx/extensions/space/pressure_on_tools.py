@@ -63,7 +63,10 @@ class PressureOnTools:
             metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
 
     def refresh(self) -> None:
-        """Update the nodes in contact and the normals of their tools to the present displacement; collective."""
+        """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
+
+        They are a mask of the nodes that slide on tools, their contact pressures, and the normals of the tools.
+        """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
         functions = (self._touches, self._normal, *self._hessian)

@@ -236,7 +236,7 @@ class _Size:
         self.refused: InputError | None = None
 
     def __call__(self, x: float, y: float) -> float:
-        """Return the edge length at a point (x, y); raise an InputError if it is not positive or cannot be computed."""
+        """Return the edge length of triangles at a point (x, y), length; raise an InputError unless it is positive."""
         where = f"sheet: size at ({x:.6g}, {y:.6g})"
         try:
             return positive(where, float(self._size(x, y)))
@@ -246,7 +246,7 @@ class _Size:
             raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
 
     def callback(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
-        """Return the edge length at a point (x, y), for gmsh; 1e22 where the user's function fails."""
+        """Return the edge length of triangles at a point (x, y), for gmsh; 1e22 where the user's function fails."""
         try:
             return self(x, y)
         except InputError as error:

@@ -46,7 +46,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     images = path.scene.symmetry.images(3)
 
     def draw():
-        """Draw the part and the grid, on rank 0."""
+        """Draw the part and the lines of the grid into the file, on rank 0."""
         pyvista = figures.pyvista()
         below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
@@ -119,7 +119,7 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
 
     def write(stream):
-        """Write nodes, elements and shell sections to an open text file."""
+        """Write nodes, elements and shell sections of the part to an open text file."""
         stream.write("** formed part: shells with the wall of each element\n*NODE\n")
         stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.now, 1))
         stream.write("*ELEMENT, TYPE=S3, ELSET=PART\n")
@@ -181,7 +181,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
 
     def make() -> None:
-        """Write the HTML page, on rank 0."""
+        """Write the HTML page of the report, on rank 0."""
         text = page.page(title or "Report of a run", body, scripts(drawn))
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)

@@ -49,7 +49,7 @@ class SolidTool:
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest coordinates of the vertices of `surface`, shape (2, 3), length."""
+        """Lowest and highest coordinates (x, y, z) of the drawn surface of the tool, shape (2, 3), length."""
         points = self.surface()[0]
         return np.array([points.min(0), points.max(0)])
 
@@ -217,7 +217,7 @@ class Swept(SolidTool):
         return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
 
     def _ring(self, r: float) -> np.ndarray:
-        """Return the curve of constant r in the plane of x and y as a polyline, shape (n, 2), length."""
+        """Return n points (x, y) of the curve that a point of the profile at r sweeps, shape (n, 2), length."""
         turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2

@@ -165,7 +165,7 @@ class _Always:
     """Check of the volume ratio that always holds, in place of `Admissible`: a membrane has J > 0."""
 
     def holds(self) -> bool:
-        """Return True."""
+        """Return True: the volume ratio of a membrane is positive in every state."""
         return True
 
     def furthest_volume_ratio(self) -> None:
