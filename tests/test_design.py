@@ -119,6 +119,8 @@ def test_bad_input_is_told_in_words():
     design = fx.Design(disc, {"c": 0.0})
     with pytest.raises(fx.InputError, match="nothing to fit"):
         design.fit()
+    with pytest.raises(fx.InputError, match="are both given: must be one of them"):
+        design.fit(wall=0.04, even=True)
     with pytest.raises(fx.InputError, match="no parameter has an effect"):
         fx.Design(lambda b: disc(), {"b": 1.0}).fit(wall=0.04, volume=None)
     with pytest.raises(fx.InputError, match="parameter 'd' is not known"):

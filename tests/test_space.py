@@ -490,6 +490,7 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
      "in three dimensions has no profile"),
     (lambda: fx.trace(disc(), until=fx.pole_height(0.1), progress=False), r"take displacement\(..., at="),
+    (lambda: fx.tools.box(half=(1.0, 1.0), depth=1.0, lip=0.1, plug=True), "lip = 0.1: a plug has no flange"),
     (lambda: fx.mesh.sheet([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), r"crosses or touches itself near \(0.5, 0.5\)"),
     (lambda: fx.mesh.sheet([(0, 0), (2, 0), (1, 0), (1, 1)], 0.1), "crosses or touches itself near"),
     (lambda: fx.mesh.sheet([(0, 0), (1, 0), (1, 0), (0, 1)], 0.1), r"the corner \(1, 0\) is there twice"),

@@ -135,11 +135,13 @@ class Design:
             First and best run of the search, and the reason for its end.
 
         Raises:
-            InputError: no target, or no parameter has an effect on it.
+            InputError: neither or both of `wall` and `even` are given, or no parameter has an effect on the wall.
             ConvergenceError: the first run fails.
         """
-        if (wall is None) == (not instance("fit: even", even, bool, "True or False")):
+        if not instance("fit: even", even, bool, "True or False") and wall is None:
             raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
+        if even and wall is not None:
+            raise InputError("fit: wall and even=True are both given: must be one of them")
         most, good = count("fit: runs", runs), positive("fit: good", good)
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")

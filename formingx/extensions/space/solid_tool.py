@@ -284,7 +284,7 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
     Args:
         half: half widths along x and y at the mouth (for a plug: at its upper end), length.
         depth: depth from the mouth to the floor, length.
-        corner: radius in plan at the mouth, length; with draft the radius at the floor is smaller, and must not be
+        corner: radius in plan at the mouth, length; with draft the radius at the floor is smaller, and should not be
             below `fillet`.
         fillet: radius between wall and floor, length.
         lip: radius between wall and flange, length; not for a plug.
@@ -296,7 +296,7 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
         The tool.
 
     Raises:
-        InputError: sizes that do not fit each other.
+        InputError: sizes that do not fit each other, or a plug with a lip.
 
     >>> tray = fx.tools.box(half=(60.0, 40.0), depth=20.0, corner=15.0, fillet=5.0)
     >>> tray.signed_distance([[0.0, 0.0, -18.0]]).tolist()
@@ -313,6 +313,8 @@ def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet:
         raise InputError(f"box: draft = {draft!r} degrees and fillet = {fillet!r}: leave no floor at depth {depth:g}")
     points = [(3 * r + lip, mouth), (r, mouth), (floor, mouth - depth), (0.0, mouth - depth)]
     if plug:
+        if lip:
+            raise InputError(f"box: lip = {lip!r}: a plug has no flange: must be left out")
         return Swept(Tool([*points[:1:-1], (r, mouth), (r, mouth + depth)], [0.0, fillet, 0.0, 0.0]), "box", (a, b),
                      corner)
     return Swept(Tool(points, [0.0, non_negative("box: lip", lip), fillet, 0.0]), "box", (a, b), corner)
