@@ -1,4 +1,4 @@
-"""Output quantities that every run records: the columns of a path."""
+"""Output quantities that a run records in each state, the columns of a path: standard and user-defined ones."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -17,13 +17,14 @@ Measure = Target | Callable[[Any], float]
 
 
 class _Recorded(Bound):
-    """Quantity that depends on more than the displacements; it cannot be interpolated between two states."""
+    """Base class of quantities that depend on more than the displacements; they cannot be interpolated between states.
+    """
 
     smooth = False
 
 
 class _Scalar(_Recorded):
-    """Function of the value of a scalar form."""
+    """Quantity f(value of a scalar form): `form` is UFL of rank 0, `function` is f."""
 
     def __init__(self, problem, form, function):
         self._problem, self._form, self._function = problem, problem.forms.compile(form), function
@@ -34,7 +35,10 @@ class _Scalar(_Recorded):
 
 
 class _Nodal(_Recorded):
-    """Sum or maximum of 0 and a quantity of each active contact."""
+    """Sum or maximum (`reduce`) of 0 and a quantity of each active contact.
+
+    `quantity` takes a contact, the owned unknowns and the control; `contacts` are all contacts of the problem if None.
+    """
 
     def __init__(self, problem, quantity, reduce, contacts=None):
         self._problem, self._quantity, self._reduce = problem, quantity, reduce
@@ -46,7 +50,7 @@ class _Nodal(_Recorded):
 
 
 class _Reaction(_Recorded):
-    """Force of the body on a driven support, given by its number in the scene."""
+    """Force of the body on a driven support along its component; `number` is the number of the support in the scene."""
 
     def __init__(self, problem, number):
         self._problem, self._number = problem, number
@@ -56,7 +60,7 @@ class _Reaction(_Recorded):
 
 
 class _Ratio(_Recorded):
-    """Relaxation of the pole stress, see `PoleStressRatio`."""
+    """Ratio of the stress at the pole to its equilibrium value, see `PoleStressRatio`."""
 
     def __init__(self, problem):
         self._problem, self._ratio = problem, PoleStressRatio(problem)
@@ -66,8 +70,8 @@ class _Ratio(_Recorded):
         return self._ratio.now()
 
 
-class _Own(_Recorded):
-    """User-defined function of the problem."""
+class _UserDefined(_Recorded):
+    """User-defined quantity: `function` takes the problem and returns a number; `name` is the name of its column."""
 
     def __init__(self, problem, name, function):
         self._problem, self._name, self._function = problem, name, function
@@ -82,18 +86,18 @@ class _Own(_Recorded):
 
 
 def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
-    """Return the user-defined columns.
+    """Return the output quantities that a user adds to the columns of a run.
 
     Args:
         problem: the `Problem`.
-        columns: {name: target, or function of the problem}.
-        taken: existing columns.
+        columns: {name of a column: a target, or a function that takes the problem and returns a number}.
+        taken: {name of an existing column: its quantity}.
 
     Returns:
-        {name: quantity}.
+        {name of a column: quantity}.
 
     Raises:
-        InputError: a name that exists or is no word, or a column that is neither a target nor a function.
+        InputError: a name exists already or is no word, or a value of `columns` is neither a target nor a function.
     """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")
@@ -105,47 +109,51 @@ def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]
         if isinstance(measure, Target):
             found[name] = measure.bind(problem)
         elif callable(measure):
-            found[name] = _Own(problem, name, measure)
+            found[name] = _UserDefined(problem, name, measure)
         else:
             raise InputError(f"record: {name} = {measure!r}: must be a function of the problem, or a target")
     return found
 
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
-    """Return the output quantities that every run records, by column name.
+    r"""Return the output quantities that every run records.
 
     Energies, volumes, areas and forces belong to the whole part, tool and support, also where a half or a quarter is
     modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
 
-    - pressure, travel (length): controlled quantities. Several controls have a column each, such as plug_travel
-      (`Scene.column`).
-    - pole_height (length), pole_stretch: with an axis.
-    - enclosed_volume (length^3): with a controlled pressure.
-    - strain_energy (stress length^3).
-    - mass_error: volume over its original value, minus 1; volume_error: root mean square of J - 1. Both are relative to
-      the thermally expanded volume.
-    - sag (length): with `Gravity`, the largest downward displacement.
-    - contact_length: with contacts, the reference length in contact; in three dimensions contact_area (deformed) and
-      reference_contact_area.
-    - penetration (length): with contacts, of the deepest node.
-    - tool_force: force of the body on the only tool, otherwise plug_force for a tool named "plug", tool_1_force for one
-      without a name. The force counts along the travel, positive when it resists; for a fixed tool along Z, positive
-      upwards.
-    - support_force: with a driven support, force of the body on it along its component; plug_force if it is named
+    - pressure (stress), travel (length): controlled quantities. Several controls have a column each, such as
+      plug_travel (`Scene.column`).
+    - pole_height (length), pole_stretch: for a body with a boundary "axis".
+    - enclosed_volume (length^3): for a scene with a controlled pressure.
+    - strain_energy (stress length^3): recoverable energy of the body.
+    - mass_error, volume_error: mean and root mean square of J - 1 over the reference volume V,
+
+      .. math:: \frac{1}{V} \int (J - 1) \, dV, \qquad \left[\frac{1}{V} \int (J - 1)^2 \, dV\right]^{1/2}
+
+      with the volume ratio J to the thermally expanded body.
+
+    - sag (length): largest downward displacement, for a scene with `Gravity`.
+    - contact_length (length): reference length in contact, for a section with contacts. In three dimensions the columns
+      are contact_area (deformed) and reference_contact_area (length^2).
+    - penetration (length): penetration of the deepest contact point, for a scene with contacts.
+    - tool_force: force of the body on the only tool; of several tools, tool_1_force for the first contact. A tool named
+      "plug" also has plug_force. The force counts along the travel, positive when it resists; for a fixed tool along Z,
+      positive upwards.
+    - support_force: force of the body on a driven support along its component; plug_force if the support is named
       "plug" and there are several controls.
-    - process_time: with `timed`.
-    - dissipated_power (stress length^3 over time): with relaxing materials, and in a run its integral dissipated_energy
-      (stress length^3).
-    - pole_stress_ratio: with relaxing materials, an axis and a known equilibrium, the Mises stress at the pole over its
-      equilibrium value (`PoleStressRatio`).
-    - damage_energy (stress length^3): with a rate-independent history.
+    - process_time (time): if `timed`.
+    - dissipated_power (stress length^3 over time): for relaxing materials. A run also records its integral,
+      dissipated_energy (stress length^3).
+    - pole_stress_ratio: Mises stress at the pole over its equilibrium value (`PoleStressRatio`), for relaxing materials
+      with a known equilibrium and a body with a boundary "axis".
+    - damage_energy (stress length^3): energy dissipated by damage, for materials with a rate-independent history.
 
     Args:
         problem: the `Problem`.
-        timed: True for the column of the process time.
+        timed: True to record the process time.
 
     Returns:
-        {column: quantity}.
+        {name of a column: quantity}.
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     energy = scene.symmetry_factor * forms.stress * volume

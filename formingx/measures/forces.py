@@ -1,4 +1,4 @@
-"""Force of the body on a controlled item, a support or a tool, as a target."""
+"""Force of the body on a controlled support or tool, as the target of a run."""
 
 from typing import Any
 
@@ -13,24 +13,26 @@ from .targets import Target
 
 
 def resisting(contact: Any) -> np.ndarray:
-    """Return the direction in which the force of the body on a tool counts.
+    r"""Return the direction in which the force of the body on a tool counts as positive.
+
+    .. math:: -\frac{m}{|m|}
 
     Args:
-        contact: the `Contact`.
+        contact: the `Contact`; m is its motion per unit of travel (`Contact.way`).
 
     Returns:
-        Unit vector, shape (components,), against the travel; +Z for a fixed tool.
+        Unit vector against the travel, shape (components,); +Z for a fixed tool.
     """
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
-    """Return the ratio of the force on a whole tool to the force on its modelled part.
+    """Return the ratio of the force on a whole tool to the force on its part in the model.
 
     Args:
         scene: the `Scene`.
-        contact: contact of the tool.
+        contact: the `Contact` of the tool.
 
     Returns:
         The ratio, a power of 2.
@@ -39,7 +41,7 @@ def tool_factor(scene: Any, contact: Any) -> int:
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the ratio of the force on a whole driven support to the force on its modelled part.
+    """Return the ratio of the force on a whole driven support to the force on its part in the model.
 
     Args:
         scene: the `Scene`.
@@ -55,14 +57,18 @@ def support_factor(scene: Any, support: Any) -> int:
 
 
 def force(value: float, *, of: str | None = None) -> Target:
-    """Return the target that the force of the body on a controlled support or tool reaches a value.
+    r"""Return the target that the force of the body on a controlled support or tool reaches a value.
 
-    The force on a support counts along its component, on a tool against its travel, positive when it resists. It is the
-    force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`).
+    The force on a support counts along the driven component. The force on a tool counts against its motion m, positive
+    when it resists. With the tractions t of the body on the tool
+
+    .. math:: F = -\frac{m}{|m|} \cdot \int_{\Gamma_c} t \, dA
+
+    It is the force on the whole tool or support, also where a half or a quarter is modelled (`Scene.symmetry_factor`).
 
     Args:
         value: the force, stress length^2; in plane strain per unit depth, stress length.
-        of: name of the support or tool; None for the controlled one.
+        of: name of the support or tool; None for the only one that the run or the stage controls.
 
     Returns:
         The target.
@@ -90,7 +96,7 @@ def force(value: float, *, of: str | None = None) -> Target:
 
 
 class _SupportForce(Bound):
-    """Force of the body on a driven support, given by its number in the scene."""
+    """Force of the body on a driven support along its component; `number` is the number of the support in the scene."""
 
     smooth = False
 
@@ -121,7 +127,7 @@ class _SupportForce(Bound):
 
 
 class _ToolForce(Bound):
-    """Force of the body on a tool, against its travel."""
+    """Force of the body on a tool, positive against its travel; `contacts` are the contact faces of the tool."""
 
     smooth = False
 

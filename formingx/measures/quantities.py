@@ -1,4 +1,4 @@
-"""Output quantities of a problem: the base class, linear and integral quantities, the sag."""
+"""Output quantities of a problem: base class, linear forms of the displacements, integrals, and the sag."""
 
 from functools import cached_property
 from typing import Any
@@ -10,21 +10,23 @@ from ..mesh.nodes import of_space
 
 
 class Bound:
-    """Output quantity of one problem: its value, and the equation quantity = target for a run with this target.
+    """Base class of output quantities of one problem, such as the height of its pole.
+
+    A quantity has a value in a state, and an equation that fixes this value at the target of a run.
 
     Attributes:
-        size: scale of the quantity, in the user's units: differences below 1e-12 of it are round-off.
-        smooth: True if it is a smooth function of the displacements and the control alone.
+        size: scale of the quantity, in the user's units; differences below 1e-12 times `size` are round-off.
+        smooth: True if the quantity is a smooth function of the displacements and the control alone.
     """
 
     size = 0.0
     smooth = True
 
     def value(self, x: Any, control: float) -> float:
-        """Return the value in a state.
+        """Return the value of the quantity in a state.
 
         Args:
-            x: unknowns.
+            x: unknowns of the problem (PETSc vector).
             control: dimensionless control.
 
         Returns:
@@ -33,23 +35,26 @@ class Bound:
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
-        """Return the equation c = 0 of a target value.
+        r"""Return the equation that the quantity equals a target value, as a dimensionless residual c.
+
+        .. math:: c(x, \lambda) = 0
 
         Args:
             target: the target value, in the user's units.
 
         Returns:
-            Function (x, control, gradient) -> (c, dc/dcontrol) that sets the vector `gradient` to dc/dx.
+            Function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, and sets the
+            vector to dc/dx.
         """
         raise NotImplementedError
 
 
 class OfWholePart(Bound):
-    """Quantity of the modelled part times a factor for its images (`Scene.symmetry`).
+    """Output quantity of the whole part, where a half, a quarter or an eighth is modelled (`Scene.symmetry`).
 
     Args:
-        modelled: quantity of the modelled part.
-        factor: factor for the images.
+        modelled: quantity of the modelled body.
+        factor: number of images of the modelled body that count; the quantity is multiplied by it.
     """
 
     def __init__(self, modelled: Bound, factor: int):
@@ -64,14 +69,16 @@ class OfWholePart(Bound):
 
 
 class Linear(Bound):
-    """Function of a linear form, f(offset + row . x).
+    r"""Output quantity that is a function of a linear form of the unknowns x.
+
+    .. math:: f(y_0 + a \cdot x)
 
     Args:
         problem: the `Problem`.
-        row: row, locally owned entries, shape (n,).
-        offset: the offset.
-        function: function f.
-        inverse: inverse of f.
+        row: coefficients a of the linear form, locally owned entries, shape (n,).
+        offset: value y_0 of the form for x = 0.
+        function: function f; the default is the identity.
+        inverse: inverse function of f.
     """
 
     def __init__(self, problem, row, offset=0.0, function=lambda y: y, inverse=lambda v: v):
@@ -91,13 +98,15 @@ class Linear(Bound):
 
 
 class Form(Bound):
-    """Offset plus scale times the value of a scalar form.
+    r"""Output quantity that is an integral over the body or its boundary.
+
+    .. math:: q_0 + s \, I(x)
 
     Args:
         problem: the `Problem`.
-        form: UFL form of rank 0.
-        scale: the scale.
-        offset: the offset.
+        form: integral I, a UFL form of rank 0 in the unknowns, dimensionless.
+        scale: factor s of the integral, in the user's units.
+        offset: constant q_0, in the user's units.
     """
 
     def __init__(self, problem, form, scale, offset=0.0):
@@ -106,7 +115,7 @@ class Form(Bound):
 
     @cached_property
     def _derivative(self):
-        """Compiled derivative of the form."""
+        """Compiled derivative of the integral by the unknowns."""
         forms = self._problem.forms
         return forms.compile(ufl.derivative(self._form, forms.w, forms.test_function()))
 
@@ -123,7 +132,9 @@ class Form(Bound):
 
 
 class Sag(Bound):
-    """Downward displacement of the lowest node; among equal ones the first.
+    r"""Largest downward displacement of a node; the displacement counts from the first mesh of a run.
+
+    .. math:: \max(0, \max_i(-u_{z,i}))
 
     Args:
         problem: the `Problem`.
@@ -145,7 +156,7 @@ class Sag(Bound):
             self._so_far = (nodes_at - brought.first_places(nodes_at))[:, -1] / forms.length
 
     def _deepest(self, x: Any) -> tuple[float, int]:
-        """Return the sag over length, and the rank of the node."""
+        """Return the sag over the length of the body, and the rank that owns the lowest node; `x`: unknowns."""
         mine = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
         found = self._problem.comm.allgather(float(mine))
         return max(found), int(np.argmax(found))

@@ -1,4 +1,4 @@
-"""Relaxation of a body: pole stress over its equilibrium value, elastic stretches of branches."""
+"""Measures of the relaxation of a body: pole stress over its equilibrium value, elastic stretches of branches."""
 
 from typing import Any
 
@@ -15,18 +15,18 @@ _NONE = 1e-10
 """Stress over the shear modulus below which a stress counts as zero."""
 
 _STRAIN = 1e-6
-"""Equibiaxial strain that is added where the stresses are zero: their ratio is then the ratio of the moduli."""
+"""Equibiaxial strain that is added if the stresses are zero: the ratio of stresses is then the ratio of the moduli."""
 
 
 class PoleStressRatio:
-    r"""Mises stress at the pole over its equilibrium value, after complete relaxation at the same F.
+    r"""Ratio of the Mises stress at the pole to its value after complete relaxation at the same deformation.
 
-    Both stresses are means over the reference volume of the elements at the axis, at their quadrature points:
+    Both stresses are means over the reference volume of the elements at the axis:
 
     .. math:: \sigma = \sqrt{\tfrac{3}{2}} \, |\mathrm{dev}(P F^T)|, \qquad P = \frac{\partial W}{\partial F}
 
-    W is the stored energy or `Material.equilibrium_energy`. In the equibiaxial state of a pole, sigma is the stress
-    along the sheet minus the stress through its thickness.
+    W is `Material.stored_energy` for the present stress, `Material.equilibrium_energy` for the relaxed stress. In the
+    equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness.
 
     Args:
         problem: the `Problem`.
@@ -48,20 +48,20 @@ class PoleStressRatio:
 
     @staticmethod
     def known(problem: Any) -> bool:
-        """Check whether the scene has a pole and a known equilibrium stress in all materials.
+        """Check whether the ratio is defined: a boundary "axis", and an equilibrium energy of every material.
 
         Args:
             problem: the `Problem`.
 
         Returns:
-            True if it has both.
+            True if the ratio is defined.
         """
         forms = problem.forms
         return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
                                                        for t in forms.terms)
 
     def now(self) -> float:
-        """Return the ratio for the current fields of the forms; collective.
+        """Return the ratio of stresses for the current fields of the forms of the problem; collective.
 
         Returns:
             The ratio.
@@ -74,7 +74,10 @@ class PoleStressRatio:
         return float(stored / relaxed)
 
     def _integrals(self) -> np.ndarray:
-        """Return the integrals of both stresses and of the largest modulus over the elements at the pole, all ranks."""
+        """Return the integrals of present stress, relaxed stress and largest modulus over the elements at the pole.
+
+        Shape (3,), equal on all ranks; collective.
+        """
         totals = np.zeros(3)
         for expression, cells in self._parts:
             if len(cells):
@@ -83,7 +86,7 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """Return the integrands of a material for `_integrals`, times the volume weight."""
+        """Return the integrands of `_integrals` times the reference volume, for the `MaterialTerms` of a material."""
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -95,14 +98,17 @@ class PoleStressRatio:
 
 
 class ElasticStretches:
-    """Largest principal elastic stretch of each branch, projected to linear functions in each element.
+    """Largest principal elastic stretch of each relaxing branch, at n points of every cell.
+
+    The values at quadrature points are projected to a linear function in each cell, by least squares. See
+    `Material.elastic_stretches`.
 
     Args:
         problem: the `Problem`.
-        places: positions in the reference cell, shape (n, dimension).
+        places: positions of the points in the reference cell, shape (n, 2).
 
     Attributes:
-        count: largest number of branches of a material.
+        count: largest number of branches of a material; 0 if no material relaxes.
     """
 
     def __init__(self, problem: Any, places: np.ndarray):
@@ -124,13 +130,13 @@ class ElasticStretches:
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def now(self, cells: int) -> np.ndarray:
-        """Return the stretches for the current fields of the forms.
+        """Return the elastic stretches for the current fields of the forms of the problem.
 
         Args:
             cells: number of locally owned cells.
 
         Returns:
-            Stretches, shape (cells, n, branches); nan where a material has fewer branches.
+            Stretches, shape (cells, n, count); nan for branches that a material does not have.
         """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:

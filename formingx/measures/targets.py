@@ -14,13 +14,14 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 
 
 class Amplitude(Bound):
-    """Amplitude of an item of the scene, of the process time or of the control, as an output quantity.
+    """Output quantity that is a pressure, a travel, the process time or the control itself.
 
-    For a load that a stage deactivates or activates, it is the part of the amplitude that acts on the body.
+    For a load that a stage deactivates or activates, it is the part of the load that acts on the body.
 
     Args:
         problem: the `Problem`.
-        number: number of the item in the scene; -1 for the process time, None for the control.
+        number: number in `Scene.items` of the item with this pressure or travel; -1 for the process time, None for the
+            control.
     """
 
     def __init__(self, problem: Any, number: int | None):
@@ -40,7 +41,7 @@ class Amplitude(Bound):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return the dimensionless amplitude of the item at a value of the control; for number -1, the process time."""
+        """Return the quantity at a value of the control, dimensionless; the process time in the user's unit of time."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -49,11 +50,26 @@ class Amplitude(Bound):
         return (setting.acting if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
-        """Return the amplitude of the item at a value of the control, in the user's units; `x` has no influence."""
+        """Return the quantity at a value of the control.
+
+        Args:
+            x: not used.
+            control: dimensionless control.
+
+        Returns:
+            The quantity, in the user's units.
+        """
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
-        """Return the constraint "amplitude = target", linear in the control; `target` is in the user's units."""
+        """Return the equation that the quantity equals a target value; it is linear in the control.
+
+        Args:
+            target: the target value, in the user's units.
+
+        Returns:
+            Function as in `Bound.equation`.
+        """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
         if self._acts and setting.fading:                    # the load fades, or grows, as the control goes to 1
@@ -73,7 +89,8 @@ class Target(NamedTuple):
         name: name of the output quantity.
         value: its target value, in the user's units.
         bind: function that takes a `Problem` and returns the output quantity of this problem (`Bound`).
-        signed: True if the quantity changes sign with the control.
+        signed: True if the quantity changes sign with the control; False for a stretch, which may grow in both
+            directions of the control.
     """
 
     name: str
@@ -90,7 +107,7 @@ def pressure(value: float, *, of: str | None = None) -> Target:
 
     Args:
         value: the pressure, stress.
-        of: name of the load; None for the controlled one.
+        of: name of the load; None for the only pressure that the run or the stage controls.
 
     Returns:
         The target.
@@ -102,11 +119,11 @@ def pressure(value: float, *, of: str | None = None) -> Target:
 
 
 def travel(value: float, *, of: str | None = None) -> Target:
-    """Return the target that a controlled support or tool has moved by a length.
+    """Return the target that a controlled support or tool has moved by a length from its initial position.
 
     Args:
         value: the travel, length.
-        of: name of the support or tool; None for the controlled one.
+        of: name of the support or tool; None for the only one that the run or the stage controls.
 
     Returns:
         The target.
@@ -118,10 +135,10 @@ def travel(value: float, *, of: str | None = None) -> Target:
 
 
 def process_time(value: float) -> Target:
-    """Return the target that the process time reaches a value.
+    """Return the target that the process time, counted from the beginning of the process, reaches a value.
 
     Args:
-        value: the time.
+        value: the process time.
 
     Returns:
         The target.
@@ -132,9 +149,10 @@ def process_time(value: float) -> Target:
 
 
 def changed() -> Target:
-    """Return the target that the change of the active items between two stages is complete (`StepData.fading`).
+    """Return the target that a change of the active loads, supports and tools between two stages is complete.
 
-    Meanwhile the control goes from 0 to 1, and the unbalanced forces fade to zero.
+    The change leaves forces out of balance. They decrease to 0 while the control goes from 0 to its target 1
+    (`StepData.fading`).
 
     Returns:
         The target.
@@ -143,12 +161,12 @@ def changed() -> Target:
 
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
-    """Return the target of a controlled quantity.
+    """Return the target that a controlled pressure or travel reaches a value.
 
     Args:
         quantity: "pressure" or "travel".
-        value: the target value, in the user's units.
-        of: name of the item; None for the item that is controlled.
+        value: the target value, stress or length.
+        of: name of the load, support or tool; None for the only one that the run or the stage controls.
 
     Returns:
         The target. Its `bind` raises an InputError if the scene has no such item, or several of them.
@@ -164,7 +182,7 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
         if len(moving) != 1:
             raise InputError(f"{quantity} = {value:g}: the scene has {len(moving) or 'no'} {quantity} that can be"
                              " driven" + (", say which with of=..." if moving
-                                          else f": what can be is {scene.drivable}"))
+                                          else f"; items that can be driven are {scene.drivable}"))
         return Amplitude(problem, moving[0])
     return Target(quantity if of is None else f"{of}_{quantity}", finite(quantity, value), bind)
 
@@ -175,7 +193,7 @@ def pole_height(value: float) -> Target:
     The pole is the material point on the axis at mid-thickness in the reference configuration.
 
     Args:
-        value: the displacement, length.
+        value: the displacement u_z, length.
 
     Returns:
         The target.
@@ -210,10 +228,13 @@ def pole_stretch(value: float) -> Target:
 
 
 def enclosed_volume(value: float) -> Target:
-    """Return the target that the volume swept by the face under the controlled pressure reaches a value.
+    r"""Return the target that the volume swept by the face under the controlled pressure reaches a value.
 
-    The volume lies between the reference and the deformed face; straight lines close it where an end of the face has
-    moved. Where a half or a quarter is modelled, the value is the volume of the whole part (`Scene.symmetry_factor`).
+    .. math:: V = -\int_0^1 \int_{\Gamma} u \cdot a(t u) \, dS \, dt
+
+    Here a(t u) is the area vector of the face at the displacement t u (`Kinematics.area_vector`). The volume lies
+    between the reference and the deformed face; straight lines close it where an end of the face has moved. Where a
+    half or a quarter is modelled, V is the volume of the whole part (`Scene.symmetry_factor`).
 
     Args:
         value: the volume, length^3; in plane strain per unit depth, length^2.
@@ -228,18 +249,19 @@ def enclosed_volume(value: float) -> Target:
 
 
 def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
-    """Return the target that a displacement component of a reference point reaches a value.
+    """Return the target that a displacement component of a material point reaches a value.
 
     Args:
         value: the displacement, length.
-        at: reference position (R, Z), for a sheet in three dimensions (x, y), length.
+        at: position of the point in the reference configuration, (R, Z), for a sheet in three dimensions (x, y),
+            length.
         component: "r" or "z"; in three dimensions "x", "y" or "z".
 
     Returns:
         The target.
 
     Raises:
-        InputError: an unknown component.
+        InputError: the component is unknown.
 
     >>> fx.displacement(3.0, at=(5.0, 0.0)).name
     'u_z_at_5_0'
@@ -256,10 +278,10 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
 
 def sag(value: float) -> Target:
-    """Return the target that the largest downward displacement (along -Z) of the body reaches a value.
+    """Return the target that the sag of the body, its largest displacement along -Z, reaches a value.
 
     Args:
-        value: the displacement, length, positive.
+        value: the sag, length, positive.
 
     Returns:
         The target.
@@ -286,10 +308,9 @@ def bind_pole_height(problem: Any) -> Bound:
 
 
 def bind_pole_stretch(problem: Any) -> Bound:
-    """Return the in-plane stretch of the sheet on the axis, at the pole, as an output quantity.
+    """Return the in-plane stretch of the sheet at the pole, on the axis, as an output quantity.
 
-    In a solid the stretch follows from the thickness on the axis, by incompressibility. In a membrane it is 1 +
-    du_r/dR, on the mid-surface. On a remeshed body the thickness counts from the first mesh.
+    `pole_stretch` defines the stretch. On a remeshed body the thickness h_0 is the thickness on the first mesh.
 
     Args:
         problem: the `Problem`.
@@ -307,7 +328,7 @@ def bind_pole_stretch(problem: Any) -> Bound:
 def bind_volume(problem: Any) -> Bound:
     """Return the volume swept by the face under the controlled pressure as an output quantity.
 
-    It is the volume of the whole part, also where only a half or a quarter is modelled.
+    `enclosed_volume` defines the volume. It belongs to the whole part, also where a half or a quarter is modelled.
 
     Args:
         problem: the `Problem`.
@@ -319,9 +340,9 @@ def bind_volume(problem: Any) -> Bound:
 
 
 def _volume(problem: Any) -> Bound:
-    """Return the volume swept by the loaded face of the modelled part as an output quantity.
+    """Return the volume swept by the loaded face of the modelled body as an output quantity.
 
-    On a remeshed body it includes the volume that the face swept on the meshes before.
+    On a remeshed body it includes the volume that the face swept on earlier meshes.
     """
     so_far = 0.0
     if problem.scene.preformed is not None:
@@ -332,15 +353,18 @@ def _volume(problem: Any) -> Bound:
 
 
 def _unit_of_volume(forms: Any) -> float:
-    """Return the unit of the dimensionless volume, length^3; in plane strain per unit depth, length^2."""
+    """Return the cube of the length scale of the forms; in plane strain, where volumes are per unit depth, its square.
+    """
     return forms.length**forms.scene.kinematics.dimension_of_volume
 
 
 def swept_volume(problem: Any) -> Any:
-    """Return the scalar form of the volume swept by the loaded face of the modelled part, over the unit of volume.
+    r"""Return the form of the volume swept by the loaded face of the modelled body, over the cube of the length scale.
 
-    The volume is minus the integral of u . n da over the face, which moves from X to X + u. The area vector of X + t u
-    is of degree 2 in t (axisymmetric), so the two-point Gauss rule in t is exact.
+    .. math:: V = -\int_0^1 \int_{\Gamma} u \cdot a(t u) \, dS \, dt
+
+    The area vector a of the face at the displacement t u is of degree 2 in t for an axisymmetric body, so the two-point
+    Gauss rule in t is exact.
 
     Args:
         problem: the `Problem`.
@@ -349,7 +373,7 @@ def swept_volume(problem: Any) -> Any:
         The form (UFL, rank 0), dimensionless.
 
     Raises:
-        InputError: no controlled pressure with a face.
+        InputError: the scene has no controlled pressure with a face.
     """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
@@ -362,12 +386,12 @@ def swept_volume(problem: Any) -> Any:
 
 
 def _displacement(problem, points, factors):
-    """Return a weighted sum of the displacements of reference points as an output quantity.
+    """Return a weighted sum of displacement components of material points as an output quantity.
 
     Args:
         problem: the `Problem`.
-        points: reference positions, shape (n, 2), length.
-        factors: weights of the displacement components, shape (n, components).
+        points: reference positions of the points, shape (n, 2), length.
+        factors: weights of the displacement components of the points, shape (n, components).
 
     Returns:
         The quantity, length.
@@ -378,7 +402,7 @@ def _displacement(problem, points, factors):
 
 
 def _pole(problem):
-    """Return the axial coordinates Z of the bottom and of the top of the body on the axis, on the first mesh, length.
+    """Return the axial coordinates Z of the lowest and of the highest node on the axis, on the first mesh, length.
 
     Raises:
         InputError: the mesh has no boundary named "axis".
@@ -392,7 +416,9 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    """Check whether the value of an output quantity equals its target to round-off (1e-12, relative).
+    r"""Check whether the value v of an output quantity equals its target v* to round-off.
+
+    .. math:: |v - v^*| \le 10^{-12} \max(|v|, |v^*|, size)
 
     Args:
         target: the target.
