@@ -401,7 +401,7 @@ AT_REST = Stage("up", control="air", until=fx.pressure(0.1))
      "'b': tools overlap.*at travel 2.0.*into each other"),
     (lambda: run(plugged(more=[FLOOR]), Stage("b", amplitudes={"plug": [(1, 2.5)]}, step=STEP)), "'b': tools overlap"),
     (lambda: run(plugged(plug=tools.cylinder(radius=12, z=0.5)), plug("a", 1)), "'a'.*whole height.*'rim'"),
-    (lambda: plugged(more=[fx.Contact("top", PLUG, direction=(1, -1), name="plug")]), "two things are called 'plug'"),
+    (lambda: plugged(more=[fx.Contact("top", PLUG, direction=(1, -1), name="plug")]), "two items are called 'plug'"),
 ])
 def test_bad_input(make, words):
     with pytest.raises(fx.InputError, match=words):

@@ -323,9 +323,11 @@ def test_axes_of_a_sheet_in_space_are_x_and_y(tmp_path):
             disc(**given)
     (tmp_path / "T.csv").write_text("x,T\n0,100\n2,120\n")
     assert disc(material=warm, temperature=tmp_path / "T.csv").temperature.T.x.array.max() == pytest.approx(110)
-    with pytest.raises(fx.InputError, match="must have T, and x, y or both"):
-        (tmp_path / "T.csv").write_text("R,T\n0,100\n2,120\n")
-        disc(material=warm, temperature=tmp_path / "T.csv")
+    for text, words in (("R,T\n0,100\n2,120\n", "must have T, and x, y or both"),
+                        ("x,T\n0,100\n2,120\n0,110\n", "two temperatures, 100 and 110, at x = 0")):
+        (tmp_path / "T.csv").write_text(text)
+        with pytest.raises(fx.InputError, match=words):
+            disc(material=warm, temperature=tmp_path / "T.csv")
 
 
 def plug_above(separates):

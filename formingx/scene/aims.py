@@ -13,16 +13,17 @@ from .scene import Scene
 _NEAR = 1e-5           # distance over the body's length up to which a point is on a boundary
 _MOST = 1e9            # largest plausible pressure over shear modulus, or travel over the body's length
 _SQUARES = 200         # number of squares along a mould's larger side
-_ROOMY = 1.05, 1.005   # largest ratio of a volume to the one counted in squares, over a flat body and around a tube
+_MARGINS = 1.05, 1.005  # largest ratio of a volume to its count in squares, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
-    """Check that the targets of a run can be reached, as far as is known.
+    """Check that the targets of a run can be reached, as far as the scene tells without a run.
 
     Args:
         scene: the `Scene`.
         targets: the targets.
-        inactive: see `unreachable`.
+        inactive: numbers in `Scene.items` of the items that a stage leaves out; None for a run from the unloaded state
+            with one control.
 
     Raises:
         InputError: a target cannot be reached.
@@ -34,12 +35,13 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
 
 
 def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None) -> str | None:
-    """Return the reason why no run reaches a target.
+    """Return the reason why no run of a scene can reach a target.
 
     Args:
         scene: the `Scene`.
-        target: target with `name` and `value`.
-        inactive: numbers of the items that a stage leaves out; None for a run from the unloaded state with one control.
+        target: the target, with `name` and `value`.
+        inactive: numbers in `Scene.items` of the items that a stage leaves out; None for a run from the unloaded state
+            with one control.
 
     Returns:
         The reason as text; None if no reason is known.
@@ -51,7 +53,7 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])
         if value >= largest:
-            return f"must be less than {largest:.6g}, where I1 comes to the limit {material.largest_I1:g} of {material}"
+            return f"must be less than {largest:.6g}, where I1 reaches the limit {material.largest_I1:g} of {material}"
     if inactive is None and driven is not None and name in ("pressure", "travel"):
         if name != driven.quantity:
             return f"the run drives {driven!r}, which has no {name}"
@@ -72,23 +74,23 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
         for contact in moulds if scene.kinematics.components == 2 else ():
-            room, error = _room(scene, contact)
+            room, margin = _room(scene, contact)
             room *= scene.symmetry_factor
-            if value > error * room:
+            if value > margin * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
     return None
 
 
 def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
-    """Return the reason why a pressure or a travel is implausibly large.
+    """Return the reason why a pressure or a travel is implausibly large for a scene.
 
     Args:
         scene: the `Scene`.
-        quantity: "pressure", "travel", or another quantity, which is not checked.
-        value: its value, stress or length.
+        quantity: "pressure" or "travel"; another quantity is not checked.
+        value: value of the quantity, stress or length.
 
     Returns:
-        The reason as text, or None.
+        The reason as text; None if the value is plausible.
     """
     units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
              "travel": ("the length of the body", float(max(scene.extent)))}
@@ -101,7 +103,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 
 def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """Return the support that constrains the displacement of a `displacement` target (u_r_at_R_Z), or None."""
+    """Return the support that constrains a displacement, or None; `name` is the name u_r_at_R_Z of a target."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
@@ -115,7 +117,7 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
 
 
 def _beyond(scene: Scene, contact: Any, height: float) -> bool:
-    """Return True if at a pole height the pole would lie deeper in the tool than the thickness of the body."""
+    """Return True if a pole at this height would lie deeper in the tool of a contact than the thickness of the body."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
@@ -125,15 +127,15 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _room(scene: Scene, contact: Any) -> tuple[float, float]:
-    """Return the volume between a flat body and its mould, and an upper bound of its error as a factor.
+    """Return the volume between a body and its mould, and the largest plausible ratio of the true volume to it.
 
-    Squares outside the tool are counted if they are connected with the body in the reference configuration. The volume
-    is infinite if the mould is open. `_room_of_tube` treats a closed tube.
+    For a flat body, squares outside the tool are counted if they are connected with the body in the reference
+    configuration. The volume is infinite if the mould is open. `_room_of_tube` treats a tube.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
     if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
-        return _room_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _ROOMY[1]
+        return _room_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _MARGINS[1]
     low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
     outline = contact.tool.bounds[1]
@@ -151,7 +153,7 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
     if inside[-1].any() or inside[:, -1].any():
         return np.inf, 1.0
     volume = float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
-    return volume, _ROOMY[0]
+    return volume, _MARGINS[0]
 
 
 def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Check of the clearance between the tools of a process, before anything is solved."""
+"""Check that the tools of a process do not overlap, before anything is solved."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -14,15 +14,15 @@ _MOST = 1000           # largest number of points of a tool in three dimensions 
 
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
-    """Check that tools do not overlap in a stage, and that none passes through a constrained boundary.
+    """Check that the tools do not overlap in the stages of a process, and that none passes a constrained boundary.
 
-    A travel may be unknown before the run, as in a stage that ends at a pole height. Its tool is not checked from there
-    on.
+    The travel of a tool may be unknown before the run, as in a stage that ends at a pole height. The tool is not
+    checked from there on.
 
     Args:
         scene: the `Scene`.
         plans: plans of the stages (`formingx.solve.stage.Plan`).
-        travels: travels at the beginning, {number: length}; default 0.
+        travels: travels of the tools at the beginning, {number in `Scene.items`: length}; None: all are 0.
 
     Returns:
         The plans with an unknown travel at their beginning, to be checked again when the run reaches them.
@@ -32,10 +32,10 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
     """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
-    travels, unsure = travels or dict.fromkeys(tools, 0.0), []
+    travels, unknown = travels or dict.fromkeys(tools, 0.0), []
     for plan in plans:
         if not all(map(np.isfinite, travels.values())):
-            unsure.append(plan)
+            unknown.append(plan)
         present = {i: tool for i, tool in tools.items() if i not in plan.inactive}
         for where in _piece_ends(plan, travels):
             for i in (i for i in present if where[i] != travels[i] and np.isfinite(where[i])):
@@ -47,11 +47,14 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
                 now = {i: travels[i] + part * (where[i] - travels[i]) for i in tools}
                 _check_overlap(scene, plan.stage.label, present, outlines, now)
             travels = where
-    return unsure
+    return unknown
 
 
 def _piece_ends(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Yield the travels of all tools at the ends of the linear pieces of a stage, {number: length}."""
+    """Yield the travels of all tools, {number in `Scene.items`: length}, at the ends of the linear pieces of a stage.
+
+    `travels` are the travels at the beginning of the stage. A travel that the stage determines only in the run is nan.
+    """
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
             yield travels | {i: float(np.interp(time, *table.T)) for i, table in plan.tables
@@ -64,7 +67,11 @@ def _piece_ends(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, floa
 
 def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
                    where: dict[int, float]) -> None:
-    """Raise an InputError if two active tools overlap at given travels."""
+    """Raise an InputError if two active tools overlap at given travels.
+
+    `present` are the contacts of the active tools, `outlines` points on the tools and `where` the travels of the tools,
+    each {number in `Scene.items`: value}; `caller` begins the message.
+    """
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
@@ -83,7 +90,10 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
-    """Return points on a tool's profile, shape (n, 2), or in three dimensions on its surface, shape (n, 3), length."""
+    """Return points on the profile of a tool, shape (n, 2), length, `pieces` of them on each line of the profile.
+
+    In three dimensions the points lie on the surface of the tool, shape (n, 3).
+    """
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
         return points[:: max(1, len(points) // _MOST)]
@@ -92,5 +102,5 @@ def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
 
 
 def _at(contact: Contact, travel: float) -> str:
-    """Return a contact and its travel as text."""
+    """Return a contact and the travel of its tool as text."""
     return f"{contact!r}" + (f" at travel {travel:g}" if contact.direction else "")

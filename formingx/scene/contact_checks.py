@@ -1,4 +1,4 @@
-"""Checks of the contacts of a scene."""
+"""Checks of the contacts of a scene: tools at the start, and the travel of a tool."""
 
 from typing import Any
 
@@ -12,17 +12,17 @@ from ..ranks import gathered
 from . import tool_width
 
 OTHER_UNIT = 4.0
-"""Ratio of sizes above which a body that starts inside a tool probably has another unit of length."""
+"""Ratio of the sizes of body and tool above which a body inside a tool probably has another unit of length."""
 
 
 def check_start(scene: Any, contact: Contact) -> None:
-    """Check that the body starts outside a tool, and that its contact face is the nearest one to the tool.
+    """Check that the body starts outside a tool, and that the contact face is its boundary nearest to the tool.
 
     The friction must have a value at the temperatures of the face, and no controlled pressure may act on the face.
 
     Args:
         scene: the `Scene`.
-        contact: contact of the tool.
+        contact: the `Contact` of the face with the tool.
 
     Raises:
         InputError: one of these conditions is violated, or the tool does not fit the kinematics.
@@ -67,8 +67,8 @@ def check_travel(scene: Any, contact: Contact, travel: float) -> None:
 
     Args:
         scene: the `Scene`.
-        contact: contact of the tool.
-        travel: its travel, length.
+        contact: the `Contact` of the tool.
+        travel: travel of the tool, length.
 
     Raises:
         InputError: a constrained boundary would lie inside the tool as a whole.

@@ -1,4 +1,4 @@
-"""Temperature of a body from a number, a function, a table, a file, or an earlier run."""
+"""Temperature at points of a body from a number, a function, a table, a file, or an earlier run."""
 
 import os
 from typing import Any
@@ -19,27 +19,27 @@ _WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what 
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """Evaluate a temperature at points of a mesh, which may differ between ranks; collective.
+    """Evaluate a given temperature at points of a mesh, which may differ between ranks; collective.
 
     Args:
-        field: one of the following, with x and y in place of R and Z for a sheet in three dimensions:
+        field: the temperature, in one of the following forms. For a sheet in three dimensions x and y replace R and Z.
 
-            - a number;
-            - a `Table` over R;
-            - a function of arrays (R, Z), shape (n,) each;
-            - the name of a CSV file with columns R, Z, T (points all around the body), or R, T, or Z, T (constant along
-              the other coordinate);
-            - the result of `fx.heat` (its last state);
-            - a scalar DOLFINx Function on this mesh.
+            - A number.
+            - A `Table` over R.
+            - A function of arrays (R, Z), shape (n,) each.
+            - The name of a CSV file with columns R, Z, T (points all around the body), or R, T, or Z, T (constant along
+              the other coordinate).
+            - The result of `fx.heat`, of which the last state counts.
+            - A scalar DOLFINx `Function` on a mesh of the body.
         points: reference positions, shape (n, 2), length.
         mesh: the `Mesh`.
         name: name of the argument, for messages.
 
     Returns:
-        Values at the points, shape (n,).
+        Temperatures at the points, shape (n,).
 
     Raises:
-        InputError: another kind of field, a value that is not finite, or a point outside a table or a file.
+        InputError: `field` has another form, a value is not finite, or a point lies outside a table or a file.
     """
     comm: Any = mesh.comm
     first = comm.scan(len(points)) - len(points)
@@ -48,7 +48,7 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """Return `values_at` for points that are the same on all ranks."""
+    """Return the result of `values_at` for points that are equal on all ranks; `axes` are the names of coordinates."""
     if isinstance(field, type):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
     if isinstance(field, Table):
@@ -70,14 +70,14 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
 
 
 class PointReader:
-    """Values of functions of a space at fixed points.
+    """Evaluation of scalar finite element functions at fixed points of a mesh.
 
     Args:
-        space: the function space.
-        points: reference positions, shape (n, 2), length, the same on all ranks.
+        space: DOLFINx function space of the functions.
+        points: reference positions, shape (n, 2), length, equal on all ranks.
 
     Raises:
-        InputError: a point outside the mesh.
+        InputError: a point lies outside the mesh.
     """
 
     def __init__(self, space: Any, points: np.ndarray):
@@ -94,7 +94,7 @@ class PointReader:
         """Return the values of a function at the points, on all ranks; collective.
 
         Args:
-            array: coefficients of the function with ghosts.
+            array: coefficients of the function on this rank, with ghosts.
 
         Returns:
             Values, shape (n,).
@@ -105,7 +105,10 @@ class PointReader:
 
 
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
-    """Return the linear interpolation of the points of a CSV file along one or both axes, shape (n,)."""
+    """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file; `names` are its axes.
+
+    The file has the column T and one or both axes as columns. The result has the shape (n,).
+    """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)
@@ -125,7 +128,7 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     if np.any(low != high):
         k = int(np.argmax(high - low))
         raise InputError(f"{table.name}: two temperatures, {low[k]:.6g} and {high[k]:.6g}, at"
-                         f" {' and '.join('RZ'[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in at[k])}")
+                         f" {' and '.join(names[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in at[k])}")
     requested, spans = points[:, axes], np.ptp(at, axis=0)
     if len(axes) == 1:
         x, near = requested[:, 0], 1e-9 * spans[0]
@@ -147,12 +150,12 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
 
 
 def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
-    """Raise an InputError unless all points lie inside the points of a file."""
+    """Raise an InputError unless the mask `inside` is True for all points; `name` is the name of a file."""
     if not np.all(inside):
         raise InputError(f"{name}: point {_at(points, inside, axes)} of the body lies outside the points of the file")
 
 
 def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """Return the first point whose entry in the mask `fine` is False, as text."""
+    """Return the first point whose entry in the mask `fine` is False, as text with the names of the axes."""
     first, second = points[np.argmin(fine)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -1,4 +1,4 @@
-"""Quadrature points of a layer in the mesh, where spatially varying constants are evaluated."""
+"""Quadrature points of a layer, at which material constants that vary over the body are checked."""
 
 from typing import Any
 
@@ -19,11 +19,11 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
     Args:
         mesh: the `Mesh`.
         layer: name of the layer.
-        degree: degree of the quadrature.
+        degree: degree of the quadrature rule.
         temperature: temperature of the scene, or None.
 
     Returns:
-        The points with their cells and temperatures.
+        The points with the cells that contain them and the temperatures.
     """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])

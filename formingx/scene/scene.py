@@ -1,4 +1,5 @@
-"""Scene as a user declares it, checked before anything is solved."""
+"""Scene: a body with materials, supports, loads and contacts as a user declares it, checked before anything is solved.
+"""
 
 from __future__ import annotations
 
@@ -32,35 +33,36 @@ from .temperature import Expansion, GivenTemperature
 log = logging.getLogger("formingx")
 
 _HIGHEST = 30
-"""Largest degree of a quadrature: higher degrees are mistakes, and their points would fill the memory."""
+"""Largest degree of a quadrature rule: higher degrees are mistakes, and their points would fill the memory."""
 
 
 class Scene:
     """Body with its materials, supports, loads and contacts.
 
     Args:
-        mesh: mesh from `formingx.mesh`.
+        mesh: mesh of the body, from `formingx.mesh`.
         materials: {layer name: material}, or one material for all layers.
         supports: list of supports, see `formingx.physics.supports`.
         loads: list of loads, see `formingx.physics.loads`. A run controls one load, support or tool; a
-            `formingx.Process` controls several. Contacts of one tool with several faces, of the same `direction` and
-            name, count as one.
-        contacts: list of contacts of faces with rigid tools, see `formingx.Contact`.
-        model: `MixedPressure()` (default) or `DisplacementPenalty()` for a solid; `Membrane()`.
+            `formingx.Process` controls several.
+        contacts: list of contacts of faces with rigid tools, see `formingx.Contact`. Contacts with the same `direction`
+            and name are contacts of one tool with several faces.
+        model: `MixedPressure()` or `DisplacementPenalty()` for a solid, or `Membrane()`. The default is
+            `MixedPressure()`, in three dimensions `Membrane()`.
         kinematics: `Axisymmetric()` (default) or `PlaneStrain()`; for a sheet in three dimensions `ThreeD()`.
-        quadrature_degree: degree of the quadrature of the energy, at most 30; default 5 (seven points), the thesis'
-            rule; in three dimensions 1.
+        quadrature_degree: degree of the quadrature rule of the energy, at most 30. The default is 5 (seven points), the
+            rule of Song (1993); in three dimensions 1.
         temperature: temperature of the body, on which material constants may depend. It is a number, a `table` over R,
             a function of arrays (R, Z), or a CSV file with columns R, Z, T. It may also be the result of
             `formingx.heat`, or a DOLFINx Function.
         heat: `Cooling(...)` for a temperature that changes with time.
-        expansion: a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}.
+        expansion: thermal expansion, a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}.
         thickness: thickness of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either}.
-        preformed: deformation transferred from another mesh (`trace(remesh=)`).
+        preformed: deformation transferred from another mesh; only remeshing (`trace(remesh=)`) sets it.
 
     Attributes:
-        mesh: mesh of the body. If `accuracy` chose the elements of the given mesh, and a tool touches the body, it is a
-            mesh with other elements, see `formingx.mesh.disc`.
+        mesh: mesh of the body. If the argument `accuracy` of `formingx.mesh.disc` chose the elements of the given mesh,
+            and the scene has tools, it is a mesh with elements chosen for these tools.
         materials: {layer name: material}.
         supports: list of supports.
         loads: list of loads.
@@ -76,8 +78,9 @@ class Scene:
         preformed: deformation transferred from another mesh, or None.
 
     Raises:
-        InputError: an unknown or empty tag; a layer without material; insufficient support; a mesh with R < 0,
-            overlapping or inverted elements. Also two controlled items with the same name or without names.
+        InputError: a boundary or a layer is unknown or empty, a layer has no material, the supports are too few,
+            elements overlap or are inverted, or the mesh reaches R < 0. Also if two controlled items have the same name
+            or no names, and if an argument is not allowed.
 
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top
@@ -158,7 +161,7 @@ class Scene:
             self.heat = heat
 
     one_by_one = False
-    """True if one node comes into contact in a step, for contacts with nodes_per_step=None."""
+    """True if at most one node comes into contact in a step, for contacts with nodes_per_step=None."""
 
     temperature: GivenTemperature | None = None
     heat: Any = None
@@ -173,16 +176,16 @@ class Scene:
 
     @property
     def first(self) -> Scene:
-        """Scene on the first mesh of its run."""
+        """Scene on the first mesh of the run; this scene itself unless remeshing made it."""
         return self if self.preformed is None else self.preformed.before[0].scene.first
 
     def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
-        """Return the scene on another mesh of the body with the same names of layers and boundaries.
+        """Return this scene with another mesh of the body.
 
         Args:
-            mesh: the mesh.
+            mesh: the new mesh, with the same names of layers and boundaries.
             preformed: deformation transferred from the present mesh, or None.
-            temperature: temperature on the new mesh; None for the temperature of this scene.
+            temperature: temperature on the new mesh; None for the temperature given to this scene.
 
         Returns:
             The new scene.
@@ -197,23 +200,23 @@ class Scene:
 
     @property
     def items(self) -> list[Part]:
-        """Loads, supports and contacts, in order."""
+        """Loads, then supports, then contacts of the scene; an item is addressed by its number in this list."""
         return [*self.loads, *self.supports, *self.contacts]
 
     @property
     def drivable(self) -> list[Any]:
-        """Items that can be controlled; for a tool that meets several faces, its first contact."""
+        """Items that a run can control; for a tool that meets several faces, only the first contact."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.together(i)[0] == i]
 
     def together(self, number: int) -> list[int]:
-        """Return the contacts of the same tool, which have the same `direction` and name.
+        """Return the numbers of all contacts of the same moving tool: contacts with the same `direction` and name.
 
         Args:
-            number: number of an item in `items`.
+            number: number in `items` of a contact, or of another item.
 
         Returns:
-            Numbers of these contacts in `items`, ascending; the number itself for other items.
+            Numbers of these contacts in `items`, ascending; the number itself for an item without `direction`.
         """
         item = self.items[number]
         if item.direction is None:
@@ -223,30 +226,29 @@ class Scene:
 
     @property
     def driven(self) -> Any:
-        """The only item that can be controlled; None if there is none or several."""
+        """Only item that a run can control; None if there is none or several."""
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, caller: str) -> Any:
-        """Return the controlled item of a run with one control.
+        """Return the item that a run with one control controls.
 
         Args:
             caller: name of the calling function, for messages.
 
         Returns:
-            `driven`.
+            The item.
 
         Raises:
-            InputError: no item or several items can be controlled, or the controlled support drives a constrained
-                component.
+            InputError: no item or several items can be controlled, or another support constrains the component of the
+                controlled support.
         """
         if not self.drivable:
             raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
                              " add a PrescribedDisplacement support")
         if len(self.drivable) > 1:
             raise InputError(f"{caller}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a"
-                             f" run;"
-                             f" give the others a value, or drive them in stages with formingx.Process")
+                             f" run; give the others a value, or drive them in stages with formingx.Process")
         self.check_driven(self.supports)
         return self.driven
 
@@ -255,7 +257,7 @@ class Scene:
 
         Args:
             caller: name of the calling function, for the message.
-            item: the item, or its name.
+            item: the load, support or contact, or its name.
 
         Returns:
             The number.
@@ -271,19 +273,19 @@ class Scene:
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, item: Any) -> str:
-        """Return the name of the column of a controllable item.
+        """Return the name of the column of a path with the pressure or the travel of an item.
 
         Args:
-            item: the item.
+            item: an item that can be controlled.
 
         Returns:
-            "pressure" or "travel", preceded by the item's name if several items can be controlled.
+            "pressure" or "travel", preceded by the name of the item if several items can be controlled.
         """
         alone = len(self.drivable) == 1 or not item.name
         return item.quantity if alone else f"{item.name}_{item.quantity}"
 
     def check_constrained(self, supports: Sequence[Any], touched: bool = False) -> None:
-        """Check that supports constrain the axis and prevent rigid motions.
+        """Check that the active supports constrain u_r on the axis and prevent rigid motions of the body.
 
         Args:
             supports: the active supports.
@@ -297,7 +299,7 @@ class Scene:
             support_checks.check_rigid_body(self, supports)
 
     def check_driven(self, supports: Sequence[Any]) -> None:
-        """Check that no support drives a component that another one constrains.
+        """Check that no support drives a displacement component that another support constrains or drives.
 
         Args:
             supports: the active supports.
@@ -313,14 +315,14 @@ class Scene:
                    if isinstance(material, Material) for constant in material.constants().values())
 
     def _check_names(self) -> None:
-        """Raise an InputError unless the names of items and controls are unique."""
+        """Raise an InputError unless the names of items and of columns of controlled items are unique."""
         names = [item.name for item in self.items if item.name is not None]
         for name in names:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
             called = [i for i, item in enumerate(self.items) if item.name == name]
             if called != self.together(called[0]) and len(called) > 1:
-                raise InputError(f"Scene: two things are called {name!r}: names must differ")
+                raise InputError(f"Scene: two items are called {name!r}: names must differ")
         columns = [self.column(item) for item in self.drivable]
         for column in columns:
             if columns.count(column) > 1:
@@ -329,7 +331,7 @@ class Scene:
                                  f" value, or each a name=... and drive them in stages with formingx.Process")
 
     def _check_materials(self) -> None:
-        """Raise an InputError unless each layer has a valid material; store the shear moduli."""
+        """Raise an InputError unless each layer has a valid material; store the shear moduli of the layers."""
         layers = self.mesh.layers
         for name, material in self.materials.items():
             known("Scene: materials: layer", name, layers)
@@ -342,15 +344,15 @@ class Scene:
         self._moduli = {name: self._checked_modulus(name, self.materials[name]) for name in layers}
 
     def _checked_modulus(self, layer: str, material: Material) -> float:
-        """Return `shear_modulus` of a layer; check its material at every quadrature point of the energy."""
+        """Return the largest shear modulus of a layer, stress; check its material at every quadrature point."""
         if not material.varies:
             material.check()
             return material.shear_modulus
-        looked_at = self.sample(layer)
+        points = self.sample(layer)
         refused, mine = None, -np.inf
         try:
-            material.check(looked_at)
-            mine = float(material.shear_modulus_at(looked_at).max(initial=-np.inf))
+            material.check(points)
+            mine = float(material.shear_modulus_at(points).max(initial=-np.inf))
         except InputError as error:
             refused = str(error)
         found = self.mesh.comm.allgather((refused, mine))                   # all ranks refuse, with one message
@@ -359,7 +361,7 @@ class Scene:
         return max(modulus for _, modulus in found)
 
     def _checked_expansion(self, given: Any) -> dict[str, Expansion]:
-        """Return {layer: its law of expansion}, checked at the temperature of every quadrature point."""
+        """Return {layer: law of thermal expansion} for the argument `expansion`, checked at all quadrature points."""
         laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, Expansion) else given
         if not isinstance(laws, Mapping) or not all(isinstance(law, Expansion) for law in laws.values()):
             raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
@@ -367,18 +369,18 @@ class Scene:
             raise InputError("Scene: expansion: depends on the temperature: give Scene a temperature=...")
         for layer, law in laws.items():
             known("Scene: expansion: layer", layer, self.mesh.layers)
-            looked_at: Any = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
-            together(self.mesh.comm, [partial(law.stretch, looked_at)])
+            T: Any = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
+            together(self.mesh.comm, [partial(law.stretch, T)])
         return dict(laws)
 
     def sample(self, layer: str) -> Sample:
-        """Return the quadrature points of the energy in a layer, positions on the first mesh.
+        """Return the quadrature points of the energy in a layer, with their positions on the first mesh of the run.
 
         Args:
             layer: name of the layer.
 
         Returns:
-            The points with their cells and temperatures.
+            The points with the cells that contain them and the temperatures.
         """
         known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
@@ -391,13 +393,13 @@ class Scene:
             layer: name of the layer.
 
         Returns:
-            Modulus, stress; for spatially varying constants the largest one of all ranks.
+            Modulus, stress; for constants that vary over the body the largest one of all ranks.
         """
         known("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
-        """Raise an InputError unless all boundaries of items exist and have facets."""
+        """Raise an InputError unless the boundary of each item exists and has facets."""
         for item in self.items:
             on = item.on
             if on is None:
@@ -410,8 +412,8 @@ class Scene:
         """Check that a tool does not pass through a constrained boundary.
 
         Args:
-            contact: contact of the tool.
-            travel: its travel, length.
+            contact: the `Contact` of the tool.
+            travel: travel of the tool, length.
 
         Raises:
             InputError: a constrained boundary would lie inside the tool as a whole.
@@ -420,7 +422,7 @@ class Scene:
 
     @property
     def extent(self) -> np.ndarray:
-        """Extent of the mesh along R and Z, shape (2,), length, all ranks."""
+        """Extent of the body along R and Z, in three dimensions x and y, shape (2,), length, equal on all ranks."""
         return self._extent
 
     def __str__(self) -> str:
@@ -430,7 +432,10 @@ class Scene:
 
 
 def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
-    """Return a list of items of one kind; raise an InputError for others."""
+    """Return an argument as a list; raise an InputError unless all entries are objects of the class `kind`.
+
+    `name` is the name of the argument, `what` describes its entries in the message.
+    """
     scene_items = several(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

@@ -1,4 +1,4 @@
-"""Description of a scene as text."""
+"""Summary of a scene as text, a line for each of its parts."""
 
 import contextlib
 import re
@@ -12,13 +12,13 @@ from ..values.temperature import FunctionOfTemperature
 
 
 def summary(scene: Any) -> dict[str, str]:
-    """Describe the parts of a scene in a line each; not collective.
+    """Describe mesh, materials, items, model and temperature of a scene in a line each; not collective.
 
     Args:
         scene: the `Scene`.
 
     Returns:
-        {part: its description}.
+        {name of the part, such as "load 1": its description}.
     """
     mesh, extent = scene.mesh, scene.extent
     kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y)")
@@ -41,7 +41,7 @@ def summary(scene: Any) -> dict[str, str]:
 
 
 def _temperatures(scene: Any) -> list[float]:
-    """Return the temperatures that a scene gives as numbers: those for its tools, and the initial one of the body."""
+    """Return the temperatures that a scene gives as numbers: of its tools, and of the body if it is uniform."""
     tools = [given.tool for given in scene.heat.tools.values()] if scene.heat is not None else []
     first = scene.temperature.T.x.array if scene.temperature is not None else []
     even = len(first) and np.ptp(first) == 0
@@ -50,7 +50,7 @@ def _temperatures(scene: Any) -> list[float]:
 
 
 def _material(item: Any, temperatures: list[float]) -> str:
-    """Return `text` of a material, with values in place of unnamed functions of the temperature."""
+    """Return a material as text, with values at some temperatures in place of unnamed functions of the temperature."""
     found = text(item)
     for value in item.parameters.values():
         if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):
@@ -69,7 +69,7 @@ def text(item: Any) -> str:
         item: the object.
 
     Returns:
-        Its repr or, if its class defines none, its class and public attributes.
+        The repr of the object or, if its class defines none, the name of the class and the public attributes.
     """
     if type(item).__repr__ is object.__repr__:
         inside = ", ".join(f"{k}={v!r}" for k, v in vars(item).items() if not k.startswith("_"))

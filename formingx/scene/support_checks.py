@@ -1,4 +1,4 @@
-"""Checks of the supports of a scene."""
+"""Checks of the supports of a scene: axis, rigid motions, driven components, hinges of layers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from ..physics.supports import Constrained
 
 
 def check_driven(supports: Sequence[Any]) -> None:
-    """Check that no support drives a component that another one constrains.
+    """Check that no support drives a displacement component that another support constrains or drives.
 
     Args:
         supports: the active supports.
@@ -27,14 +27,14 @@ def check_driven(supports: Sequence[Any]) -> None:
 
 
 def check_axis(scene: Any, supports: Sequence[Any]) -> None:
-    """Check that the mesh does not cross the axis, and that u_r = 0 on the axis.
+    """Check that an axisymmetric mesh does not cross the axis R = 0, and that a support constrains u_r on it.
 
     Args:
         scene: the `Scene`.
         supports: the active supports.
 
     Raises:
-        InputError: the mesh crosses the axis, or the axis is unconstrained.
+        InputError: the mesh crosses the axis, or it touches the axis and no support constrains u_r there.
     """
     if not scene.kinematics.axisymmetric:
         return
@@ -56,7 +56,14 @@ def check_axis(scene: Any, supports: Sequence[Any]) -> None:
 
 
 def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
-    """Check that the supports prevent every rigid motion of the kinematics.
+    r"""Check that the supports prevent every rigid motion of the body.
+
+    Let c_ij be the constrained displacement component of the rigid motion j (`Kinematics.rigid_motions`) at node i of a
+    constraint with n nodes; a constrained mean counts as one node. The body is free to move if the matrix
+
+    .. math:: G_{jk} = \sum_{\text{constraints}} \frac{1}{n} \sum_{i=1}^{n} c_{ij} c_{ik}
+
+    is singular.
 
     Args:
         scene: the `Scene`.
@@ -85,10 +92,11 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
 
 def check_hinges(scene: Any) -> None:
-    """Check that a hinge or a pressure does not overload a layer much softer than another one at the same rim.
+    """Check that no layer at a hinge is much softer than another layer at the same rim.
 
-    With weight="area" a hinge pulls all layers with one traction, so stiffnesses may differ at most 100 times. A hinged
-    rim face is free, so a pressure would squeeze a layer out that is 50 times softer.
+    With weight="area" a hinge (`SimplySupported`) pulls all layers with one traction, so their shear moduli may differ
+    at most by a factor of 100. The rim face of a hinge can bulge, so a pressure would squeeze out a loaded layer that
+    is 50 times softer than another one.
 
     Args:
         scene: the `Scene`.
@@ -117,7 +125,7 @@ def check_hinges(scene: Any) -> None:
 
 
 def _layers_at(scene: Any, boundary: str) -> set[str]:
-    """Return the names of the layers with cells on a boundary, all ranks."""
+    """Return the names of the layers with cells at a boundary, equal on all ranks; collective."""
     topology, cells = scene.mesh.domain.topology, scene.mesh.cells
     topology.create_connectivity(1, 2)
     touching = {topology.connectivity(1, 2).links(f)[0] for f in scene.mesh.facets_of(boundary)}

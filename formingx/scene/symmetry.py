@@ -1,4 +1,4 @@
-"""Planes of symmetry of a scene, and the number of images of the modelled body that form the whole part."""
+"""Mirror planes of a scene, and the images of the modelled body that form the whole part with it."""
 
 from __future__ import annotations
 
@@ -32,18 +32,19 @@ class MirrorPlane(NamedTuple):
 
 
 class MirrorPlanes:
-    """Planes of symmetry that cut the body; the whole part consists of `factor` images of the body.
+    r"""Mirror planes of a scene: the modelled body is a half, a quarter or an eighth of the whole part.
 
-    A `Symmetry` is such a plane if its boundary is flat, lies at an end of the body, and is no guide. The axis of an
-    axisymmetric body does not count: results belong to the whole ring. Two parallel planes do not count: the body is a
-    strip of an endless one, and results belong to the strip.
+    With m planes the whole part consists of :math:`2^m` images of the body. A `Symmetry` is a mirror plane if its
+    boundary is flat, lies at an end of the body, and is no guide. The axis of an axisymmetric body does not count:
+    results belong to the whole ring. Two parallel planes do not count: the body is a strip of an endless one, and
+    results belong to the strip.
 
     Args:
-        planes: planes with different normals.
+        planes: mirror planes with different normals.
         near: tolerance of positions, length.
 
     Attributes:
-        planes: planes with different normals.
+        planes: mirror planes with different normals.
         near: tolerance of positions, length.
     """
 
@@ -52,10 +53,10 @@ class MirrorPlanes:
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> MirrorPlanes:
-        """Return the mirror planes of a scene that is given as plain data.
+        """Return the mirror planes of a scene that is given as plain data, as in a checkpoint.
 
         Args:
-            scene: result of `description.describe`.
+            scene: the data, as `formingx.results.files.description.describe` returns them.
 
         Returns:
             The mirror planes.
@@ -65,7 +66,7 @@ class MirrorPlanes:
 
     @property
     def factor(self) -> int:
-        """Number of images of the body in the whole part, a factor of 2 for every plane."""
+        """Number of images of the modelled body in the whole part, a factor of 2 for every plane."""
         return 2 ** len(self.planes)
 
     @property
@@ -74,22 +75,23 @@ class MirrorPlanes:
         return _PARTS.get(len(self.planes), "")
 
     def basis(self, depth: str | None) -> str:
-        """Return the basis of results as text.
+        """Return as text to which body the results belong, such as "the whole part (a half was modelled)".
 
         Args:
-            depth: unit of depth in plane strain, such as "mm", or "unit"; else None.
+            depth: unit of depth in plane strain, such as "mm", or "unit"; None for other kinematics.
 
         Returns:
-            The basis; "" for a body without planes in three dimensions.
+            The text; "" if the whole part is modelled, other than in plane strain.
         """
         part = f"the whole part (a {self.words} was modelled)" if self.planes else "the part"
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
 
     def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:
-        """Return the ratio of the force on a whole tool or support to the force on its modelled part.
+        r"""Return the ratio of the force on a whole tool or support to the force on its part in the model.
 
-        A plane counts if the tool reaches it, because the tool then continues on the other side. It does not count if
-        the force has a component across it. The images of this component cancel, so the force on one side is used.
+        The ratio is :math:`2^m` with the number m of planes that count. A plane counts if the tool or the boundary of
+        the support reaches it, because it then continues on the other side. It does not count if the force has a
+        component across it. The images of this component cancel, so the force on one side is used.
 
         Args:
             extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),
@@ -106,15 +108,17 @@ class MirrorPlanes:
         return int(2 ** len(cut))
 
     def images(self, components: int, extent: np.ndarray | None = None) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the maps x -> scale x + shift from the body to its images in the whole part.
+        r"""Return the maps of positions x in the modelled body, or on a tool, to its images in the whole part.
+
+        .. math:: x_i \to a_i x_i + b_i
 
         Args:
             components: number of components of x.
             extent: lowest and highest coordinates of a tool, shape (2, components), length; planes that the tool
-                crosses are left out.
+                crosses are left out. None for the body.
 
         Returns:
-            List of (scale, shift), shape (components,) each; the first is the identity.
+            List of (a, b), shape (components,) each; the first is the identity.
         """
         found = [(np.ones(components), np.zeros(components))]
         for plane in self.planes:
@@ -128,11 +132,11 @@ class MirrorPlanes:
 
 
 NO_PLANES = MirrorPlanes()
-"""Mirror planes of a body that is modelled as a whole: an empty set."""
+"""Mirror planes of a part that is modelled as a whole: there are none."""
 
 
 def mirror_planes(scene: Any) -> MirrorPlanes:
-    """Return the planes of symmetry that cut the body of a scene; collective.
+    """Return the mirror planes of a scene, found from its `Symmetry` supports; collective.
 
     Args:
         scene: the `Scene`.

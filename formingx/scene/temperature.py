@@ -1,4 +1,4 @@
-"""Temperature of a body as the scene gives it: a field on the mesh."""
+"""Initial temperature of the body of a scene as a field on the mesh, and the interface of thermal expansion."""
 
 from typing import Any, Protocol, runtime_checkable
 
@@ -14,33 +14,34 @@ from . import fields
 
 @runtime_checkable
 class Expansion(Protocol):
-    """Law of thermal expansion."""
+    """Interface of a law of thermal expansion."""
 
     def stretch(self, temperature: ArrayLike) -> np.ndarray:
-        """Return the stress-free stretch.
+        """Return the stress-free stretch of the material at given temperatures.
 
         Args:
-            temperature: temperatures.
+            temperature: temperatures, any shape.
 
         Returns:
-            Stretches, the same shape.
+            Stretches, the shape of `temperature`.
 
         Raises:
-            InputError: a stretch is not positive or not known.
+            InputError: a stretch is not positive, or is unknown at a temperature.
         """
 
 
 class GivenTemperature:
-    """Temperature on the mesh of a scene, quadratic in each element.
+    """Temperature of the body that a scene gives, interpolated to quadratic elements on the mesh.
 
     Args:
-        given: field as in `fields.values_at`.
+        given: the temperature in one of the forms of `fields.values_at`, such as a number or a function of (R, Z).
         mesh: mesh of the scene.
 
     Attributes:
         given: the argument `given`.
         mesh: the argument `mesh`.
-        T: DOLFINx `Function` (P2), constant in time; `formingx.forms.temperature.Temperature` changes.
+        T: DOLFINx `Function` (P2) with the given temperature; the changing temperature of a run is a
+            `formingx.forms.temperature.Temperature`.
 
     Raises:
         InputError: the temperature is not defined all over the body.
@@ -54,28 +55,29 @@ class GivenTemperature:
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures in some cells at points of the reference cell.
+        """Return the temperatures at points of some cells.
 
         Args:
-            cells: local numbers of the cells.
-            places: positions in the reference cell, shape (q, 2).
-            values: coefficients in place of T.x.array, with ghosts, shape (..., n).
+            cells: local numbers of the cells, shape (m,).
+            places: positions of the points in the reference cell, shape (q, 2).
+            values: coefficients of one or more functions in the space of `T`, with ghosts, shape (..., n); None: the
+                coefficients of `T`.
 
         Returns:
-            Temperatures, shape (..., cells, q).
+            Temperatures, shape (..., m, q).
         """
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def on(self, boundary: str) -> np.ndarray:
-        """Return the temperatures at the nodes of T on a boundary, on all ranks; collective.
+        """Return the temperatures at the nodes of a boundary, gathered on all ranks; collective.
 
         Args:
             boundary: name of the boundary.
 
         Returns:
-            Temperatures, shape (n,).
+            Temperatures of n nodes, shape (n,).
         """
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
         return gathered(self.mesh.comm, self.T.x.array[nodes])

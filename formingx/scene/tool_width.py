@@ -1,4 +1,4 @@
-"""Check for tools that pass between two contact points of a face, or penetrate it before they meet a point."""
+"""Check that no tool passes between two contact points of a face, or penetrates the face before it meets a point."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ from ..ranks import gathered
 _DIRECTIONS = 90           # number of directions in which the width of a closed tool is measured
 
 CUT = 0.1
-"""Penetration between contact points over the thickness above which a tool counts as cutting the face."""
+"""Largest allowed penetration of a tool between contact points, over the thickness of the body."""
 
 _PLACES = 33
-"""Number of points of an edge that are checked."""
+"""Number of points of an element edge at which the penetration is computed."""
 
 _MOVES = 200
 """Largest number of moves of a tool towards a face."""
@@ -27,11 +27,12 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
     Args:
         mesh: the `Mesh`.
-        contact: contact of the tool with the face.
-        axisymmetric: True for an axisymmetric body.
+        contact: the `Contact` of the face with the tool.
+        axisymmetric: True for an axisymmetric body, False in plane strain.
 
     Raises:
-        InputError: the tool could pass between contact points, or penetrate the face deeply before it meets one.
+        InputError: the tool could pass between contact points, or penetrate the face by more than `CUT` times the
+            thickness before it meets one.
     """
     ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
@@ -40,7 +41,10 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
-    """Raise an InputError if a closed tool is narrower than the distance of the contact points nearest to it."""
+    """Raise an InputError if a closed tool is narrower than the distance of the contact points nearest to it.
+
+    `ends` are the end points of the element edges of the face, shape (n, 2, 2), length.
+    """
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
         outline = np.concatenate([outline, outline * (-1, 1)])
@@ -56,10 +60,11 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
-    """Raise an InputError if a tool is deep in the undeformed face before it meets a contact point.
+    """Raise an InputError if a tool would be deep in the undeformed face before it meets a contact point.
 
-    The tool moves repeatedly by its distance to the nearest point (sphere tracing), so it passes no point. A fixed tool
-    is assumed to approach the middle of an edge along the normal.
+    The tool moves repeatedly by its distance from the nearest contact point (sphere tracing), so it passes no point. A
+    fixed tool is assumed to approach the middle of an edge along the normal. `ends` are the end points of the element
+    edges of the face, shape (n, 2, 2), and `thickness` is the thickness of the body, length.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))
