@@ -63,7 +63,7 @@ def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 
 def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
-    """Return the factors of the n columns by which rotations are at most `share`, shape (n,).
+    """Return the required over the present length of the n columns, so that they rotate by at most `share`, shape (n,).
 
     The rotation of a column is that along the sheet, or on a fillet of a tool its length over the fillet radius.
 
@@ -127,10 +127,10 @@ def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.
 
 
 def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    """Return the factors of the n columns that equidistribute the stress error, as in a mesh with the fewest elements.
+    """Return the required over the present length of the n columns, which equidistributes the stress error, shape (n,).
 
-    The error of a column is C(s) h^p per length, with the order p. The optimal size is h ~ C^(-2/(2 p + 1)), scaled so
-    that the integral of (C h^p)^2 meets the tolerance.
+    The error of a column is C(s) h^p per length, with its length h and the order p. The optimal size is h ~ C^(-2/(2 p
+    + 1)), scaled so that the integral of (C h^p)^2 meets the tolerance. A mesh with the fewest elements has such sizes.
 
     Args:
         path: the run.

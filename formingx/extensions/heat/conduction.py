@@ -115,11 +115,10 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the initial temperature state, with prescribed values at fixed faces.
+        """Return the initial temperatures of body and tools, with prescribed values at fixed faces.
 
         Returns:
-            Temperature state: temperatures of the body, set in `T` before; initial temperatures of each tool in
-                contact.
+            [temperatures of the body, from `T`, shape (n,); temperatures in each tool, shape (contact nodes, m)].
         """
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 
@@ -148,10 +147,12 @@ class Conduction(HeatVectors):
         """Return the rates of heat of body and tools at given temperatures.
 
         Args:
-            state: temperature state, see the class.
+            state: [temperatures of the body, shape (n,); temperatures in each tool in contact, shape (contact nodes,
+                m)].
 
         Returns:
-            Rates of heat, arrays as in `state`; heat per time into the body, as `Stage.heats`.
+            Rates of heat M dT/dt (capacity matrix M), arrays as in `state`; heat per time into the body, as
+            `Stage.heats`.
         """
         R = self._body_rate(state[0])
         found, through = [R], []
@@ -167,11 +168,13 @@ class Conduction(HeatVectors):
 
         .. math:: M \Delta = k + c R(y + \Delta)
 
+        M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y.
+
         Args:
-            state: temperature state y at the start of the step.
+            state: temperatures y of the body, then in each tool in contact, at the start of the step.
             known: known heats k, arrays as in `state`.
             c: factor c of the rates, time.
-            guess: initial guess of the change of T, locally owned entries, shape (n,).
+            guess: initial guess of the change of the temperatures of the body, locally owned entries, shape (n,).
 
         Returns:
             The changes, rates and heats.
@@ -203,11 +206,12 @@ class Conduction(HeatVectors):
 
         .. math:: (M - c R') \Delta = k
 
-        The tangent of the last `stage` is reused if it had the same c; otherwise it is assembled at the last T.
+        M is the capacity matrix, R' the derivative of the rate of heat, Delta the change of temperature. The factorised
+        matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
 
         Args:
-            known: heats k of body and tools, arrays as in a temperature state.
-            c: factor of the rates, time.
+            known: heats k of the body, shape (n,), and of each tool in contact, shape (contact nodes, m).
+            c: factor c of the rates, time.
 
         Returns:
             Largest absolute change of body and tools over all ranks, degrees.
@@ -224,10 +228,10 @@ class Conduction(HeatVectors):
         return max(sizes)
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
-        """Return dT/dt of the body from its rates of heat M dT/dt.
+        """Return dT/dt of the body from its rates of heat M dT/dt, with the capacity matrix M.
 
         Args:
-            rate: rates of heat M dT/dt, locally owned entries, shape (n,).
+            rate: rates of heat over `capacity`, locally owned entries, shape (n,), degrees per time.
 
         Returns:
             dT/dt, shape (n,), degrees per time; 0 where the temperature is prescribed.
@@ -254,7 +258,15 @@ class Conduction(HeatVectors):
 
     def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 answers: list[Any]) -> Stage:
-        """Return changes, rates and heats of a stage whose temperature T + change has converged."""
+        """Return changes, rates and heats of an implicit stage that has converged.
+
+        Args:
+            T: temperatures of the body at the start of the step, shape (n,).
+            change: their change in the stage, shape (n,).
+            known: known heats of body and tools.
+            c: factor of the rates, time.
+            answers: response of each tool in contact.
+        """
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
         for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
@@ -266,7 +278,9 @@ class Conduction(HeatVectors):
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, through_touches: list[float]) -> np.ndarray:
-        """Return heat per time into the body at the last T, over all ranks: through each law, source and tool contact.
+        """Return heat per time into the body at the present `T`, over all ranks: by each law, source and tool contact.
+
+        through_touches: this rank's part of the heat through each tool contact, over `capacity`.
         """
         local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
@@ -292,7 +306,7 @@ class Conduction(HeatVectors):
         return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
 
     def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """Return [(ThermalProperties, UFL measure of their layers)]; layers that share one object share a measure."""
+        """Return (properties, UFL measure) of the layers of each `ThermalProperties` object in {layer: object}."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -300,7 +314,7 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the form (UFL) of the heat that the body stores at temperature T, tested by v."""
+        """Return the form (UFL) of the heat in the body at temperature T over `capacity`, tested by v."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layers(materials))
 
@@ -398,7 +412,14 @@ class Conduction(HeatVectors):
         return line + u[cKDTree(X).query(line)[1]]
 
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """Factorise the tangent M - c R' of body and tools at the last T; keep one with the same c unless `afresh`."""
+        """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of the rates of heat at the last
+        `T`.
+
+        Args:
+            c: factor of the rates, time.
+            answers: response of each tool in contact, which adds to the diagonal.
+            afresh: False to keep factors with the same c.
+        """
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c
@@ -416,7 +437,7 @@ class Conduction(HeatVectors):
             raise ConvergenceError("heat: the matrix of a step is singular")
 
     def _solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Return the solution of the factorised tangent for a right-hand side, locally owned entries, shape (n,)."""
+        """Return the solution with the factorised matrix for a right-hand side, locally owned entries, shape (n,)."""
         self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, rhs)
         self._solver.solve(self._rhs, self._out)
         return self._out.array_r.copy()

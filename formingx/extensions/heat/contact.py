@@ -220,6 +220,8 @@ class HeatContact:
     def answer(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> Answer:
         """Return the response of the lines to a flux in an implicit stage M w' = known + c rate(lines + w').
 
+        M is the capacity matrix of a line, w' the change of its temperatures.
+
         Args:
             lines: temperatures of the lines above the back of the tool, shape (n, m).
             known: known heat per area at the nodes of the lines, shape (n, m).
@@ -254,7 +256,7 @@ class HeatContact:
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the inverse of M + c K of a line, shape (m, m), and c times its first column, the response to a flux.
+        """Return the inverse of capacity + c conductivity matrix of a line, shape (m, m), and c times its first column.
         """
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

@@ -42,18 +42,18 @@ class ThermalExpansion:
         self.stretch(np.array([self.stress_free]))
 
     def volume_ratio(self, temperature: Any) -> np.ndarray:
-        """Return the stress-free volume ratio J_T.
+        """Return the volume over the volume at `stress_free`, both without stress.
 
         Args:
             temperature: temperatures, any shape.
 
         Returns:
-            J_T, the same shape.
+            Volume ratios J_T, the same shape.
         """
         return self.stretch(temperature) ** 3
 
     def stretch(self, temperature: Any, clamped: bool = False) -> np.ndarray:
-        """Return the stress-free stretch J_T^(1/3).
+        """Return the length over the length at `stress_free`, both without stress: the cube root of `volume_ratio`.
 
         Args:
             temperature: temperatures, any shape.

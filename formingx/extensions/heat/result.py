@@ -106,7 +106,7 @@ class HeatRun:
 
     @property
     def balance(self) -> np.ndarray:
-        """Heat stored minus heat supplied in each step, over the largest of all heats of the step, shape (n,)."""
+        """Heat stored by the body minus heat supplied in each step, over the largest heat of the step, shape (n,)."""
         heats = np.array(self._heats)
         largest = np.abs(np.column_stack([heats, self._stored])).max(1)
         return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)

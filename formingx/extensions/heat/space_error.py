@@ -34,7 +34,8 @@ class SpaceError:
         The faces of tools keep their temperatures; the tools respond to the correction along their depth.
 
         Args:
-            state: temperature state of `Conduction`: of the body, then in each tool in contact.
+            state: [temperatures of the body, shape (n,); temperatures in each tool in contact, shape (contact nodes,
+                m)].
             time: time since the start of the run.
 
         Returns:

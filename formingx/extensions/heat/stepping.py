@@ -17,10 +17,11 @@ _ERROR = WEIGHTS - np.array([1 - _W, 3 * _W + 1, _D]) / 3
 
 
 class Step(NamedTuple):
-    """Result of a trial time step.
+    """Result of a trial time step of the heat equation.
 
     Attributes:
-        state: temperature state of `Conduction` at the end of the step: of the body, then in each tool in contact.
+        state: temperatures at the end of the step: of the body, shape (n,), then in each tool in contact, shape
+            (contact nodes, m).
         error: estimated error of the step, degrees.
         stored: heat that the whole body stores in the step.
         heats: heat that enters the body in the step by each boundary and source, in the order of `Conduction.names`.
@@ -33,11 +34,12 @@ class Step(NamedTuple):
 
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
-    """Take one time step by TR-BDF2.
+    """Take one time step of the heat equation by TR-BDF2.
 
     Args:
         body: heat equation of the body.
-        state: temperature state of `Conduction` at the start of the step.
+        state: temperatures at the start: of the body, shape (n,), then in each tool in contact, shape (contact nodes,
+            m).
         dt: length of the step, time.
 
     Returns:

@@ -54,7 +54,7 @@ class HeatVectors:
         """Return the heat that the whole body stores by a change of temperature, summed over ranks.
 
         Args:
-            change: change of T, locally owned entries, shape (n,), degrees.
+            change: change of the nodal temperatures, locally owned entries, shape (n,), degrees.
 
         Returns:
             Heat.
@@ -62,10 +62,10 @@ class HeatVectors:
         return self.capacity * self._sum(self._mass(change))
 
     def mass(self, change: np.ndarray) -> np.ndarray:
-        """Return the product M dT of the mass matrix and a change of temperature.
+        """Return the capacity matrix M, over `capacity`, times a change of temperature.
 
         Args:
-            change: change of T, locally owned entries, shape (n,), degrees.
+            change: change of the nodal temperatures, locally owned entries, shape (n,), degrees.
 
         Returns:
             Locally owned entries, shape (n,), degrees.
@@ -108,13 +108,16 @@ class HeatVectors:
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Set `self.T` to T; return R(T) of the body without tool contacts, locally owned entries, shape (n,)."""
+        """Set `self.T` to T; return the rates of heat over `capacity`, without tools, locally owned entries, shape
+        (n,).
+        """
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
-        """Return the mass matrix M times a change of T, locally owned entries, shape (n,)."""
+        """Return the capacity matrix over `capacity` times a change of temperature, locally owned entries, shape (n,).
+        """
         self._change.x.array[: self._n] = change
         self._change.x.scatter_forward()
         return self._assemble(self._mass_form)

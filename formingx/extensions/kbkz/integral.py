@@ -59,13 +59,13 @@ class Integral:
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights of K past states in each relaxation mode.
+        """Return the weights w of K past states in the stress, for each relaxation mode (G, tau) of unit modulus.
 
         Args:
             ages: ages of the states in reduced time, descending, the last 0, shape (K,) or (K, n), time.
 
         Returns:
-            Weights w, shape (K, modes) or (K, modes, n).
+            Weights, shape (K, modes) or (K, modes, n).
         """
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
@@ -86,8 +86,8 @@ class Integral:
               close: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the weights of K past states in the stress at the end of a step in reduced time.
 
-        The step is exact if h C_k^-1 is a parabola through the last states. So it is of second order even for steps far
-        longer than tau (`TransientNetwork`).
+        The step is exact if damping times inverse tensor of the past states is a parabola through the last states. So
+        it is of second order even for steps far longer than the relaxation times (`TransientNetwork`).
 
         Args:
             weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
@@ -119,15 +119,15 @@ class Integral:
         return W, slope
 
     def damped(self, C: np.ndarray, past: np.ndarray, smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
-        """Return inverse tensors and damping of K past states.
+        """Return inverse tensors and damping of K past states at n points.
 
         Args:
-            C: entries of the present Cbar, shape (4, n).
+            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
-            smallest_h: smallest h of each state so far, shape (K, n), or None.
+            smallest_h: smallest damping h of each state so far, shape (K, n), or None.
 
         Returns:
-            Inverse tensors of the past states, shape (K, 4, n); h, dh/dI1 and dh/dI2, shape (K, n) each.
+            Inverse tensors of the past states, shape (K, 4, n); damping h and dh/dI1, dh/dI2, shape (K, n) each.
         """
         inverse = _inverse(past)
         if self.damping is None:
@@ -143,17 +143,18 @@ class Integral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the second Piola-Kirchhoff stress from K past states, without pressure, and its derivatives.
+        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and its
+        derivatives.
 
         Args:
-            C: entries of the present Cbar, shape (4, n).
+            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
             W: weights of the states, shape (K, n), stress.
-            slope: derivatives of the weights by the reduced time of the step, shape (K, n).
-            smallest_h: smallest h of each state so far, shape (K, n), or None.
+            slope: derivatives of the weights by the length of the step in reduced time, shape (K, n).
+            smallest_h: smallest damping h of each state so far, shape (K, n), or None.
 
         Returns:
-            S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
+            Stress S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
         """
         inverse, h, h1, h2 = self.damped(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
@@ -168,8 +169,10 @@ class Integral:
     def potential(self, C: Any, coefficients: dict[str, Any], time_step: Any) -> Any:
         """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dCbar.
 
+        S is the second Piola-Kirchhoff stress, Cbar = J^(-2/3) C.
+
         Args:
-            C: entries of Cbar (UFL).
+            C: entries 11, 22, 12, 33 of Cbar (UFL).
             coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
             time_step: length of the step (UFL scalar, time).
 
@@ -184,8 +187,10 @@ class Integral:
     def unsymmetric_work(self, C: Any, dC: Any, coefficients: dict[str, Any]) -> Any:
         """Return the virtual work of the unsymmetric part of dS/dCbar, which `potential` lacks.
 
+        S is the second Piola-Kirchhoff stress, Cbar = J^(-2/3) C.
+
         Args:
-            C: entries of Cbar (UFL).
+            C: entries 11, 22, 12, 33 of Cbar (UFL).
             dC: virtual changes of these entries (UFL).
             coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
 
@@ -202,7 +207,7 @@ def _inverse(C: np.ndarray) -> np.ndarray:
 
 
 def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
-    """Return the change of the entries of Cbar (UFL) since the coefficients were refreshed."""
+    """Return the change of the entries of Cbar = J^(-2/3) C (UFL) since the coefficients of the form were refreshed."""
     return [C[i] - coefficients["past_C"][i] for i in range(4)]
 
 
@@ -220,9 +225,12 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 
 
 def _parabola(s: Any) -> tuple[Any, Any, Any]:
-    """Return the factors of (-C^-1, C_n^-1, -C_n-1^-1) for a ratio s of the step to the previous one.
+    """Return the factors of (-C^-1, C_n^-1, -C_n-1^-1) in the weight of a parabola through the last three states.
 
-    They are f, f (1 + s) and f s with f = s/(1 + s), reduced from s = 2 on and 0 from s = 4 on, where BDF2 is unstable.
+    C is the state at the end of the step, C_n the one at its start, C_n-1 the one before. The factors are f, f (1 + s)
+    and f s with f = s/(1 + s), reduced from s = 2 on and 0 from s = 4 on, where BDF2 is unstable.
+
+    s: ratio of the step to the previous one.
     """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s

@@ -215,8 +215,7 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _now(self) -> tuple[np.ndarray, Any, Any]:
-        """Return entries of Cbar, shape (4, n), reduced time since the last state, and reduced time per process time.
-        """
+        """Return Cbar = J^(-2/3) C, shape (4, n), and the reduced time since the last state and per process time."""
         step: Any = self._forms.time_now - self._memory.time
         rate: Any = 1.0
         if not len(self._own):

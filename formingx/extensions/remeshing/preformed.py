@@ -136,7 +136,7 @@ class Preformed(NamedTuple):
         return first_places(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
-        """Return the transferred deformation gradient on the elements of the new mesh.
+        """Return the deformation gradient from the start of the run to the new mesh, on the elements of the new mesh.
 
         Args:
             forms: the `Formulation` on the new mesh.
@@ -194,12 +194,15 @@ class Preformed(NamedTuple):
                 nearest(pressures, np.column_stack([1 - at.sum(1), at])))
 
     def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the six entries of b at points of the deformed old mesh, shape (n, 6), and J there, shape (n,).
+        """Return the deformation b = F F^T/J at points of the deformed old mesh, and J.
 
         Args:
             cells: old cell of each point, shape (n,).
             places: local coordinates of the points in their cells, shape (n, 2).
             axisymmetric: True for a body of revolution.
+
+        Returns:
+            Six entries (see `Preformed.b`), shape (n, 6); J, shape (n,).
         """
         x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, places, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))
@@ -252,6 +255,8 @@ def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray
 
 def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
     """Return V with V^2 = b in the section, cosine and sine of the rotation, and det V.
+
+    The first five arguments are entries of `Preformed.b`; for b = F F^T/J see there.
 
     Args:
         rr: entry of b.

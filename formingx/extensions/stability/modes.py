@@ -98,13 +98,13 @@ class Located(NamedTuple):
 
 
 class _Sample(NamedTuple):
-    """Number of unstable modes, and the modes nearest to the stability limit, in a state between two others.
+    """Unstable modes, and modes nearest to the stability limit, of a state between two others.
 
     Attributes:
         fraction: position of the state between the two others, from 0 to 1.
         state: the state.
         unstable: number of unstable modes.
-        values: k eigenvalues nearest to 0, ascending, shape (k,), dimensionless.
+        values: k eigenvalues of the second variation nearest to 0, ascending, shape (k,), dimensionless.
         modes: modes of these eigenvalues, locally owned entries, shape (k, n).
     """
 
@@ -153,7 +153,7 @@ class Modes:
             return self._count(kind)
 
     def _count(self, kind: Kind) -> int:
-        """Return the number of unstable modes of a kind at the present state of the problem.
+        """Return the number of unstable modes of a wave number and symmetry at the present state of the problem.
 
         Raises:
             Failure: the second variation is singular.
@@ -212,24 +212,34 @@ class Modes:
         return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
 
     def _sample(self, fraction: float, state: State, kind: Kind, index: int) -> _Sample:
-        """Return the number of unstable modes of a kind in a state, and enough modes around eigenvalue `index`."""
+        """Return the number of unstable modes in a state, and the modes nearest to the stability limit.
+
+        Args:
+            fraction: position of the state between two others, from 0 to 1.
+            state: the state.
+            kind: wave number and symmetry of the modes.
+            index: number of the eigenvalue in ascending order that must be among those computed.
+        """
         with self.problem.state_context(state):
             count = self._count(kind)
             return _Sample(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
     def _mode_of_index(self, sample: _Sample, index: int) -> Array:
-        """Return the mode of eigenvalue number `index` (ascending) in a sample, or the nearest one that it has."""
+        """Return the mode of eigenvalue number `index` (ascending, from 0) of a state, or the nearest one known.
+
+        sample: eigenvalues and modes of the state.
+        """
         negative = np.flatnonzero(sample.values < 0)
         k = (negative[-1] + 1 if len(negative) else 0) + index - sample.unstable
         return sample.modes[min(max(k, 0), len(sample.modes) - 1)]
 
     def _track(self, samples: list[_Sample], end: _Sample, index: int) -> list[tuple[float, float]]:
-        """Return (fraction, eigenvalue) of one mode in all samples that have it.
+        """Return (fraction, eigenvalue) of one mode in all sampled states in which it is found again.
 
         Args:
-            samples: samples between the two states.
-            end: end of the bracket at which the mode is unstable.
-            index: number of its eigenvalue there.
+            samples: eigenvalues and modes of states between two others.
+            end: the end of the bracket at which the mode is unstable.
+            index: number of the eigenvalue there, in ascending order.
         """
         mode, found = self._mode_of_index(end, index), []
         for sample in samples:
@@ -259,8 +269,8 @@ class Modes:
     def _lanczos(self, number: int) -> tuple[Array, Array]:
         """Return the eigenvalues of K x = value M x nearest to 0, ascending, and their modes, shape (number, n).
 
-        M is the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1 M. Rigid motions are
-        removed, and vectors are orthogonalised fully.
+        K is the second variation, M the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1
+        M. Rigid motions are removed, and vectors are orthogonalised fully.
 
         number: number of eigenvalues.
         """

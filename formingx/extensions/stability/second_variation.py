@@ -57,10 +57,11 @@ class _BodyWithMode(LoadedBody):
 
 
 class SecondVariation:
-    """Second variation of the energy of a solid at the present state of its problem, for one wave number at a time.
+    """Second variation of the energy of a solid at the present state of its problem, for one wave number n at a time.
 
-    The unknowns of a mode are its amplitudes U, W, V + m U and its pressures, see the module. A mode antisymmetric
-    about a symmetry plane is possible if the support has `mirror=True`.
+    A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta); in plane strain
+    with k x3 in place of n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A
+    mode antisymmetric about a symmetry plane is possible if the support has `mirror=True`.
 
     Args:
         problem: the `Problem` of a solid.
@@ -145,19 +146,19 @@ class SecondVariation:
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """Return the displacement amplitudes (U, W, V) of a mode at `nodes`.
+        """Return the amplitudes (U, W, V) of the radial, axial and hoop displacement of a mode at `nodes`.
 
         Args:
             x: mode, locally owned entries, shape (n,).
 
         Returns:
-            Amplitudes, shape (m, 3), dimensionless.
+            Amplitudes over the length unit of the problem, shape (m, 3).
         """
         U, W, V = self._unknowns[~self._bubble].T
         return np.column_stack([x[U], x[W], x[V] - self._m.value * x[U]])
 
     def plane(self, x: np.ndarray) -> np.ndarray:
-        """Return the amplitudes U, W and the pressures of a mode as unknowns of the problem.
+        """Return the radial and axial amplitudes and the pressures of a mode as unknowns of the problem.
 
         Args:
             x: mode, locally owned entries, shape (n,).
@@ -217,22 +218,23 @@ class SecondVariation:
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
-        """Return the bilinear form (UFL) of the second variation of energy and loads, dimensionless."""
+        """Return the bilinear form (UFL) of the second variation of energy and work of loads, dimensionless."""
         forms, kinematics = self._forms, self.problem.scene.kinematics
         h, v, w = fem.Function(self.space), ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
 
         def displacement(mode: Any) -> Any:
-            """Return the displacement amplitudes (U, W, V) of a mode (UFL, length)."""
+            """Return the radial, axial and hoop displacement amplitudes of a mode (UFL, shape (3,), length)."""
             U, W, V = (ufl.split(mode)[0][i] for i in range(3))
             return forms.constant(forms.length) * ufl.as_vector([U, W, V - self._m * U])
 
         def gradient(mode: Any) -> Any:
-            """Return the change H of F by a mode (UFL)."""
+            """Return the change of the deformation gradient by a mode (UFL, shape (3, 3))."""
             return kinematics.mode_gradient(displacement(mode), forms.X, self._number)
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
-            """Return F changed within or across its blocks (UFL)."""
+            """Return the deformation gradient, changed by a mode within its blocks or across them (UFL, shape (3, 3)).
+            """
             return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])
@@ -310,10 +312,14 @@ class SecondVariation:
                                            lambda X: np.hypot(X[0] - point[0], X[1] - point[1]) < near)[0]
 
     def _find_constrained(self, number: float, flipped: str | None) -> np.ndarray:
-        """Return the local numbers of the constrained unknowns of the modes of a wave number and symmetry, with ghosts.
+        """Return the local numbers of the constrained unknowns of modes, with ghosts.
 
         A boundary or node that is constrained in r and in z is also constrained round the axis: a clamped rim, a fixed
         node, a face with prescribed displacement.
+
+        Args:
+            number: circumferential wave number; in plane strain the wave number along the depth.
+            flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
         """
         problem, constrained, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
@@ -343,8 +349,9 @@ class SecondVariation:
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Yield (number of the item in the scene, row, correction) for each constraint of a mean displacement.
 
-        The row for wave number n is row - m correction; both have the shape (locally owned unknowns,). A support that
-        constrains both mean components also constrains the mean of V.
+        The row for modes of circumferential wave number n is row - m correction, with m = 1 for n = 1 and 0 else; both
+        have the shape (locally owned unknowns,). A support that constrains both mean components also constrains the
+        mean hoop displacement.
         """
         forms, problem = self._forms, self.problem
         n = problem.n_owned
@@ -366,7 +373,7 @@ class SecondVariation:
         Args:
             contact: the contact of the problem.
             fields: locally owned unknowns of the problem.
-            m: factor m of V + m U.
+            m: 1 for modes of one wave round the axis, whose third unknown is V + U; else 0.
         """
         control = self.problem.control
         plane = contact.stiffness(fields, control)
@@ -383,11 +390,12 @@ class SecondVariation:
     def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return (unknowns, stiffness matrices) of nodes with a constrained radius that are free round the axis.
 
-        The outward force f on such a node acts along a circle: its second variation is -f V^2/r.
+        The outward force f on such a node acts along a circle: its second variation by a hoop displacement V is -f
+        V^2/r.
 
         Args:
             fields: locally owned unknowns of the problem.
-            m: factor m of V + m U.
+            m: 1 for modes of one wave round the axis, whose third unknown is V + U; else 0.
         """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
         constrained = np.zeros(len(self._V_of), dtype=bool)
