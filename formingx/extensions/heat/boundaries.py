@@ -1,7 +1,7 @@
 """Thermal properties of a body, and the laws of heat at its faces and in its interior.
 
 A flux is heat into the body per deformed area and time. All numbers are in one consistent set of units, with the mesh's
-unit of length. A "table over R" is a `formingx.table` of the reference radius.
+unit of length. A `table` over the reference radius is a `formingx.table`.
 """
 
 from typing import Any
@@ -102,8 +102,8 @@ class Convection(_Boundary):
 
     Args:
         on: name of the boundary.
-        h: heat transfer coefficient, heat per time, area and degree, number or table over R.
-        air: temperature of the air, number or table over R.
+        h: heat transfer coefficient, heat per time, area and degree, number or `table` over the reference radius.
+        air: temperature of the air, number or `table` over the reference radius.
 
     >>> fx.Convection("top", h=2e-5, air=fx.table({0.0: 25.0, 10.0: 20.0}))              # W/(mm2 K); by R
     Convection('top', h=2e-05, air=table({0: 25, 10: 20}))
@@ -137,9 +137,9 @@ class Radiation(_Boundary):
 
     Args:
         on: name of the boundary.
-        emissivity: emissivity of the face, from 0 to 1, number or table over R.
-        heater: temperature of the heater, number or table over R.
-        view_factor: view factor f, from 0 to 1, number or table over R.
+        emissivity: emissivity of the face, from 0 to 1, number or `table` over the reference radius.
+        heater: temperature of the heater, number or `table` over the reference radius.
+        view_factor: view factor f, from 0 to 1, number or `table` over the reference radius.
         stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
 
     >>> fx.Radiation("top", emissivity=0.9, heater=600.0, stefan_boltzmann=5.67e-14)      # W/(mm2 K4)
@@ -157,7 +157,7 @@ class Radiation(_Boundary):
         self._between("view_factor", 0.0, 1.0)
 
     def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
-        """Return the heat flux from the heater into the face, less the radiation of the face.
+        """Return the heat flux into the face, proportional to heater^4 - T^4 in absolute temperatures.
 
         Args:
             T: temperature of the face (UFL scalar).
@@ -179,7 +179,7 @@ class HeatFlux(_Boundary):
 
     Args:
         on: name of the boundary.
-        flux: heat per time and area, number or table over R; negative out of the body.
+        flux: heat per time and area, number or `table` over the reference radius; negative out of the body.
 
     >>> fx.HeatFlux("top", flux=1e-3)
     HeatFlux('top', flux=0.001)
@@ -207,7 +207,7 @@ class FixedTemperature(_Boundary):
 
     Args:
         on: name of the boundary.
-        temperature: number or table over R.
+        temperature: number or `table` over the reference radius.
 
     >>> fx.FixedTemperature("rim", temperature=80.0)
     FixedTemperature('rim', temperature=80.0)

@@ -412,8 +412,7 @@ class Conduction(HeatVectors):
         return line + u[cKDTree(X).query(line)[1]]
 
     def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
-        """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of the rates of heat at the last
-        `T`.
+        """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
 
         Args:
             c: factor of the rates, time.

@@ -108,9 +108,7 @@ class HeatVectors:
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Set `self.T` to T; return the rates of heat over `capacity`, without tools, locally owned entries, shape
-        (n,).
-        """
+        """Set `self.T` to T; return rates of heat over `capacity`, without tools, locally owned entries, shape (n,)."""
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power

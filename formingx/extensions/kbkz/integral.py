@@ -143,8 +143,7 @@ class Integral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and its
-        derivatives.
+        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and derivatives.
 
         Args:
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
