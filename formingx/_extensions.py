@@ -13,7 +13,7 @@ _FOLDER = Path(__file__).parent / "extensions"
 
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
-    """Skip the rest of the block if it needs an extension whose folder is missing.
+    """Provide a block that ends silently if it imports an extension whose folder is missing.
 
     Raises:
         ModuleNotFoundError: another module is missing.

@@ -152,7 +152,7 @@ def count(name: str, value: Any) -> int:
 
 
 def instance(name: str, value: Any, kind: Any, what: str) -> Any:
-    """Return an argument of a given type.
+    """Return an argument that is of a given type.
 
     Args:
         name: name of the argument, for the message.
@@ -332,7 +332,7 @@ def known(kind: str, name: Any, names: Any) -> None:
     """Check that a name is one of the known names.
 
     Args:
-        kind: kind of the name, for the message.
+        kind: kind of the name, such as "Scene: layer", for the message.
         name: the name.
         names: the known names.
 

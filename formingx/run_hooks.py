@@ -48,7 +48,7 @@ class MeshAdaptation(Protocol):
     """Adaptation of the mesh to the states of a first run, for `trace(adapt_mesh=...)`."""
 
     def check(self, mesh: Mesh) -> None:
-        """Check that a mesh can be adapted.
+        """Check that `mesh` can be adapted.
 
         Raises:
             InputError: the mesh cannot be adapted.

@@ -73,7 +73,7 @@ class Units:
 
     @property
     def tension(self) -> str:
-        """Unit of forces per length, stress length: "MPa mm"; "" if a unit is not given."""
+        """Unit of forces per length, stress length: "MPa mm" for mm and MPa; "" if a unit is not given."""
         return self._derived({}, 1).removesuffix("1")
 
     @property

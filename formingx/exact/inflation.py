@@ -248,7 +248,7 @@ class ThickWallState:
         return -(self.radial + self.hoop + self.third) / 3
 
     def cauchy(self, direction: Any) -> np.ndarray:
-        """Return the Cauchy stress in components r, z, hoop, shape (n, 3, 3), stress.
+        """Return the Cauchy stresses at the points through the wall, in components r, z, hoop, shape (n, 3, 3), stress.
 
         Args:
             direction: vector (r, z) of any length that points outwards through the wall, shape (2,) or (n, 2); (1, 0)

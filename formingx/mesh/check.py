@@ -13,10 +13,10 @@ _MIN_AREA = 1e-12                          # area over the square of the longest
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Check the elements of a section in the reference configuration.
+    """Check the triangles of a mesh in the reference configuration.
 
     Args:
-        points: nodes, shape (n, 2), length.
+        points: nodes (R, Z), shape (n, 2), length.
         triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
         what: name of the mesh, with which the message begins.
 

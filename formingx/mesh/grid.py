@@ -54,7 +54,7 @@ def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def to_grid(mesh: Mesh) -> Grid:
-    """Return the mesh as plain arrays, on one rank only; node i of the mesh has the number i + 1.
+    """Return the mesh as plain arrays (`Grid`), on one rank only; node i of the mesh has the number i + 1.
 
     Raises:
         InputError: there is more than one rank.
@@ -68,7 +68,7 @@ def to_grid(mesh: Mesh) -> Grid:
 
 
 def gathered(mesh: Mesh) -> Grid:
-    """Return the whole mesh as plain arrays on all ranks; collective."""
+    """Return the whole mesh as plain arrays (`Grid`), equal on all ranks; collective."""
     domain, comm = mesh.domain, mesh.comm
     owned, X = len(own_cells(domain)), domain.geometry.x
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))

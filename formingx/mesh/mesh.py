@@ -80,7 +80,7 @@ class Mesh:
     preset: Preset | None = None
 
     def __str__(self) -> str:
-        """Return a summary of the mesh; sizes and numbers of edges only on one rank, because it is not collective."""
+        """Return a summary of the mesh; not collective, so on several ranks without sizes and numbers of edges."""
         cells, serial = self.domain.topology.index_map(2).size_global, self.comm.size == 1
         edges = {name: f" ({len(self.facets_of(name))} edges)" if serial else "" for name in self.boundaries}
         lines = [f"{cells} six-node triangles"]
@@ -91,7 +91,7 @@ class Mesh:
                           f"boundaries: {', '.join(name + of for name, of in edges.items())}"])
 
     def check(self) -> None:
-        """Check the elements of a mesh whose nodes were moved; collective.
+        """Check the elements of this mesh, after a script moved its nodes; collective.
 
         Raises:
             InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet
@@ -107,7 +107,11 @@ class Mesh:
         check_elements(points, triangles, "the mesh")
 
     def facets_of(self, boundary: str) -> np.ndarray:
-        """Return the local numbers of the facets of a boundary, sorted, shape (n,), ghosts included."""
+        """Return the local numbers of the facets of a boundary, in ascending order, with ghosts, shape (n,).
+
+        Args:
+            boundary: name of the boundary.
+        """
         known("Mesh: boundary", boundary, self.boundaries)
         return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
 
@@ -119,9 +123,9 @@ class Mesh:
         Args:
             name: new name of the part.
             of: name of the boundary that contains the part.
-            within: (lowest, highest) reference coordinate, length. Nodes must lie there (see `concentrate` of `disc`),
-                unless the boundary ends before.
-            along: the coordinate, "r" or "z".
+            within: (lowest, highest) reference coordinate of the part, length. Nodes must lie at both (see
+                `concentrate` of `disc`), unless the boundary ends before.
+            along: coordinate that `within` limits, "r" or "z".
 
         Raises:
             InputError: `of` is unknown, `name` is not new, no facet lies between the coordinates, or a facet is cut.
@@ -186,8 +190,11 @@ class Mesh:
     def nodes_of(self, boundary: str) -> np.ndarray:
         """Return the coordinates of all nodes of a boundary, sorted by R, then Z; collective.
 
+        Args:
+            boundary: name of the boundary.
+
         Returns:
-            Shape (n, 2), in three dimensions (n, 3), length.
+            Coordinates (R, Z), shape (n, 2), in three dimensions (x, y, z), shape (n, 3), length; equal on all ranks.
         """
         domain, facets = self.domain, self.facets_of(boundary)
         nodes = np.unique(numbers_of_facets(domain, facets))
@@ -203,8 +210,11 @@ class Mesh:
 
         The first node is the end of smaller R, or of smaller Z for equal R.
 
+        Args:
+            boundary: name of the boundary.
+
         Returns:
-            Shape (2 n + 1, 2) for n edges, with the ends in even rows, length; equal on all ranks.
+            Nodes (R, Z), shape (2 n + 1, 2) for n edges, with the ends in even rows, length; equal on all ranks.
 
         Raises:
             InputError: the boundary is not one line with two ends.

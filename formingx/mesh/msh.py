@@ -290,7 +290,7 @@ def _elements_2(section: Section) -> list[Block]:
 
 
 def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
-    """Return {(dimension, entity): numbers of its physical groups}.
+    """Return {(dimension, entity): numbers of its physical groups} from a section of an MSH 4.1 file.
 
     Args:
         section: the section $Entities or $PartitionedEntities.

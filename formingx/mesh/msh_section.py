@@ -32,7 +32,7 @@ class Section:
 
     @property
     def binary(self) -> bool:
-        """True in a binary file."""
+        """True if the file is binary."""
         return self._binary
 
     def line(self) -> int:
@@ -49,26 +49,26 @@ class Section:
         return int(word)
 
     def reals(self, n: int) -> np.ndarray:
-        """Return the next n real numbers."""
+        """Return the next n numbers of the section as floats, shape (n,)."""
         return self._take(n, "f8")
 
     def ints(self, n: int) -> np.ndarray:
-        """Return the next n integers of four bytes."""
+        """Return the next n numbers of the section, integers of four bytes in a binary file, shape (n,)."""
         return self.whole(self._take(n, "i4"))
 
     def int_list(self, n: int) -> list[int]:
-        """Return the next n integers of four bytes as a list."""
+        """Return the next n numbers of the section, as in `ints`, as a list."""
         return [int(value) for value in self.ints(n)]
 
     def sizes(self, n: int) -> np.ndarray:
-        """Return the next n integers of the file's size type (counts, node and element numbers)."""
+        """Return the next n counts, node or element numbers, integers of `width` bytes in a binary file, shape (n,)."""
         return self.whole(self._take(n, f"u{self._width}"))
 
     def end(self) -> None:
-        """Check that the whole section was read.
+        """Check that all numbers of the section were read.
 
         Raises:
-            InputError: numbers are left over, which would be lost.
+            InputError: numbers are left over.
         """
         remaining = len(self._body[self._offset:].strip()) if self._binary else len(self._values) - self._offset
         if remaining:
@@ -108,7 +108,7 @@ class Section:
         return found
 
     def whole(self, values: np.ndarray) -> np.ndarray:
-        """Return real numbers as integers.
+        """Return floats as integers, of the shape of `values`.
 
         Raises:
             InputError: a number is not an integer.

@@ -14,22 +14,30 @@ COORDINATES = 2
 
 
 def axes(domain: Any) -> str:
-    """Return the names of the two reference coordinates: "RZ" for a section, "xy" for a sheet in three dimensions."""
+    """Return the names of the reference coordinates of a DOLFINx mesh: "RZ" for a section, "xy" in three dimensions."""
     return "RZ" if domain.geometry.dim == 2 else "xy"
 
 
 def own_cells(domain: Any) -> np.ndarray:
-    """Return the local numbers of the cells that this rank owns, shape (m,)."""
+    """Return the local numbers of the cells of a DOLFINx mesh that this rank owns, shape (m,)."""
     return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
 
 
 def of_mesh(domain: Any) -> np.ndarray:
-    """Return the reference positions of this rank's nodes, shape (n, COORDINATES), length."""
+    """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, COORDINATES), length."""
     return domain.geometry.x[:, :COORDINATES]
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
-    """Return the lowest and highest coordinates of all nodes, shape (2, COORDINATES), length; collective."""
+    """Return the lowest and highest coordinates of all nodes of a DOLFINx mesh; collective.
+
+    Args:
+        domain: the mesh.
+        comm: MPI communicator.
+
+    Returns:
+        Coordinates, shape (2, COORDINATES), length.
+    """
     X = of_mesh(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
@@ -59,18 +67,33 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def of_cells(domain: Any, cells: Any) -> np.ndarray:
-    """Return the nodes of cells, corners first, shape (cells, nodes, coordinates), length."""
+    """Return the positions of the nodes of cells, corners first, shape (cells, nodes, coordinates), length.
+
+    Args:
+        domain: the DOLFINx mesh.
+        cells: local numbers of the cells.
+    """
     geometry = domain.geometry
     return geometry.x[np.asarray(_compat.cell_nodes(domain))[cells], :geometry.dim]
 
 
 def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the nodes of facets, ends first, shape (facets, 2 or 3, coordinates), length."""
+    """Return the positions of the nodes of facets, ends first, shape (facets, 2 or 3, coordinates), length.
+
+    Args:
+        domain: the DOLFINx mesh.
+        facets: local numbers of the facets.
+    """
     return domain.geometry.x[numbers_of_facets(domain, facets), :domain.geometry.dim]
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the local node numbers of facets, ends first, shape (facets, 2 or 3): rows of `domain.geometry.x`."""
+    """Return the nodes of facets, ends first, as rows of `domain.geometry.x`, shape (facets, 2 or 3).
+
+    Args:
+        domain: the DOLFINx mesh.
+        facets: local numbers of the facets.
+    """
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

@@ -101,23 +101,23 @@ def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _line(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the line of an entity LINE, as a list."""
+    """Return the line of a DXF entity LINE, as a list; arguments as in `_pieces`."""
     return [Line(_in_plane(entity.dxf.start, name), _in_plane(entity.dxf.end, name))]
 
 
 def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the arc of an entity ARC, as a list."""
+    """Return the arc of a DXF entity ARC, as a list; arguments as in `_pieces`."""
     start, end = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the circle of an entity CIRCLE, as a list with an arc of 360 degrees."""
+    """Return the arc of 360 degrees of a DXF entity CIRCLE, as a list; arguments as in `_pieces`."""
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a polyline.
+    """Return the lines and arcs of a DXF polyline; arguments as in `_pieces`.
 
     Each point has a bulge: the tangent of a quarter of the angle of the arc that follows, negative if clockwise.
 
@@ -150,7 +150,7 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along an ellipse, within the tolerance.
+    """Return arcs along a DXF ellipse, within the tolerance; arguments as in `_pieces`.
 
     Raises:
         InputError: the ratio of the axes is not between 0 and 1, or there is no tolerance.
@@ -169,7 +169,7 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along the smooth parts of a spline between its knots, within the tolerance."""
+    """Return arcs along the smooth parts of a DXF spline between its knots; arguments as in `_pieces`."""
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
     tool = entity.construction_tool()
@@ -197,7 +197,7 @@ def _is_visible(entity: Any, drawing: Any) -> bool:
 
 
 def unit(file: str) -> str | None:
-    """Return the unit of length of a drawing ($INSUNITS), or None.
+    """Return the name of the unit of length that a DXF file states ($INSUNITS), or None.
 
     Raises:
         InputError: the file cannot be read, or the unit is not supported.

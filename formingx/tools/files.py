@@ -197,7 +197,7 @@ def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
 
 
 def _geo_curves(file: str) -> _Curves:
-    """Return the curves of a .geo file."""
+    """Return {number: function that returns the pieces, or raises an error} of the curves of a .geo file."""
     def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
         if isinstance(piece, str):
             raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"
@@ -207,7 +207,7 @@ def _geo_curves(file: str) -> _Curves:
 
 
 def _mesh_curves(file: str) -> _Curves:
-    """Return the curves of a .msh file."""
+    """Return {number: function that returns the pieces, or raises an error} of the curves of a .msh file."""
     found = msh.content(file)
     points = dict(zip(map(int, found.numbers), found.points))
     lines: dict[int, list[tuple[int, int]]] = {}

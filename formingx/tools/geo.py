@@ -75,7 +75,7 @@ class _Drawing:
         self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
-        """Add the content of one statement.
+        """Add the points, curve or number that one statement of a script defines.
 
         Raises:
             ValueError: the statement is not supported.
@@ -151,7 +151,7 @@ class _Drawing:
         self.curves[tag] = piece
 
     def _point(self, number: float) -> np.ndarray:
-        """Return a point by its number.
+        """Return the point (x, y) with a number, shape (2,).
 
         Raises:
             ValueError: there is no such point.
@@ -185,7 +185,7 @@ class _Drawing:
         return float(self._value(ast.parse(text.strip().replace("^", "**"), mode="eval").body))
 
     def _value(self, node: ast.expr) -> float:
-        """Return the value of a node of the syntax tree.
+        """Return the value of a node of the syntax tree of an expression.
 
         Raises:
             ValueError: the node is not a number, a known name or an operation.

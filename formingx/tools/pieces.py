@@ -28,12 +28,12 @@ class Line(NamedTuple):
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """First and last point (R, Z), length."""
+        """First and last point (R, Z) of the line, shape (2,) each, length."""
         return self.a, self.b
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Angle between the line and the R axis at its first and last point (both equal), radians."""
+        """Angles between the line and the R axis at its first and last point, which are equal, radians."""
         angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
         return angle, angle
 
@@ -60,14 +60,14 @@ class Arc(NamedTuple):
 
     @property
     def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """First and last point (R, Z), length."""
+        """First and last point (R, Z) of the arc, shape (2,) each, length."""
         first, last = (self.centre + self.radius * np.array([math.cos(a), math.sin(a)])
                        for a in (self.start, self.start + self.sweep))
         return first, last
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Angle between the tangent and the R axis at the first and the last point, radians."""
+        """Angles between the tangent of the arc and the R axis at its first and last point, radians."""
         quarter = math.copysign(math.pi / 2, self.sweep)
         return self.start + quarter, self.start + self.sweep + quarter
 

@@ -143,27 +143,36 @@ class Tool:
         return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
-        """Return the tool shifted by (r, z), length."""
+        """Return the tool shifted in its plane.
+
+        Args:
+            r: shift along R, length.
+            z: shift along Z, length.
+        """
         shift = np.array([finite("Tool.moved: r", r), finite("Tool.moved: z", z)])
         return self._with_pieces([Line(p.a + shift, p.b + shift) if isinstance(p, Line)
                                   else p._replace(centre=p.centre + shift) for p in self.pieces])
 
     def turned(self, angle: float) -> Tool:
-        """Return the tool rotated counter-clockwise about the origin by an angle in degrees (plane strain)."""
+        """Return the tool rotated counter-clockwise about the origin, for plane strain.
+
+        Args:
+            angle: angle of the rotation, degrees.
+        """
         a = math.radians(finite("Tool.turned: angle", angle))
         Q = np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]])
         return self._with_pieces([Line(Q @ p.a, Q @ p.b) if isinstance(p, Line)
                                   else p._replace(centre=Q @ p.centre, start=p.start + a) for p in self.pieces])
 
     def mirrored(self) -> Tool:
-        """Return the tool upside down: Z becomes -Z."""
+        """Return the tool upside down, mirrored at Z = 0; its solid is mirrored, too."""
         flip = np.array([1.0, -1.0])
         return self._with_pieces([Line(p.b * flip, p.a * flip) if isinstance(p, Line)
                                   else Arc(p.centre * flip, p.radius, -p.start - p.sweep, p.sweep)
                                   for p in reversed(self.pieces)])
 
     def reversed(self) -> Tool:
-        """Return the tool with its solid on the other side of the profile."""
+        """Return the tool whose solid lies on the other side of the same profile."""
         return self._with_pieces([p.backwards for p in reversed(self.pieces)])
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
@@ -229,9 +238,11 @@ class Tool:
         self._table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
-        """Return (point, angle of the corner that the mirrored profile forms there) of the first and the last end.
+        """Return the corners that the profile and its mirror image form on R = 0, at the first and the last end.
 
-        An entry is None where the profile continues along its end piece. A closed profile has the angles 0.
+        Returns:
+            For each end (point, angle by which the mirrored profile turns there, radians), or None where the profile
+            continues along its end piece. A closed profile has two corners of angle 0.
         """
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)

@@ -15,7 +15,7 @@ class RigidTool(Protocol):
     """
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distance of points from the surface.
+        """Return the signed distance of points from the surface of the tool.
 
         Args:
             x: points, shape (n, components), length.
@@ -25,16 +25,16 @@ class RigidTool(Protocol):
         """
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the surface in straight pieces, for drawing and for checks.
+        """Return straight pieces of the tool's surface, for drawing and for checks.
 
         Returns:
-            Points, shape (n, components), length, and point numbers of the pieces: lines, shape (m, 2), or in three
+            Points, shape (n, components), length. Point numbers of the pieces: lines, shape (m, 2), or in three
             dimensions triangles, shape (m, 3).
         """
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lowest and highest coordinates of the drawn surface, shape (2, components), length."""
+        """Lowest and highest coordinates of the points of `surface`, shape (2, components), length."""
 
 
 class PlaneTool(RigidTool, Protocol):
