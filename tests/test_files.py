@@ -341,7 +341,7 @@ def test_report_of_a_run_that_failed(tmp_path):
     caught.value.path.report(tmp_path / "failed.html", failure=caught.value)
     text = page(tmp_path / "failed.html")
     assert "The run could not go on" in text and "max_steps = 4 were used up" in text
-    assert "The path ended early: it aimed at pole stretch 8" in text
+    assert "The path ended early: its target is pole stretch 8" in text
 
 
 @pytest.fixture(scope="module")
@@ -374,7 +374,7 @@ def test_report_of_tools(plugged, formed, tmp_path):
     plugged.report(tmp_path / "run.html")
     text = page(tmp_path / "run.html")
     force = f"{plugged.last.measures['plug_force']:.6g}"           # it travels down: what it takes resists
-    for words in ("plug", "1 arc, closed", "moves along (0, -1)", force, "floor", "1 line from", "stays",
+    for words in ("plug", "1 arc, closed", "moves along (0, -1)", force, "floor", "1 line from", "fixed",
                   " Stages ", "plug travel at its end", "largest force on plug"):
         assert words in text
     plugged.save(tmp_path / "run")
@@ -419,6 +419,38 @@ def test_runs_side_by_side(inflated, formed, tmp_path):
     assert [trace["name"] for trace in walls["traces"]] == ["sheet", "cup"]
     with pytest.raises(fx.InputError, match="2 runs and 1 names"):
         fx.report([inflated, formed], tmp_path / "three.html", names=["a"])
+
+
+def test_runs_with_and_without_time_side_by_side(formed, tmp_path):
+    """The gaps in the corners of both are drawn over the pressure."""
+    scene = cup("none")
+    timed = fx.Process(scene).run([fx.Stage("blow", amplitudes={scene.driven: [(0.0, 0.0), (1.0, 8.0)]})],
+                                  progress=False)
+    for runs in ([formed, timed], [timed, formed]):
+        fx.report(runs, tmp_path / "both.html", units=fx.Units("cm", "kg/cm2"))
+        gaps, = (chart for chart in drawn(tmp_path / "both.html")["charts"] if chart["title"].startswith("Gap"))
+        assert gaps["x"] == "pressure, kg/cm2" and len(gaps["traces"]) == 2
+        assert gaps["traces"][0]["y"][-1] == pytest.approx(gaps["traces"][1]["y"][-1], rel=1e-2)
+
+
+def test_a_sheet_that_creeps_under_its_weight(tmp_path):
+    """A run without a controlled load or tool: a report, and an animation of the pole height over time."""
+    creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=creeps,
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Gravity(1.0, value=1e-5)])
+    path = fx.Process(scene).run([fx.Stage("sag", duration=5.0)], progress=False)
+    path.report(tmp_path / "run.html")
+    run, = drawn(tmp_path / "run.html")["runs"]
+    assert np.allclose(run["progress"], path["process_time"] / 5.0, atol=1e-4)
+    path.animate(tmp_path / "run.gif", frames=2)
+    assert animation.columns_of_stages(path) == {"sag": ("process_time", "pole_height")}
+
+
+def test_largest_vacuum(tmp_path):
+    """A pressure below 0 is largest where its magnitude is."""
+    path = fx.trace(treloar((10, 1)), until=fx.pressure(-0.3), progress=False)
+    path.report(tmp_path / "run.html", units=fx.Units("cm", "kg/cm2"))
+    assert "-0.3 kg/cm2 largest pressure" in page(tmp_path / "run.html")
 
 
 def test_a_long_run_makes_a_small_file(formed, tmp_path):

@@ -171,7 +171,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
     body += [f"<p class=note>{html.escape(entry.text)}</p>" for entry in path.findings()]
-    body += [PROCESS, "<div class=grid>", *pictures, "</div><h2>The answer</h2>",
+    body += [PROCESS, "<div class=grid>", *pictures, "</div><h2>Key numbers</h2>",
              page.table(["", ""], [list(row) for row in found.rows]), "<h2>Curves</h2><div id=charts class=grid></div>"]
     names = list(dict.fromkeys(state.stage for state in path.states))
     columns = [c for c in path.columns if not c.endswith("error")]

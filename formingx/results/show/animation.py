@@ -1,7 +1,6 @@
 """Animation of the forming: the section and the loading curve, in frames evenly spaced over the process.
 
-The loading curve belongs to the control of the stage: the force of a plug over its travel, or a pressure over the pole
-height.
+The loading curve of a stage is, for example, the force of a plug over its travel, or a pressure over the pole height.
 """
 
 import shutil
@@ -58,7 +57,11 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """Return frames evenly spaced over the progress of the process.
+    """Return the positions of frames that are evenly spaced over the progress of the process.
+
+    Args:
+        path: the computed `Path`.
+        frames: number of frames.
 
     Returns:
         For each frame a state, the next state, and the position between them, 0 to 1.
@@ -73,12 +76,16 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
-    """Return the columns (x, y) of the loading curve of each stage.
+    """Return the columns of the loading curve of each stage.
 
-    Fixed loads are left out. A stage without a control shows a force over time.
+    Pressures and travels that are constant in the stage are left out. If all are constant, the curve shows a force
+    over the process time.
+
+    Args:
+        path: the computed `Path`.
 
     Returns:
-        {stage: (x, y)}.
+        {name of the stage: (name of the column x, name of the column y)}.
     """
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
@@ -94,7 +101,16 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
 
 
 def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
-    """Return the frames of the animation as images, one for each shape."""
+    """Return the frames of the animation as images.
+
+    Args:
+        shapes: `Profile` of the sheet in each frame.
+        tools: placed tools in each frame (`Tooling.placed`).
+        now: for each frame the names (x, y) of the columns of the loading curve, and their values.
+        curves: {(x, y): values of both columns along the path, shapes (m,)}.
+        axisymmetric: False in plane strain.
+        units: units for the labels.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -125,7 +141,15 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
 
 
 def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], units: Units) -> None:
-    """Draw the loading curve, and a dot at the present state."""
+    """Draw the loading curve, and a dot at the state of the frame.
+
+    Args:
+        axes: matplotlib axes, which are cleared.
+        names: names of the columns (x, y).
+        curve: values of both columns along the path, shapes (m,).
+        point: values of both columns in the frame.
+        units: units for the labels.
+    """
     x, y = map(units.label, names)
     axes.clear()
     axes.grid(True, color="0.9", linewidth=0.7)
@@ -137,7 +161,13 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], u
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write the frames as a GIF; the last one is shown for one second more."""
+    """Write images as an animated GIF; the last one is shown for one second more.
+
+    Args:
+        pictures: the images.
+        seconds: duration, s.
+        stream: binary stream of the file.
+    """
     from PIL import Image
     pictures = [picture.quantize(256, dither=Image.Dither.NONE) for picture in pictures]
     each = max(int(1000 * seconds / len(pictures)), 20)
@@ -146,7 +176,12 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
 
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write the frames as H.264, which every player reads; the last one is shown for one second more.
+    """Write images as an MP4 with H.264, which every player reads; the last one is shown for one second more.
+
+    Args:
+        pictures: the images.
+        seconds: duration, s.
+        stream: binary stream of the file, which is closed.
 
     Raises:
         OSError: ffmpeg failed.

@@ -1,4 +1,4 @@
-"""Data of a report's drawings for plotly.js: sections, surfaces and curves. The script `report.js` draws them."""
+"""Data of the drawings in a report: sections, surfaces and curves. The script `report.js` draws them with plotly.js."""
 
 import base64
 import functools
@@ -17,12 +17,12 @@ from .record import Record, words
 DIGITS = 5
 """Significant digits of drawn numbers."""
 STATIONS = 101
-"""Largest number of drawn places along a sheet."""
+"""Largest number of drawn points along a sheet."""
 
 
 @functools.cache
 def library() -> str:
-    """Return the compressed source of plotly.js.
+    """Return the source of plotly.js as `packed` text.
 
     Raises:
         InputError: plotly is not installed.
@@ -40,7 +40,8 @@ def library() -> str:
 
 
 def packed(text: str) -> str:
-    """Return a text, compressed, in letters that a page can hold; a higher level takes twice the time to save 6 %."""
+    """Return a text compressed by gzip and written in base64, which an HTML page can hold."""
+    # level 6 takes twice the time to save 6 %
     return base64.b64encode(gzip.compress(text.encode(), 4, mtime=0)).decode()
 
 
@@ -51,7 +52,7 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
         records: the runs.
         names: names of the runs.
         units: units for the labels.
-        extra: further data of each run, such as the "mesh" of a sheet.
+        extra: further entries of the data of each run, such as the "mesh" of a sheet in three dimensions.
     """
     runs = [_run(record, name, units) | (extra or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
@@ -61,7 +62,7 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
 
 
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
-    """Return the data of one run: its section and the colours, frame by frame."""
+    """Return the data of one run for `report.js`: stages, columns, tools and the sheet in each drawn state."""
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
               for a, b in record.stage_ranges]
@@ -77,7 +78,7 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
 
 
 def _sheet(record: Record, units: Units) -> dict[str, Any]:
-    """Return the profiles and fields of a sheet, frame by frame."""
+    """Return the outline of a sheet and the fields on it in each drawn state, at up to `STATIONS` points along it."""
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
@@ -97,12 +98,21 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
 
 
 def _label(record: Record, units: Units, key: str) -> str:
-    """Return the label of a field, with its unit."""
+    """Return the label of a field with its unit.
+
+    Args:
+        record: the run, for the unit of temperatures.
+        units: units of the script.
+        key: name of the field, such as "contact pressure".
+    """
     return f"{key}, {record.unit}" if key == "temperature" and record.unit else units.label(key.replace(" ", "_"), key)
 
 
 def _tools(record: Record) -> list[dict[str, Any]]:
-    """Return the outline of each tool of a section, its offset outline, direction, and travel in every frame."""
+    """Return for each tool of a section its outline, an outline inside the tool, its direction, and its travels.
+
+    The travels belong to the drawn states; None while the tool is inactive.
+    """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found, frames = [], record.frames
@@ -119,7 +129,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """Return the loading curves of each stage: force of a tool over its travel, or pressure over the pole height."""
+    """Return charts of the loading curves of each stage: force of a tool over travel, or pressure over pole height."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         for a, b in record.stage_ranges:
@@ -133,7 +143,15 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Return (name of x, name of y, x, y) of the loading curves of a stage."""
+    """Return the loading curves of a stage, of each quantity that changes in it.
+
+    Args:
+        record: the run.
+        stage: slice of the states of the stage.
+
+    Returns:
+        For each curve the names of the columns x and y, and their values.
+    """
     found, measures = [], record.measures
     for column, values in measures.items():
         if np.ptp(values[stage]) <= 1e-9 * (np.ptp(values) or 1.0):
@@ -154,7 +172,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
 
 
 def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return curves of the control, the tool forces and the temperature of the body over the process time."""
+    """Return charts of pressures, travels, tool forces and the temperature of the body over the process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
@@ -178,17 +196,23 @@ def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
-    """Return a curve, with dots at the states unless there are too many."""
+    """Return a curve as data of plotly, with dots at the states if there are at most 60.
+
+    Args:
+        x: values at the states, shape (n,).
+        y: values at the states, shape (n,).
+        name: name of the curve in the legend.
+    """
     return {"x": rounded(x), "y": rounded(y), "name": name, "marker": {"size": 4},
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
 
 def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
-    """Return curves of the remaining gap in every corner of the fixed tools.
+    """Return a chart of the remaining gap in each corner of the fixed tools, or None without corners.
 
-    They run over the process time, or, without it, over the pressure in the last stage.
+    The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage.
     """
-    traces, timed = [], any(record.timed for record in records)
+    traces, timed = [], all(record.timed for record in records)
     for record, name in zip(records, names):
         abscissa = record.measures["process_time"] if timed else next(
             (v for c, v in record.measures.items() if c.endswith("pressure")), None)
@@ -202,9 +226,9 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return two charts of the final wall thickness, over height and over arc length, whole and of each layer.
+    """Return two charts of the wall thickness in the last state, whole and of each layer: over height and arc length.
 
-    A chart is None if no record has a profile.
+    A chart is None if no run has a profile.
     """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
@@ -220,12 +244,21 @@ def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[s
             by_height.append({"x": rounded(values), "y": rounded(wall.height), "name": label, "mode": "lines"})
             by_length.append({"x": rounded(wall.arc_length), "y": rounded(values), "name": label, "mode": "lines"})
     label = units.label("wall")
-    return [_chart("Wall against height above the base", label, units.label("height"), by_height, zero="x"),
+    return [_chart("Wall against height (distance in z from the pole, or from the lowest point)", label,
+                   units.label("height"), by_height, zero="x"),
             _chart("Wall against arc length from the axis", units.label("arc_length"), label, by_length, zero="y")]
 
 
 def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> dict[str, Any] | None:
-    """Return a chart of curves, or None without curves."""
+    """Return a chart as data for `report.js`, or None without curves.
+
+    Args:
+        title: title of the chart.
+        x: label of the horizontal axis.
+        y: label of the vertical axis.
+        traces: the curves.
+        zero: axis that begins at 0, "x" or "y"; "": none.
+    """
     if not traces:
         return None
     return {"title": title, "x": x, "y": y, "zero": zero,
@@ -233,11 +266,12 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
 
 
 def rounded(values: Any, each: bool = False) -> list:
-    """Return numbers as lists with few digits.
+    """Return the numbers of an array as nested lists, rounded to few digits.
 
     Args:
-        values: an array.
-        each: True for `DIGITS` digits of each number, False for the digits of the largest.
+        values: an array of one or more dimensions.
+        each: True for `DIGITS` significant digits of each number. False: all numbers of a row are rounded to the last
+            of these digits of the largest number.
     """
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)

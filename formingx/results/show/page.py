@@ -1,4 +1,4 @@
-"""Elements of an HTML page."""
+"""Elements of an HTML page, as HTML text."""
 
 import base64
 import html
@@ -13,8 +13,8 @@ def page(title: str, body: list[str], tail: str = "") -> str:
 
     Args:
         title: title of the window; the heading is part of the body.
-        body: elements of the page.
-        tail: text behind the body, such as scripts.
+        body: elements of the page, as HTML.
+        tail: HTML after the elements, such as scripts.
     """
     style = resources.files(__package__).joinpath("report.css").read_text()
     return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
@@ -26,8 +26,8 @@ def table(head: list[str], rows: list[list[str]]) -> str:
     """Return an HTML table; columns of numbers are aligned right.
 
     Args:
-        head: names of the columns. Two empty names give a table of names and values without a head.
-        rows: the cells.
+        head: names of the columns; empty names: the table has no head.
+        rows: the cells of each row, as text.
     """
     numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
 
@@ -40,6 +40,7 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def _is_number(text: str) -> bool:
+    """Return True if the text of a cell is a number or empty."""
     try:
         float(text or 0)
     except ValueError:
@@ -48,12 +49,17 @@ def _is_number(text: str) -> bool:
 
 
 def details(title: str, content: str) -> str:
-    """Return a section that is closed until the reader opens it."""
+    """Return a section of which the reader sees the title, and the content after a click.
+
+    Args:
+        title: title, as text.
+        content: the content, as HTML.
+    """
     return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
 
 
 def figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    """Return a matplotlib figure with a caption.
+    """Return a matplotlib figure as a PNG picture with a caption.
 
     Args:
         figure: the figure.
@@ -69,8 +75,8 @@ def picture(png: bytes, caption: str, kind: str) -> str:
     """Return a PNG picture with a caption.
 
     Args:
-        png: content of the file.
-        caption: text below it.
+        png: content of the PNG file.
+        caption: text below the picture.
         kind: "wide", or "small" for less than the full width.
     """
     text = html.escape(caption, quote=True)
@@ -79,10 +85,10 @@ def picture(png: bytes, caption: str, kind: str) -> str:
 
 
 def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
-    """Return lines over 1, 2, 3, ... with a logarithmic axis as a small figure (SVG), with a caption.
+    """Return a small figure (SVG) of lines over 1, 2, 3, ..., with a logarithmic vertical axis and a caption.
 
     Args:
-        lines: positive values; empty lines are left out.
+        lines: positive values of each line; empty lines are left out.
         x: label of the horizontal axis.
         y: label of the vertical axis.
         caption: text below the figure.
@@ -116,10 +122,10 @@ def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
 
 
 def lines(text: str) -> str:
-    """Return a text whose line breaks HTML keeps."""
+    """Return a text as HTML with its line breaks."""
     return html.escape(text).replace("\n", "<br>")
 
 
 def number(value: float) -> str:
-    """Return a number with six digits."""
+    """Return a number as text with six significant digits."""
     return f"{value:.6g}"

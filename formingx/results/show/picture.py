@@ -7,7 +7,10 @@ from typing import Any
 
 
 class Picture(os.PathLike):
-    """Picture (.png, .gif) or film (.mp4) in a file; a notebook shows its present content.
+    """Picture (.png, .gif) or animation (.mp4) in a file; a notebook shows the present content of the file.
+
+    Args:
+        file: name of the file.
 
     Attributes:
         file: path of the file (`pathlib.Path`).

@@ -6,9 +6,16 @@ from ...figures import figure
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
-    """Draw column y over column x of a path.
+    """Draw column `y` over column `x` of a path.
 
-    States are dots on the line of the path. Limit points are circled, states after jumps are diamonds.
+    States are dots on the smooth line of the path. Limit points are circled, states after jumps are diamonds.
+
+    Args:
+        path: the computed `Path`.
+        y: name of a column.
+        x: name of a column.
+        axes: matplotlib axes; default new ones.
+        style: keyword arguments of matplotlib's `plot`.
 
     Returns:
         The matplotlib axes; `axes.figure.savefig` saves them.
@@ -25,7 +32,13 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 
 
 def convergence(path: Any, axes: Any = None) -> Any:
-    """Draw the correction (Song 1993, eq. 3.5.1) over the iterations, one line per state (as in figures 3.2 and 5.7).
+    """Draw the correction of the Newton iterations over their number, one line for each state.
+
+    The correction is |dx|/|x| (Song 1993, eq. 3.5.1; figures 3.2 and 5.7 are of this kind).
+
+    Args:
+        path: the computed `Path`.
+        axes: matplotlib axes; default new ones.
 
     Returns:
         The matplotlib axes.
@@ -41,9 +54,11 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
 
 def main_columns(columns: list[str]) -> tuple[str, str]:
-    """Return the columns (x, y) of the main loading curve.
+    """Return the names (x, y) of the columns of the main loading curve.
 
-    They are the force of a tool over its travel, or the controlled pressure over the pole height.
+    They are the force of a tool over its travel, or else a pressure over the pole height. A run without both gives the
+    pole height over the process time, or its control, which is the first column, over the pole height. Where there is
+    no pole height, another measure of the deformation takes its place.
 
     Args:
         columns: names of all columns.
@@ -53,18 +68,21 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
         own_force = travel.replace("travel", "force")
         forces = [c for c in columns if c.endswith("_force")]       # tools that move come first
         return travel, next(c for c in (own_force, *forces, "pole_height", "strain_energy") if c in columns)
-    return (next(c for c in ("pole_height", "enclosed_volume", "strain_energy") if c in columns),
-            next(c for c in columns if c.endswith("pressure")))
+    deformation = next(c for c in ("pole_height", "enclosed_volume", "strain_energy", "volume_error") if c in columns)
+    pressure = next((c for c in columns if c.endswith("pressure")), None)
+    if pressure is None and columns[0] == "process_time":
+        return columns[0], deformation
+    return deformation, pressure or columns[0]
 
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
-    """Draw the deformed sheet as strips between its two faces.
+    """Draw the deformed sheet as coloured strips between its two faces.
 
     Args:
         axes: matplotlib axes.
-        profile: the `Profile`.
-        scale: factors of r and z.
-        colours: RGBA at the n nodes, shape (n, 4).
+        profile: the `Profile` of the sheet at n nodes.
+        scale: factors by which r and z are multiplied, such as (-1, 1) for the mirror image.
+        colours: colours (red, green, blue, opacity) at the nodes, 0 to 1, shape (n, 4).
     """
     import numpy as np
     from matplotlib.collections import PolyCollection
@@ -75,11 +93,11 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
-    """Return two corners (r, z), low and high, of a box around sheets, with a margin.
+    """Return the lower and the upper corner (r, z) of a box around deformed sheets, with a margin, length.
 
     Args:
-        profiles: profiles of the sheets.
-        mirrored: True to include their mirror images at r = 0.
+        profiles: a `Profile` of each sheet.
+        mirrored: True to include the mirror images of the sheets at r = 0.
     """
     import numpy as np
     points = np.vstack([side for profile in profiles for side in (profile.bottom, profile.top)])
@@ -91,10 +109,10 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """Draw the deformed sheet filled between its faces.
+    """Draw the deformed sheet as an area between its two faces, in one colour.
 
     Args:
-        profile: the `Profile`.
+        profile: the `Profile` of the sheet.
         axes: matplotlib axes; r points to the right.
         scale: factor of all lengths.
         style: keyword arguments of matplotlib's `fill`.

@@ -1,4 +1,4 @@
-"""Run as plain data, from a path or from a checkpoint alone, for reports and pictures."""
+"""Data of a run for reports and animations, from a path or from a checkpoint without the scene."""
 
 import sys
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from ..files.progress import progress as shown_progress
 from ..files.status import aimed
 
 PENETRATION = 0.05
-"""Penetration over the smallest thickness above which a report warns."""
+"""Penetration over the smallest thickness of the sheet above which a report warns."""
 
 MASS = 1e-3
 """Relative error of the mass above which a report warns."""
@@ -33,31 +33,31 @@ FRAMES = 100
 
 @dataclass
 class Record:
-    """Run with n states as plain data.
+    """Data of a run with n states, without the discretised problem.
 
     Attributes:
         summary: {part of the scene: one line of text}.
         versions: {program: version}.
         axisymmetric: False in plane strain and in three dimensions.
-        kinds: kinds of the states.
-        stages: stages of the states, "" in a run without stages.
+        kinds: kind of each state (`State.kind`).
+        stages: name of the stage of each state, "" in a run without stages.
         measures: {column: values, shape (n,)}.
         histories: for each state, rows (residual, correction, work) of the Newton iterations.
-        profiles: for each state a `Profile`; None without a sheet, or if the state is not drawn (`frames`).
-        counts: cost of the run.
+        profiles: for each state a `Profile`; None if the body is not a sheet, or if the state is not drawn (`frames`).
+        counts: cost of the run: {"iterations": ..., "seconds": ..., ...} as in `formingx.solve.record.Counts`.
         until: target of the run (quantity, value), or None.
         tooling: the `Tooling` of the scene.
         travels: for each state the travels of the tools (`Tooling.travels`), length.
         forces: {tool: force of the body on it, shape (n,)}, positive if it resists the travel. The force on a fixed
             tool is its Z component.
-        fields: for each drawn state {name: values at the nodes of the profile, shape (m,)}. A record from a checkpoint
-            has the temperature only.
-        layers: layers of the wall in the last state, as in `Wall`.
+        fields: for each drawn state {name: values at the m nodes of the profile, shape (m,)}. A record from a
+            checkpoint has the temperature only.
+        layers: fractions of the wall that the layers take in the last state (`Wall.layers`).
         script: file of the script, or "".
-        findings: findings of the run (`Path.findings`), from a checkpoint those at its end.
+        findings: findings of the run (`Path.findings`), which a checkpoint holds if the run has ended.
         failure: error message that ended the run, or "".
         verdicts: reason why each state is inadmissible, or "" (`State.verdict`).
-        heat: {tool: (conductance, its temperature as text)} for tools that conduct heat.
+        heat: {tool: (conductance of the contact, temperature of the tool as text)} for tools that conduct heat.
         unit: unit of temperatures, or "".
         space: True for a sheet in three dimensions.
         planes: symmetry planes that cut the body.
@@ -101,23 +101,23 @@ class Record:
 
     @property
     def progress(self) -> np.ndarray:
-        """Progress of the process in each state (function `progress`), shape (n,)."""
+        """Progress of the process in each state, from 0 to 1, shape (n,)."""
         return progress(self.measures, self.profiles)
 
     @property
     def timed(self) -> bool:
-        """True if the process time advances."""
+        """True if the process time advances in the run."""
         return bool(np.ptp(self.measures.get("process_time", 0.0)) > 0)
 
     @property
     def stage_ranges(self) -> list[tuple[int, int]]:
-        """Numbers of the first state of each stage, and of the state after its last."""
+        """For each stage in order, the number of its first state and the number after its last state."""
         ends = [k for k in range(1, len(self.stages)) if self.stages[k] != self.stages[k - 1]]
         return list(zip([0, *ends], [*ends, len(self.stages)]))
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the drawn states (function `frames`)."""
+        """Numbers of the states that are drawn."""
         return frames(self.progress, self.kinds, self.stages, self.drawn)
 
     @property
@@ -126,47 +126,47 @@ class Record:
         return [k for k in self.frames if self.profiles[k] is not None]
 
     def all_findings(self) -> list[Finding]:
-        """Return the findings of the run and on its numbers, the worst first."""
+        """Return all findings on the run, the worst first: those of its checks, and those on its columns."""
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
             if abs(last - value) > 1e-6 * abs(value):
-                found.append(Finding("serious", "target", f"The path ended early: it aimed at {words(name)} {value:g};"
-                                     f" its last state has {last:.6g}."))
+                found.append(Finding("serious", "target", f"The path ended early: its target is {words(name)}"
+                                     f" {value:g}; its last state has {last:.6g}."))
         if "penetration" in self.measures:
             deep, thickness = self.measures["penetration"].max(), self._smallest_thickness()
             if thickness is not None and deep > PENETRATION * thickness:
                 begins = self._from(self.measures["penetration"] > PENETRATION * thickness)
                 found.append(Finding("warning" if deep > 4 * PENETRATION * thickness else "note", "penetration",
                                      f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
-                                     f" smallest thickness{begins}: a larger contact penalty makes that less."))
+                                     f" smallest thickness{begins}: a larger contact penalty reduces it."))
         worst = np.abs(self.measures["mass_error"]).max()
         if worst > MASS:
             found.append(Finding("warning" if worst > 10 * MASS else "note", "mass",
                                  f"The mass changes by up to {100 * worst:.2g} %"
-                                 f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: a smaller eps, or a finer"
-                                 f" mesh, keeps it."))
+                                 f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: use a smaller eps or a"
+                                 f" finer mesh."))
         found += [*self._of_volume(), *self._of_verdict()]
-        subjects = {finding.about for finding in found}         # on all states; `self.findings` are on the last one
+        subjects = {finding.about for finding in found}      # these are on all states, `self.findings` on the last one
         found += [finding for finding in self.findings if finding.about not in subjects]
         if self.counts.get("failures", 0) > len(self.kinds):
             found.append(Finding("note", "steps", f"{self.counts['failures']} attempts at a step failed and were"
-                                 f" repeated with a shorter step; that does not impair the results."))
+                                 f" repeated with a shorter step; this does not impair the results."))
         return worst_first(found)
 
     @property
     def limits(self) -> dict[str, int]:
-        """{reason for shorter steps: count}, the most frequent first; empty if unknown."""
+        """{reason for a shorter or failed step: count}, the most frequent first; empty if unknown."""
         return dict(sorted(self.counts.get("limits", {}).items(), key=lambda entry: -entry[1]))
 
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
-        """Return the remaining gaps in the corners of fixed tools.
+        """Return the remaining gaps between the sheet and the corners of fixed tools.
 
         Args:
-            states: numbers of states with profiles.
+            states: numbers of m states with profiles.
 
         Returns:
-            {"tool, corner": gaps, shape (len(states),), length}.
+            {name, such as "mould, corner 1": largest distance of the corner from the sheet, shape (m,), length}.
         """
         found = {}
         for contact in self.tooling.contacts if states else ():
@@ -180,17 +180,17 @@ class Record:
         return found
 
     def _from(self, where: np.ndarray) -> str:
-        """Return the first state that satisfies a condition, as text.
+        """Return the number, stage and control of the first state that satisfies a condition, as text.
 
         Args:
-            where: True for the states that satisfy it, shape (n,).
+            where: True for the states that satisfy the condition, shape (n,).
         """
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
 
     def _of_volume(self) -> list[Finding]:
-        """Return the findings on the volume error of the states."""
+        """Return the findings on elements that do not keep their volumes, in a list."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > volume.BOUND))
@@ -200,14 +200,14 @@ class Record:
         return clamped or volume.findings(errors[k], where)
 
     def _of_verdict(self) -> list[Finding]:
-        """Return a finding on the first inadmissible state."""
+        """Return a finding on the first inadmissible state in a list; empty if all states are admissible."""
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
             Finding("serious", "state", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be"
                     f" used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
-        """Return the texts of all findings on the run, notes included, the worst first."""
+        """Return the texts of `all_findings`."""
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
@@ -217,7 +217,7 @@ class Record:
 
 
 def of_path(path: Any) -> Record:
-    """Return the record of a `Path`; collective."""
+    """Return the record of a run from its `Path`; collective."""
     from ...scene.summary import summary
     problem, states, n = path.problem, path.states, len(path)
     with shown_progress(problem.comm, f"report of {n} states") as done:
@@ -251,11 +251,11 @@ def of_path(path: Any) -> Record:
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
-    """Return the record of a checkpoint.
+    """Return the record of a run from its checkpoint (`formingx.results.files.checkpoint_data.contents`).
 
     Args:
-        about: data of its scene.json (`formingx.results.files.checkpoint_data.contents`).
-        states: data of its states.
+        about: data of the file scene.json, with the end of the run ("ended").
+        states: data of each state.
     """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
@@ -274,7 +274,11 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
-    """Return `Record.heat` and `Record.unit` from the heat transfer of a scene as plain data (`description.plain`)."""
+    """Return {"heat": `Record.heat`, "unit": `Record.unit`}; empty for a scene without heat transfer.
+
+    Args:
+        heat: heat transfer of the scene as plain data (`description.plain`), or None.
+    """
     if not heat:
         return {}
 
@@ -285,7 +289,15 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """Return for each state {"temperature": values at the nodes of the last profile}, shape (m,), from a checkpoint."""
+    """Return the temperature of a sheet in the states of a checkpoint.
+
+    Args:
+        states: data of each state.
+        last: profile of the sheet with m nodes, in the last state.
+
+    Returns:
+        For each state {"temperature": values at the nodes of the profile, shape (m,)}; {} without a temperature.
+    """
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     numbers = None
     for values, state in zip(found, states):
@@ -299,14 +311,15 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 
 
 def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAMES) -> list[int]:
-    """Return the numbers of the states to be drawn.
+    """Return the numbers of the states to be drawn; all states if they are few.
 
-    Ends of stages and limit points are included. The others are spaced evenly over both the process and the states.
+    Ends of stages and limit points are included. Further states are spaced evenly over the mean of the progress of the
+    process and the fraction of the states.
 
     Args:
         at: progress of the process in n states (`progress`), shape (n,).
-        kinds: kinds of the states.
-        stages: stages of the states.
+        kinds: kind of each state (`State.kind`).
+        stages: name of the stage of each state.
         most: approximate number of drawn states.
     """
     n = len(at)
@@ -319,19 +332,20 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    It follows the process time if the time advances. Otherwise it is the mean of two parts. One is the path length of
-    the control over its range, the other the path length of the sheet's motion over its total.
+    It is proportional to the process time if the time advances. Otherwise each step counts by its change of the
+    controls, over their ranges, and by the motion of the sheet, over the total motion.
 
     Args:
         measures: {column: values, shape (n,)}.
-        profiles: profiles of the states.
+        profiles: `Profile` of the sheet in each state; None if there is no profile.
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
     driven = [c for c in measures if c.endswith(("pressure", "travel", "displacement"))]
-    for column in ["process_time"] if np.ptp(clock) > 0 else driven:
+    columns = ["process_time"] if np.ptp(clock) > 0 else driven
+    for column in columns:
         values = measures[column]
-        steps[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(driven)
+        steps[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(columns)
     if not np.ptp(clock) > 0 and all(p is not None for p in profiles):
         moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(profiles, profiles[1:])]
         steps[1:] += np.array(moved) / (sum(moved) or 1.0)
@@ -345,7 +359,14 @@ def words(name: str) -> str:
 
 
 class _Fields:
-    """Stress, contact pressure and temperature at the nodes of a profile, from both faces of a sheet."""
+    """Evaluates stress, contact pressure and temperature of a sheet at the m nodes of its profile.
+
+    At each node the larger stress and the mean temperature of both faces are taken.
+
+    Args:
+        path: the `Path`, with the states of one mesh.
+        profile: the `Profile` of the sheet.
+    """
 
     def __init__(self, path: Any, profile: Profile):
         self._path, self._points = path, [profile.reference_bottom, profile.reference_top]
@@ -355,7 +376,7 @@ class _Fields:
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
 
     def of(self, state: Any) -> dict[str, np.ndarray]:
-        """Return {name: values, shape (m,)} in a state; collective."""
+        """Return {name of a field: values at the nodes, shape (m,)} in a state; collective."""
         path, points, found = self._path, self._points, {}
         if path.problem.scene.heat is not None:
             found["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
@@ -368,9 +389,14 @@ class _Fields:
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
-    """Return the contact pressure at the nodes of a profile, from the contact points nearest to them, shape (m,).
+    """Return the contact pressure at the m nodes of a profile, shape (m,), stress.
 
-    The face of the sheet that is nearer to the contact points is used.
+    Each node gets the pressure of the nearest contact point.
+
+    Args:
+        table: contact quantities at the contact points of one face of the sheet.
+        points: reference positions of the m nodes on the bottom face, and opposite them on the top face, shape (m, 2)
+            each, length. The face that is nearer to the contact points is used.
     """
     distance, numbers = zip(*(nearest(table.reference_points, p) for p in points))
     nearer = np.argmin([a.mean() for a in distance])

@@ -1,8 +1,8 @@
 """Report on one or several runs: one HTML file that needs no network.
 
-It shows first the part, then the process as animated drawings, then inputs and warnings, and last the numerical details
-in closed sections. It is made from paths or from checkpoints alone. The file contains plotly.js and the data in
-compressed form.
+It shows findings, the process as animated drawings, key numbers, curves, tools and inputs. Sections with numerical
+details open by a click. A report is made from paths, or from checkpoints without the scene. The file contains plotly.js
+and the data in compressed form.
 """
 
 import datetime
@@ -67,6 +67,17 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
     """Write the report of one or several records (`report`, `Path.report`).
 
+    Args:
+        records: a `Record`, or a list of them.
+        file: its name ends in .html.
+        title: heading of the page; "": a default.
+        failure: the `ConvergenceError` that ended the run, if one did.
+        comm: MPI communicator; rank 0 writes.
+        units: units of the script, for the labels.
+        density: density in g/cm3, for the weights in grams.
+        trim: place at which parts are cut off, see `Path.part`.
+        names: names of the runs; default the title.
+
     Returns:
         The path of the file.
     """
@@ -84,22 +95,37 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
 
 
 def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:
-    """Return the part of a section in numbers, or None without a sheet.
+    """Return the key numbers of the part in the last state of a run, or None if the body is not a sheet in a section.
+
+    Args:
+        record: the run.
+        units: units of the script.
+        density: density, g/cm3, or None.
+        trim: place at which the part is cut off, see `Path.part`, or None.
 
     Raises:
-        InputError: a density or a trim is given without a sheet.
+        InputError: a density or a trim is given, but there is no part.
     """
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
-                             + (_NO_MESH if record.space else "the mesh is no sheet: it has no wall, nor a part"))
+                             + (_NO_MESH if record.space else "the mesh is not a sheet: it has no wall and no part"))
         return None
     return part(Wall(record.profiles[-1], record.layers, None), record.axisymmetric, density, trim, (), units,
                 record.planes)
 
 
 def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
-    """Return the page as HTML."""
+    """Return the report as an HTML page.
+
+    Args:
+        records: the runs.
+        names: names of the runs.
+        parts: for each run its `Part`, or None.
+        title: heading of the page.
+        failure: the error that ended the run, or None.
+        units: units of the script.
+    """
     alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
     for record, name in zip(records, names):
@@ -108,7 +134,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     body.append(PROCESS)
     if alone:
         body.append(_cards(records[0], parts[0], units))
-    body += ["<h2>The answer</h2>", _answers(records, names, parts, units),
+    body += ["<h2>Key numbers</h2>", _answers(records, names, parts, units),
              "<h2>Curves</h2><div id=charts class=grid></div>"]
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
@@ -118,7 +144,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
 
 
 def scripts(data: str) -> str:
-    """Return the scripts at the end of a page; they draw the data in the elements `PROCESS` and "charts".
+    """Return the scripts at the end of a page, which draw its data in `PROCESS` and in the element "charts".
 
     Args:
         data: result of `interactive.data`.
@@ -129,20 +155,25 @@ def scripts(data: str) -> str:
     return f"{tail}\n<script>{code}</script>"
 
 
-_NO_MESH = ("a run in space keeps its states without the mesh: its part and pictures are in the report of the path,"
-            " fx.load(folder, scene).report()")
+_NO_MESH = ("the checkpoint of a sheet in three dimensions holds no mesh: its part and pictures are in the report of"
+            " the path, fx.load(folder, scene).report()")
 PROCESS = """<p id=trouble class='note bad' hidden>This browser cannot draw what follows (it needs DecompressionStream
 and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothing.</p>
 <div id=process><div class=controls><button id=play>Play</button>
 <label>Colour: <select id=colour></select></label>
 <label>Run: <select id=run></select></label></div>
-<input id=slider type=range min=0 max=1000 value=1000 aria-label='how far the process has come'>
+<input id=slider type=range min=0 max=1000 value=1000 aria-label='progress of the process'>
 <div id=marks></div><div id=now></div>
 <div class=views><div id=section></div><div id=solid></div></div></div>"""
 
 
 def _trouble(failure: Any, lead: str) -> list[str]:
-    """Return the error message of a failed run as elements of the page."""
+    """Return the error message of a failed run as elements of the page, with a picture of its last good state.
+
+    Args:
+        failure: the `ConvergenceError`, its text, or "" or None without a failure.
+        lead: text before the heading, such as the name of the run.
+    """
     if not failure:
         return []
     found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
@@ -152,32 +183,39 @@ def _trouble(failure: Any, lead: str) -> list[str]:
 
 
 def _details(record: Record, units: Units) -> list[str]:
-    """Return the sections below the results: stages, tools, inputs, warnings; closed: all quantities, convergence."""
+    """Return the sections below the curves: stages, tools, inputs, output quantities, convergence and states."""
     found = []
     if any(record.stages):
         found += ["<h2>Stages</h2>", _stages(record, units)]
     if record.tooling.contacts:
         found += ["<h2>Tools</h2>", _tools(record, units)]
     found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()])]
-    found.append(page.details("All measures at limit points and at the end", _key_numbers(record, units)))
+    found.append(page.details("All output quantities at limit points and at the end", _key_numbers(record, units)))
     if record.limits:
-        found.append("<p>What made steps shorter, or fail: " + html.escape(", ".join(
-            f"{why} ({times} times)" for why, times in record.limits.items())) + ".</p>")
-    found.append(page.details("Convergence", _convergence(record) + _iterations(record)))
-    some = "States that are drawn" if len(record.frames) < len(record.kinds) else "All states"
-    found.append(page.details(some, _states(record, units)))
+        found.append("<p>Reasons for shorter or failed steps: " + html.escape(", ".join(
+            f"{reason} ({times} times)" for reason, times in record.limits.items())) + ".</p>")
+    found.append(page.details("Convergence", _convergence(record) + _iterations(record, units)))
+    shown = "States that are drawn" if len(record.frames) < len(record.kinds) else "All states"
+    found.append(page.details(shown, _states(record, units)))
     return found
 
 
 def _warnings(record: Record, lead: str = "") -> str:
-    """Return the warnings: two lines each, the whole text after a click."""
+    """Return the findings on a run as elements of the page, or a sentence that there are none.
+
+    Of each finding two lines are shown, and the whole text after a click.
+
+    Args:
+        record: the run.
+        lead: text before each finding, such as the name of the run.
+    """
     findings = record.all_findings()
     if record.space:
-        lead = f"<p class=note>{html.escape(lead)}Curves and inputs alone: {_NO_MESH}.</p>"
+        lead = f"<p class=note>{html.escape(lead)}Only curves and inputs are shown: {_NO_MESH}.</p>"
         return lead + "".join(map(_noted, findings))
     if not findings:
-        return (f"<p class=good>{html.escape(lead)}No warnings: the target was met; mass, volume of the elements and"
-                f" penetration are within bounds, and no face crosses another or the axis.</p>")
+        return (f"<p class=good>{html.escape(lead)}No warnings: the target was met. Mass, volume of the elements and"
+                f" penetration are within bounds. No face crosses another or the axis.</p>")
     return "".join(_noted(found._replace(text=lead + found.text)) for found in findings)
 
 
@@ -188,11 +226,11 @@ def _noted(found: Finding) -> str:
 
 
 def _made(records: list[Record]) -> list[list[str]]:
-    """Return rows with date, script and versions."""
+    """Return rows (name, value) with the date, the scripts and the versions of programs."""
     try:
         version = importlib.metadata.version("formingx")
     except importlib.metadata.PackageNotFoundError:
-        version = "from its checkout"
+        version = "source tree, not installed"
     scripts = dict.fromkeys(record.script for record in records if record.script)
     return [["date", datetime.datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")],
             *([["script", ", ".join(scripts)]] if scripts else []), ["formingx", version],
@@ -200,12 +238,18 @@ def _made(records: list[Record]) -> list[list[str]]:
 
 
 def _cards(record: Record, found: Part | None, units: Units) -> str:
-    """Return the main numbers of the part and of the run."""
+    """Return the main numbers of the part and of the run as large figures.
+
+    Args:
+        record: the run.
+        found: its part, or None.
+        units: units of the script.
+    """
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
         cards = [(f"{found.min_wall:.4g}{length}", f"minimum wall, at r = {found.min_wall_at[0]:.4g}{length}"),
-                 (f"{found.uniformity:.3g}", "least over mean wall"),
+                 (f"{found.uniformity:.3g}", "minimum over mean wall"),
                  (f"{found.weight:.4g} {found.units.weight}", found.weight_label) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
@@ -214,15 +258,14 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
 
 
 def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
-    """Return the largest force on every tool, and the largest pressures."""
-    found = [(f"largest force on {name}", f"{force[np.argmax(np.abs(force))]:.4g} {units.force}")
-             for name, force in record.forces.items()]
-    return found + [(f"largest {words(c)}", f"{v.max():.4g} {units.of(c)}") for c, v in record.measures.items()
-                    if c.endswith("pressure")]
+    """Return rows (name, value) of the force on each tool and of each pressure, where its magnitude is largest."""
+    found = [(f"largest force on {name}", force, units.force) for name, force in record.forces.items()]
+    found += [(f"largest {words(c)}", v, units.of(c)) for c, v in record.measures.items() if c.endswith("pressure")]
+    return [(name, f"{v[np.argmax(np.abs(v))]:.4g} {unit}".rstrip()) for name, v, unit in found]
 
 
 def _answers(records: list[Record], names: list[str], parts: list, units: Units) -> str:
-    """Return a table of the main numbers with one column per run."""
+    """Return a table of the key numbers of each part, forces and pressures, with one column per run."""
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
@@ -231,44 +274,39 @@ def _answers(records: list[Record], names: list[str], parts: list, units: Units)
 
 
 def _lead(record: Record, units: Units) -> str:
-    """Return a sentence on the run."""
+    """Return sentences on the size of the run, the kinematics and the units."""
     counts = record.counts
-    how = f"{len(record.kinds) - 1} states after the start"
+    size = f"{len(record.kinds) - 1} states after the start"
     if counts:
-        how += f", {counts['iterations']} Newton iterations, {counts['seconds']:.1f} s"
+        size += f", {counts['iterations']} Newton iterations, {counts['seconds']:.1f} s"
     jumps = record.kinds.count("jump")
     if jumps:
-        how += f", {jumps} jump{'s' * (jumps > 1)}, where the body snapped to its next equilibrium"
-    said = f"Lengths in {units.length}, stresses in {units.stress}, forces in {units.force}." if units.force else \
+        size += f", {jumps} jump{'s' * (jumps > 1)}, where the body snapped to its next equilibrium"
+    names = f"Lengths in {units.length}, stresses in {units.stress}, forces in {units.force}." if units.force else \
         "Units are those of the script."
-    kind = "A sheet in space" if record.space else "Axisymmetric" if record.axisymmetric else "Plane strain"
+    kind = "Sheet in three dimensions" if record.space else "Axisymmetric" if record.axisymmetric else "Plane strain"
     basis = record.planes.basis((units.length or "unit") if record.per_depth else None)
     basis = f" Forces, energies, volumes and areas are given for {basis}." if basis else ""
-    return html.escape(f"{how}. {kind}. {said}{basis}")
+    return html.escape(f"{size}. {kind}. {names}{basis}")
 
 
 def _key_numbers(record: Record, units: Units) -> str:
-    """Return a table of the last state and the limit points, and the thinnest place."""
+    """Return a table of all columns, and of the smallest and largest wall, at limit points and in the last state."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
     rows = [[units.label(name), *(page.number(values[k]) for k in chosen)] for name, values in record.measures.items()]
     if record.profiles[-1] is not None:
         ratios = [record.profiles[k].wall_ratio for k in chosen]
-        rows.append(["smallest thickness / original", *(page.number(r.min()) for r in ratios)])
-        rows.append(["largest thickness / original", *(page.number(r.max()) for r in ratios)])
+        rows.append(["smallest wall / original thickness", *(page.number(r.min()) for r in ratios)])
+        rows.append(["largest wall / original thickness", *(page.number(r.max()) for r in ratios)])
     return page.table(head, rows)
 
 
-def _control_columns(record: Record) -> list[list[str]]:
-    """Return groups of columns of one kind: the control, and forces."""
-    kinds = [[c for c in record.measures if c.endswith(end)] for end in ("pressure", "travel", "displacement", "force")]
-    return [columns for columns in kinds if columns]
-
 
 def _stages(record: Record, units: Units) -> str:
-    """Return a table of the stages: states, iterations, end, largest tool forces, remaining gap."""
-    columns = [c for kind in _control_columns(record) for c in kind if not c.endswith("force")]
+    """Return a table with one row per stage: states, iterations, controls at its end, tool forces, gap and wall."""
+    columns = [c for end in ("pressure", "travel", "displacement") for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
     for stage in dict.fromkeys(record.stages):
@@ -281,33 +319,38 @@ def _stages(record: Record, units: Units) -> str:
                      record.forces.values()), "" if gap is None else page.number(gap),
                      "" if last is None else page.number(last.wall_ratio.min())])
     return page.table(["stage", "states", "iterations of accepted steps",
-                       *(f"{units.label(c)} at its end" for c in columns), *extra,
-                       units.label("gap", "largest gap in a corner"), "smallest thickness / original"], rows)
+                       *(units.label(c, f"{words(c)} at its end") for c in columns), *extra,
+                       units.label("gap", "largest gap in a corner"), "smallest wall / original thickness"], rows)
 
 
 def _tools(record: Record, units: Units) -> str:
-    """Return a table of the contacts, with the position of each tool in the last state."""
+    """Return a table of the contacts, with travel of each tool and force on it in the last state."""
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
         force = record.forces.get(name)
         along = ", ".join(f"{x:g}" for x in contact.direction or ())
-        moves = f"moves along ({along})" if along else "stays"
-        where = "takes no part" if travel is None else page.number(travel) if contact.direction else ""
+        motion = f"moves along ({along})" if along else "fixed"
+        where = "inactive" if travel is None else page.number(travel) if contact.direction else ""
         rows.append([contact.name or "", contact.on, re.sub(r"^Tool\((.*)\)$", r"\1", repr(contact.tool)),
-                     f"{contact.friction}{'' if contact.separates else ', holds what has touched'}",
-                     page.number(contact.penalty), moves, where, "" if force is None else page.number(force[-1])])
+                     f"{contact.friction}{'' if contact.separates else ', no separation'}",
+                     page.number(contact.penalty), motion, where, "" if force is None else page.number(force[-1])])
         if record.heat:
-            conductance, warm = record.heat.get(contact.name or "", (0.0, "takes no heat"))
+            conductance, warm = record.heat.get(contact.name or "", (0.0, "no heat transfer"))
             rows[-1] += [warm, page.number(conductance)]
     head = ["tool", "face", "profile", "friction", "penalty", "motion", units.label("travel", "travel at the end"),
             units.label("force", "force at the end")]
     head += [f"temperature, {record.unit}", "conductance"] if record.heat else []
     return page.table(head, rows) + (
-        "<p class=lead>A force is positive when it resists the tool's travel; of a tool that stays, along z.</p>")
+        "<p class=lead>The force on a moving tool is positive if it resists the travel. The force on a fixed tool is"
+        " its z component.</p>")
 
 
 def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
-    """Return the picture that `draw` makes, or None if there is nothing to draw or a library is missing."""
+    """Return a PNG picture as bytes, or None if there is nothing to draw or a library is missing.
+
+    Args:
+        draw: function that draws the picture into the file given to it.
+    """
     with TemporaryDirectory() as folder:
         file = FilePath(folder) / "picture.png"
         try:
@@ -318,25 +361,26 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
 
 
 def _convergence(record: Record) -> str:
-    """Return a drawing of the corrections of all Newton iterations, one line a state; empty without iterations."""
+    """Return a figure with the corrections of all Newton iterations, one line per state; "" without iterations."""
     lines = [[row[1] for row in history if row[1] > 0] for history in record.histories]
     return page.logarithmic(lines, "Newton iteration", "correction |\u0394x|/|x|",
-                            "Correction of every Newton iteration, one line a state.") if any(lines) else ""
+                            "Correction of every Newton iteration, one line per state.") if any(lines) else ""
 
 
-def _iterations(record: Record) -> str:
-    """Return a table of the iterations."""
+def _iterations(record: Record, units: Units) -> str:
+    """Return a table of the Newton iterations of each drawn state: corrections and last residual."""
     rows = []
     for k in record.frames:
         kind, history = record.kinds[k], record.histories[k]
         corrections = ", ".join(f"{row[1]:.1e}" for row in history[:-1])
         rows.append([str(k), kind, page.number(record.measures[record.control][k]), str(max(len(history) - 1, 0)),
                      corrections, f"{history[-1][0]:.1e}" if history else ""])
-    return page.table(["state", "kind", words(record.control), "iterations", "corrections", "last residual"], rows)
+    head = ["state", "kind", units.label(record.control), "iterations", "corrections", "last residual"]
+    return page.table(head, rows)
 
 
 def _states(record: Record, units: Units) -> str:
-    """Return a table of all states."""
+    """Return a table of all columns in the drawn states."""
     rows = [[str(k), record.kinds[k], *(page.number(v[k]) for v in record.measures.values())] for k in record.frames]
     return page.table(["state", "kind", *map(units.label, record.measures)], rows)
 

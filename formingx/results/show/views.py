@@ -17,13 +17,13 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """Draw three quarters of the sheet of revolution as a PNG, coloured by thickness ratio (rank 0 draws).
+    """Draw three quarters of an axisymmetric sheet as a PNG, coloured by its wall ratio (rank 0 draws).
 
-    A sheet that is more than twice as high as wide, such as a parison, is cut along the middle.
+    Of a sheet that is more than twice as high as wide, such as a parison, one half is drawn.
 
     Args:
-        profile: the `Profile`.
-        file: the picture.
+        profile: the `Profile` of the section.
+        file: name of the picture, which ends in .png.
         comm: MPI communicator.
 
     Raises:
@@ -37,13 +37,13 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
-    """Draw a sheet in plane strain as a long part as a PNG, coloured by thickness ratio (rank 0 draws).
+    """Draw an extruded sheet in plane strain as a PNG, coloured by its wall ratio (rank 0 draws).
 
     A half sheet, which begins at R = 0, is completed by its mirror image. The part is 1.5 times as long as wide.
 
     Args:
-        profile: the `Profile`.
-        file: the picture.
+        profile: the `Profile` of the section.
+        file: name of the picture, which ends in .png.
         comm: MPI communicator.
 
     Raises:
@@ -59,13 +59,13 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return two corners (r, z) of a box around the sheet."""
+    """Return the lower and the upper corner (r, z) of a box around the deformed sheet of a `Profile`, length."""
     points = np.vstack([profile.bottom, profile.top])
     return points.min(0), points.max(0)
 
 
 def _mirrored(profile: Any) -> Any:
-    """Return a half sheet together with its mirror image."""
+    """Return the `Profile` of a half sheet joined with its mirror image at R = 0."""
     def whole(points):
         return np.vstack([points[:0:-1] * (-1, 1), points])
     faces = profile.reference_bottom, profile.reference_top, profile.bottom, profile.top
@@ -73,13 +73,25 @@ def _mirrored(profile: Any) -> Any:
 
 
 def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any) -> None:
-    """Draw the section swept through `stations`, with the positions place(points (n, 2), station) -> x, y, z."""
+    """Draw the surface that a section sweeps out as a PNG (rank 0 draws).
+
+    Args:
+        profile: the `Profile` of the section.
+        stations: parameters of the successive positions of the section, such as angles, shape (m,).
+        place: function of (points (r, z) of the section, shape (n, 2), station) that returns their x, y and z.
+        camera: direction of view, (x, y, z).
+        file: name of the picture, which ends in .png.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: the name has another ending, or there is neither a screen nor Xvfb.
+    """
     file = files.named("view3d", file, ".png")
     files.on_root(comm, lambda: _draw(profile, stations, place, camera, file))
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
-    """Draw the swept section on this rank."""
+    """Draw the surface of `_view` on this rank."""
     pyvista = figures.pyvista()
 
     def swept(line, values):
@@ -112,11 +124,14 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
     """Write a PNG picture of the meshes that the block adds to the plotter.
 
     Args:
-        file: the picture.
-        height: its height; the width is 1000 pixels.
+        file: name of the picture.
+        height: height of the picture, pixels; the width is 1000.
 
     Yields:
         The pyvista plotter.
+
+    Raises:
+        InputError: there is neither a screen nor Xvfb.
     """
     pyvista = figures.pyvista()
     picture = io.BytesIO()
@@ -133,10 +148,10 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 
 def shading(values: np.ndarray) -> dict[str, Any]:
-    """Return the arguments of pyvista's `add_mesh` for colours by the array "ratio": limits, colour bar, light.
+    """Return arguments of pyvista's `add_mesh` that colour a mesh by its array "ratio": limits, colour bar, light.
 
     Args:
-        values: the array, shape (n,).
+        values: the array, wall over original thickness, shape (n,).
     """
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
@@ -150,8 +165,8 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
     Args:
         plotter: the pyvista plotter.
-        camera: direction of view.
-        points: shape (n, 3), length.
+        camera: direction from the sheet to the camera, (x, y, z).
+        points: points of the drawn surface, shape (n, 3), length.
     """
     plotter.camera_position = [tuple(camera), (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
@@ -168,7 +183,7 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """Provide a display within a block: the present one, or an Xvfb that ends with the block.
+    """Provide a display within a block: the present one, or a virtual one (Xvfb) that ends with the block.
 
     Debian's VTK aborts without a display.
 
