@@ -106,7 +106,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     tell(found, curve.problem.comm.rank)
     record.allow_inadmissible = instance("allow_inadmissible", allow_inadmissible, bool, "True or False")
     if isinstance(start, Path):
-        record.go_on_from(start.record)
+        record.continue_from(start.record)
     elif start is not None:
         record.segments[-1].states.append(start)
     return Path(record, timed=timed, columns=columns)

@@ -184,8 +184,8 @@ def test_no_parabola_goes_through_a_jump():
     def apart(a, b):
         return float(abs(b.x - a.x)[0])
     through, broken = states("step"), states("jump")
-    assert [predictor.behind(through, length, apart) for length in (3.0, 1.0)] == through[:2]
-    assert predictor.behind(broken, 3.0, apart) is None
+    assert [predictor.parabola_state(through, length, apart) for length in (3.0, 1.0)] == through[:2]
+    assert predictor.parabola_state(broken, 3.0, apart) is None
 
 
 def test_a_jump_does_not_pass_its_target():

@@ -182,7 +182,7 @@ def test_cutbacks_end(followed, monkeypatch):
         asked.append(error)
         assert len(asked) < 500, "it goes on for ever"
         return 10.0
-    monkeypatch.setattr(TimeError, "of", too_large)
+    monkeypatch.setattr(TimeError, "ratio", too_large)
     driven = {"control": "pull"} if followed is fx.travel else {}
     stage = Stage("cycle", **driven, amplitudes={followed: [(0, 0), (1, 0.5)]})
     with pytest.raises(fx.ConvergenceError, match="became shorter than.*the error in time"):
@@ -196,6 +196,6 @@ def test_a_second_cutback_is_one_in_time(monkeypatch):
     def too_large(error, states, x, control):
         ways.append(control - states[-1].control)
         return 8.0 if len(ways) < 4 else 0.5
-    monkeypatch.setattr(TimeError, "of", too_large)
+    monkeypatch.setattr(TimeError, "ratio", too_large)
     run(block(SLOW), Stage("cycle", amplitudes={"pull": [(0, 0), (1, 0.5)]}))
     assert ways[2:4] == pytest.approx([0.4 * ways[1], 0.4 * ways[2]], rel=1e-9)             # 0.8 / 8^(1/3)

@@ -1,4 +1,9 @@
-"""Contact of one face during a step: prediction of gap closures, and checks for steps that are too long."""
+"""Contact of one face during a step: prediction of gap closures, and checks for steps that are too long.
+
+A gap is closed where the signed distance of a point from its tool exceeds -theta, the outer edge of the ramp of the
+contact law. Contact with tools in three dimensions is lagged: the closed points, and the pressure that limits their
+friction, are those of the last accepted state.
+"""
 
 from __future__ import annotations
 
@@ -17,42 +22,45 @@ class StepLimits:
     """Limits that contact sets to a step.
 
     Attributes:
-        as_good: fraction of a step; gaps that close earlier in the step count as closed at its start.
-        beyond: length of a step that ends at a gap closure, over the arc length to the closure.
-        near: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
-        at_end: fraction of a step; sticking points whose gap closes later carry no friction until the next step.
-        slides: largest slip of a sticking point after its gap closure in a step, over its tributary length.
-        nearer: largest motion of a point in a step of lagged contact, less its tributary length, over its gap.
-        cut_off: largest depth of the straight path of a point inside a tool, over its tributary length.
-        places: largest number of positions at which this path is checked.
-        lag: largest predicted change of the pressure in a step of lagged friction, over the pressure.
-        behind: allowed difference between the pressure at the end of the step and the pressure that limits friction,
-            over the pressure.
+        closed_at_start: fraction of a step; gaps that close earlier in the step count as closed at its start.
+        overshoot: length of a step that ends at a gap closure, over the arc length to the closure.
+        negligible_gap: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
+        frictionless_from: fraction of a step; sticking points whose gap closes later carry no friction before the next
+            step.
+        largest_slip: largest slip of a sticking point after its gap closure in a step, over its tributary length.
+        largest_approach: largest motion of a point in a step of lagged contact, less its tributary length, over its
+            gap.
+        largest_cut: largest depth of the straight path of a point inside a tool, over its tributary length.
+        most_positions: largest number of positions at which this path is checked.
+        pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
+        pressure_difference: allowed difference between the pressure at the end of the step and the pressure that limits
+            friction, over the pressure.
         corrections: largest number of repeated solutions of a step that reduce this difference.
-        inaccurate: change of the pressure in a step, over `lag`, from which on the step is rejected.
+        rejected_change: change of the pressure in a step, over `pressure_change`, from which on the step is rejected.
         settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
-        weak: normal force, over shear modulus times thickness times length, that is added to the denominator of these
-            relative changes: lightly loaded contacts do not limit the step.
+        least_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
+            these relative changes: lightly loaded contacts do not limit the step.
         shortest: arc length (dimensionless) below which steps are never too long for these changes.
-        mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others close.
+        shortest_mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others
+            close.
     """
 
-    as_good: float = 0.02
-    beyond: float = 1.001
-    near: float = 1e-3
-    at_end: float = 0.95
-    slides: float = 2e-3
-    nearer: float = 0.7
-    cut_off: float = 0.5
-    places: int = 4000
-    lag: float = 0.2
-    behind: float = 5e-3
+    closed_at_start: float = 0.02
+    overshoot: float = 1.001
+    negligible_gap: float = 1e-3
+    frictionless_from: float = 0.95
+    largest_slip: float = 2e-3
+    largest_approach: float = 0.7
+    largest_cut: float = 0.5
+    most_positions: int = 4000
+    pressure_change: float = 0.2
+    pressure_difference: float = 5e-3
     corrections: int = 3
-    inaccurate: float = 1.4
+    rejected_change: float = 1.4
     settling: int = 2
-    weak: float = 1e-2
+    least_force: float = 1e-2
     shortest: float = 1e-4
-    mixed: float = 5e-4
+    shortest_mixed: float = 5e-4
 
 
 LIMITS = StepLimits()
@@ -81,14 +89,14 @@ class Approach:
         self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
-        """Return True if any point of the face, on any rank, is in contact with the tool.
+        """Return True if any point of the face is in contact with the tool.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
             control: control of the state.
 
         Returns:
-            True if a point is in contact.
+            True if a point on any rank is in contact.
         """
         return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
 
@@ -114,17 +122,17 @@ class Approach:
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.history)
         if face.contact.lagged:                             # a tangent of a long step predicts no arrivals
-            most = LIMITS.nearer * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
+            most = LIMITS.largest_approach * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
             length = self._within_lag(start, velocity, length)
         times = gap_closures(face.law, start, velocity, free, length)
-        ahead = (times > LIMITS.as_good * length) & (times < length)
+        ahead = (times > LIMITS.closed_at_start * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self.at_once if touching > 1 else 1
-        return min(LIMITS.beyond * times[allowed - 1], length) if len(times) >= allowed else length
+        return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
 
     def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
               length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -156,13 +164,14 @@ class Approach:
             places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
             length: arc length of the step (dimensionless).
-            ends: True if the run will end the step where a sticking point closes its gap (see `touches_by`). A point
-                whose gap closes near the end of the step then carries no friction before the next step.
+            ends: True if the run will end the step where the gap of a point closes that then slips wrongly, see
+                `fraction_to_wrong_slip`. A sticking point whose gap closes near the end of the step then carries no
+                friction before the next step.
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
-            at_end = ends & face.contact.sticks & (times >= LIMITS.at_end * length)
+            at_end = ends & face.contact.sticks & (times >= LIMITS.frictionless_from * length)
             face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
         elif ends and self.lags:
             face.expect_arrivals(places)
@@ -190,7 +199,7 @@ class Approach:
         if face.contact.lagged:
             deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
-        found = int(np.sum((a <= -theta - LIMITS.near * face.thickness) & (b > -theta)))
+        found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
         return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
 
     @property
@@ -218,40 +227,43 @@ class Approach:
             control: control at the end of the step.
 
         Returns:
-            True if the pressure was updated; False if both agree to `StepLimits.behind`, or friction is not lagged.
+            True if the pressure was updated. False if both pressures agree to `StepLimits.pressure_difference`, or
+            friction is not lagged.
         """
         if not self.lags:
             return False
         face, law = self.face, self.face.law
         now = face.tractions(new, control).normal
-        if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.behind:
+        if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
             return False
         face.expect_arrivals(law.at_pressure(face.history, now))
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length, at most `length`, at which the pressure has changed by the fraction `StepLimits.lag`.
+        """Return the arc length of a step in which the contact pressure changes by `StepLimits.pressure_change`.
 
-        The pressure that limits lagged friction is extrapolated linearly. Without lagged friction the result is
-        `length`.
+        The pressure that limits lagged friction is extrapolated linearly.
 
         Args:
             start: positions of the points relative to the tool, shape (n, c), length.
             velocity: their derivatives by arc length, shape (n, c), length.
             length: largest arc length.
+
+        Returns:
+            Arc length, at most `length`; `length` without lagged friction.
         """
         if not self.lags:
             return length
         law, history = self.face.law, self.face.history
         rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
         change = self._part_of_pressure(law.pressure(history) + length * rate)
-        return length * min(LIMITS.lag / change, 1.0) if change else length
+        return length * min(LIMITS.pressure_change / change, 1.0) if change else length
 
     def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference between two pressure fields in the area-weighted 1-norm.
 
         The difference is summed over the points that were under pressure at the last accepted state. It is divided by
-        the total normal force at that state plus a small force (`StepLimits.weak`).
+        the total normal force at that state plus a small force (`StepLimits.least_force`).
 
         Args:
             normal: normal tractions, shape (n,), stress; tension counts as 0.
@@ -264,7 +276,7 @@ class Approach:
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
-        return float(change / (pressure + LIMITS.weak * face.force_scale))
+        return float(change / (pressure + LIMITS.least_force * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
         """Return True if sticking points lifted off and moved back along the tool while other gaps closed.
@@ -285,7 +297,7 @@ class Approach:
         near = face.law.nearest(x)
         distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - history.position))
         opens = area & (history.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
-        closes = area & (history.distance <= -theta - LIMITS.near * face.thickness) & (distance > -theta)
+        closes = area & (history.distance <= -theta - LIMITS.negligible_gap * face.thickness) & (distance > -theta)
         found = self._comm.allreduce(np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
         return bool(np.all(found > 0))
 
@@ -306,7 +318,7 @@ class Approach:
     def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Return True if the straight path of a point between two positions penetrates the tool too deeply.
 
-        The depth on the path may exceed the larger depth of its ends by `StepLimits.cut_off` times the tributary
+        The depth on the path may exceed the larger depth of its ends by `StepLimits.largest_cut` times the tributary
         length. A point that slides over an edge of the tool may cut the edge off by this depth.
 
         Args:
@@ -317,19 +329,20 @@ class Approach:
             True if a path on any rank is too deep.
         """
         law, lengths = self.face.law, self.face.rule.lengths
-        way, most = np.linalg.norm(b - a, axis=1), LIMITS.cut_off * lengths
+        way, most = np.linalg.norm(b - a, axis=1), LIMITS.largest_cut * lengths
         ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
         between = (law.distance(a) + law.distance(b) + way) / 2            # bound of the depth on the path
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):
-            parts = int(min(np.ceil((way / most)[far].max() * 2), LIMITS.places)) + 1
+            parts = int(min(np.ceil((way / most)[far].max() * 2), LIMITS.most_positions)) + 1
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(self._comm.allreduce(found, MPI.LOR))
 
-    def touches_by(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
-        """Return the fraction of a step up to the first gap closure of a point that then slipped wrongly.
+    def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                               length: float) -> float:
+        """Return the fraction of a step at which the gap of a point closed that then slipped wrongly.
 
         Pressure and slip since the gap closure are assumed to grow at their rates at the end of the step, along
         (direction, slope). A sticking point is wrong if it slid too far without friction. A point with Coulomb friction
@@ -343,7 +356,7 @@ class Approach:
             length: arc length of the step.
 
         Returns:
-            Fraction of the step, 1 without such points.
+            Fraction of the step to the first such gap closure; 1 without such points.
         """
         face, law, history = self.face, self.face.law, self.face.history
         if history is None or not law.has_friction:
@@ -355,7 +368,7 @@ class Approach:
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
         if face.contact.sticks:
-            wrong = np.isnan(history.arrival[:, 0]) & (np.abs(slid) > LIMITS.slides * face.rule.lengths)
+            wrong = np.isnan(history.arrival[:, 0]) & (np.abs(slid) > LIMITS.largest_slip * face.rule.lengths)
         else:
             counted = np.einsum("ni,ni->n", near.tangent, end - history.arrival)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)

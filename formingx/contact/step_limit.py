@@ -126,7 +126,7 @@ class TrialStep(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Reason for rejecting a step that is too long.
+    """Rejection of a step that is too long.
 
     Attributes:
         why: the reason, as text for the log.
@@ -186,7 +186,7 @@ class StepLimit:
         self.several = False
 
     def predict(self, curve: Curve, state: State) -> EventPrediction | None:
-        """Return the contact events after an accepted state.
+        """Return the predicted contact events after an accepted state.
 
         Args:
             curve: path solver, for the tangent at the state.
@@ -254,13 +254,13 @@ class StepLimit:
         if self.passes_through(old, new):
             return Cut("a tool would pass through the face that it touches")
         change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
-        if change > LIMITS.inaccurate * LIMITS.lag and length > LIMITS.shortest:
-            return Cut("the pressure that limits friction changes", LIMITS.lag / change)
-        if length > LIMITS.mixed and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
+        if change > LIMITS.rejected_change * LIMITS.pressure_change and length > LIMITS.shortest:
+            return Cut("the pressure that limits friction changes", LIMITS.pressure_change / change)
+        if length > LIMITS.shortest_mixed and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
             return Cut("points lift off while others come into contact", 0.5)
         if ends and length > LIMITS.shortest:
-            part = min([c.touches_by(new.x[:n], new.control, new.direction[:n], new.slope, length) for c in contacts],
-                       default=1.0)
+            part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
+                        for c in contacts], default=1.0)
             if part < 1:
                 return Cut("contact arriving", part)
         return None
@@ -274,13 +274,13 @@ class StepLimit:
         return LIMITS.settling if any(c.lags for c in self.present) else 0
 
     def separate(self, new: Any) -> bool:
-        """Separate points under tension from tools in three dimensions, at a converged state.
+        """Open the contact points under tension at tools in three dimensions, at a converged state.
 
         Args:
             new: the converged state.
 
         Returns:
-            True if any point separated, so that the state must be solved for again.
+            True if a point separated, so that the state must be solved for again.
         """
         return any([c.face.separate(new.x[: self._n], new.control) for c in self.present])
 
@@ -299,7 +299,7 @@ class StepLimit:
             True if a contact status or a friction pressure changed, so that the state must be solved for again.
         """
         n, again = self._n, sweep < LIMITS.corrections
-        late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.near * c.face.thickness)
+        late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.negligible_gap * c.face.thickness)
                 for c in self.present if at_target or c.lags]
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
@@ -311,7 +311,7 @@ class StepLimit:
             new: state at its end.
 
         Returns:
-            True if the straight path of a point, seen from the tool, cuts the tool deeper than allowed
+            True if the straight path of a point relative to its tool cuts the tool deeper than allowed
             (`Approach.cuts`).
         """
         n = self._n

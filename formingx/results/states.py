@@ -366,7 +366,7 @@ class States:
         if state.setting["rate"][-1]:
             x, control = segment.curve.interpolate(before, state, 0.5)
         else:                                                # a flow: its tangents hold at a fixed time
-            past = [*predictor.before(states[:-1], time, predictor.CUBIC - 1), state]
+            past = [*predictor.recent_states(states[:-1], time, predictor.CUBIC - 1), state]
             weights = predictor.weights(past, time)
             x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
         with segment.problem.state_context(before) as problem:

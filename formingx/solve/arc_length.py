@@ -79,7 +79,7 @@ class Curve(StateSolver):
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
         return sign * high * rest.direction
 
-    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
+    def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
         """Return the state after a step of a given arc length (Song 1993, eqs. 4.14 to 4.31).
 
@@ -89,7 +89,7 @@ class Curve(StateSolver):
             old: accepted state at the start of the step.
             length: arc length of the step, dimensionless.
             predictor: function from the control to a guess of x, in a step in time, or None.
-            behind: earlier state on the same smooth path, or None. The guess lies on the parabola through it and `old`.
+            earlier: a state before `old` on the same smooth path, or None. The guess lies on the parabola through both.
             bend: correction of the guess in the plane, or None.
 
         Returns:
@@ -99,10 +99,10 @@ class Curve(StateSolver):
             Failure: Newton's method fails, or an element is inverted.
         """
         plane = self._plane(old, *self._ahead(old, length))
-        return self._solve_from(*self._ahead(old, length, behind, bend), plane, "step", old, predictor)
+        return self._solve_from(*self._ahead(old, length, earlier, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
+                earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
         """Return the state near the end of a step at which a constraint holds, in place of a given arc length.
 
         Args:
@@ -110,7 +110,7 @@ class Curve(StateSolver):
             length: arc length at which the guess lies, dimensionless.
             equation: the constraint, such as "quantity = target".
             predictor: as in `step`.
-            behind: as in `step`.
+            earlier: as in `step`.
             bend: correction of the guess, or None.
             kind: kind of the new state (`State.kind`).
 
@@ -120,20 +120,20 @@ class Curve(StateSolver):
         Raises:
             Failure: Newton's method fails, or an element is inverted.
         """
-        return self._solve_from(*self._ahead(old, length, behind, bend), equation, kind, old, predictor)
+        return self._solve_from(*self._ahead(old, length, earlier, bend), equation, kind, old, predictor)
 
-    def _ahead(self, old: State, length: float, behind: State | None = None,
+    def _ahead(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
         """Return the guess (x, control) at an arc length from the state `old`, on its tangent.
 
-        With an earlier state `behind` it lies on the parabola through both; the correction `bend` is added.
+        With a state `earlier` before `old` it lies on the parabola through both; the correction `bend` is added.
         """
         x, control = old.x + length * old.direction, old.control + length * old.slope
-        if behind is not None:
-            h = self.distance(behind, old)
+        if earlier is not None:
+            h = self.distance(earlier, old)
             share = (length / h) ** 2
-            x += share * (behind.x - old.x + h * old.direction)
-            control += share * (behind.control - old.control + h * old.slope)
+            x += share * (earlier.x - old.x + h * old.direction)
+            control += share * (earlier.control - old.control + h * old.slope)
         if bend is not None:
             x += bend[0]
             control += bend[1]

@@ -105,7 +105,7 @@ class FixedControlCurve(Curve):
         super().__init__(problem, tolerances)
         self._fixed = FixedControl(problem, tolerances)
 
-    def step(self, old: State, length: float, predictor: Predictor | None = None, behind: State | None = None,
+    def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
         """Return the state after a step of a length from `old`, at the control old.control + length old.slope.
 
@@ -117,7 +117,7 @@ class FixedControlCurve(Curve):
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                behind: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
+                earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
         """Return the state at which the control meets a target, from the state `old`, at the given length of the step.
 
         The target must be a value of the control: then it is met at old.control + length old.slope. `equation` and the

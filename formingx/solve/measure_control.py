@@ -137,8 +137,8 @@ class Flow(Run):
         if length < _STEPS.still:
             return new
         if self.problem.relaxes:
-            before = _rate([*predictor.before(self.states[:-1], old.time, 2), old])
-            after, step = _rate([*predictor.before(self.states, new.time, 2), new]), new.time - old.time
+            before = _rate([*predictor.recent_states(self.states[:-1], old.time, 2), old])
+            after, step = _rate([*predictor.recent_states(self.states, new.time, 2), new]), new.time - old.time
         else:                                                # the tangents of the path show an extremum
             before, after, step = old.slope, new.slope, length
         still = _STEPS.still * max(abs(old.control), abs(new.control)) / step
@@ -163,7 +163,7 @@ class Flow(Run):
         It lies on the polynomial through the last states. If there is only one, it lies on its tangent where the
         quantity has the prescribed value.
         """
-        past = predictor.before(self.states, time, predictor.CUBIC - self.problem.has_kinks)
+        past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
             return self._along(old, value)
         w = predictor.weights(past, time)

@@ -270,14 +270,14 @@ class Run:
         """
         limit = self.problem.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
-        behind = None if self.problem.has_kinks else predictor.behind(self.states, reach, self.curve.distance)
+        earlier = None if self.problem.has_kinks else predictor.parabola_state(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
             if target is not None and bound is not None:
-                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, behind, bend)
+                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, earlier, bend)
             elif end is not None:
-                new = self.curve.step_to(old, reach, fixed(end), self._predictor, behind, bend, kind="step")
+                new = self.curve.step_to(old, reach, fixed(end), self._predictor, earlier, bend, kind="step")
             else:
-                new = self.curve.step(old, length, self._predictor, behind, bend)
+                new = self.curve.step(old, length, self._predictor, earlier, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _OtherState("the target was met on a distant part of the path", [])
@@ -309,7 +309,7 @@ class Run:
 
         def x(control: float) -> Array | None:
             time = self.problem.time_at(control)
-            past = predictor.before(self.states, time, predictor.CUBIC)
+            past = predictor.recent_states(self.states, time, predictor.CUBIC)
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
 
@@ -317,7 +317,7 @@ class Run:
         """Return the time integration error of a step over its tolerance; raise `Cutback` if it is much larger."""
         if self._time_error is None:
             return 0.0
-        error = self._time_error.of(self.states, new.x, new.control)
+        error = self._time_error.ratio(self.states, new.x, new.control)
         if error > self.settings.inaccurate:
             part = max(0.8 * error ** (-1 / 3), 0.1)
             past = self.states[-1].control

@@ -12,7 +12,7 @@ from .state import State
 CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a parabola, go through
 
 
-def before(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
+def recent_states(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
     """Return the last states that are suitable for an extrapolation to a later time, in order.
 
     Args:
@@ -33,7 +33,7 @@ def before(states: Sequence[State], time: float, most: int, close: float = 0.1) 
     return found
 
 
-def behind(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
+def parabola_state(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
     """Return an earlier state that gives, with the last state and its tangent, a parabola as predictor of a step.
 
     It is one of the last few states, at least half the step away from the last one, and no jump lies between them.

@@ -19,7 +19,7 @@ log = logging.getLogger("formingx")
 
 
 class Aim:
-    """Open targets of a run, and the values of the last target's quantity in its states. This target ends the run.
+    """Targets of a run: which are still open, and how near the run is to the last one, which ends it.
 
     Args:
         curve: solver of the path.
@@ -57,17 +57,28 @@ class Aim:
 
         Args:
             value: value of the quantity, in the user's units; default: its value in the last state.
+
+        Returns:
+            The progress, dimensionless; above 1 beyond the target.
         """
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def look(self, state: State) -> None:
-        """Append the value of a state to `values`, and update the largest progress so far."""
+        """Append the value of the last target's quantity in an earlier state, of a run that is continued.
+
+        Args:
+            state: the state.
+        """
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
-        """Append the value of an accepted state to `values`, and close the targets that the state meets."""
+        """Append the value of the last target's quantity in an accepted state, and close the targets that it meets.
+
+        Args:
+            state: the state.
+        """
         self.values.append(self._curve.value(self.measure, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.met     # other targets may be met, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]

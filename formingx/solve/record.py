@@ -145,8 +145,12 @@ class Record:
             self.equations.restore(state)
         return len(states)
 
-    def go_on_from(self, other: Record) -> None:
-        """Begin this record with the states and the costs of another record, which stays unchanged."""
+    def continue_from(self, other: Record) -> None:
+        """Begin this record with the states and the costs of another record.
+
+        Args:
+            other: the other record; it is not changed.
+        """
         mine = self.segments[-1]
         *earlier, last = other.segments
         self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
@@ -154,6 +158,9 @@ class Record:
 
     def accept(self, state: State) -> None:
         """Accept a state: update the history variables, append the state and call the functions in `hooks.on_state`.
+
+        Args:
+            state: the converged state; its history variables, stage, time and check of admissibility are set.
 
         Raises:
             Unusable: no body can have this state. The record is then unchanged.

@@ -121,7 +121,7 @@ class TimeError:
         self._problem = problem
         self._once, self._adding_up = once * accuracy, adding_up * accuracy**1.5
 
-    def of(self, states: Sequence[State], x: Array, control: float) -> float:
+    def ratio(self, states: Sequence[State], x: Array, control: float) -> float:
         """Return the time integration error of a step over its tolerance.
 
         The larger ratio counts: of the error at the end of the step, and of its part that persists in later steps.
@@ -135,7 +135,7 @@ class TimeError:
             The ratio; 0 if no time passes in the step.
         """
         time = self._problem.time_at(control)
-        past = predictor.before(states, time, predictor.QUADRATIC - 1)
+        past = predictor.recent_states(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
         share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])

@@ -112,17 +112,17 @@ class ContactEventPrediction:
             closure = sequence.next(k, length)
             if closure is None:
                 break
-            allowed[closure.face] -= closure.time > LIMITS.as_good * length
+            allowed[closure.face] -= closure.time > LIMITS.closed_at_start * length
             if not allowed[closure.face]:
-                return min(LIMITS.beyond * closure.time, length)
+                return min(LIMITS.overshoot * closure.time, length)
         else:
             return None
         if sequence.exhausted:
             log.info("the contact events of this step took too many iterations: it takes one gap closure")
             return None
-        if sequence.stops or sequence.ends <= LIMITS.as_good * length:
+        if sequence.stops or sequence.ends <= LIMITS.closed_at_start * length:
             return None
-        return min(LIMITS.beyond * sequence.ends, length)
+        return min(LIMITS.overshoot * sequence.ends, length)
 
     def closures(self, length: float) -> list[tuple] | None:
         """Return the gap closures predicted within a step.
