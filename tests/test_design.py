@@ -121,6 +121,10 @@ def test_bad_input_is_told_in_words():
         design.fit()
     with pytest.raises(fx.InputError, match="are both given: must be one of them"):
         design.fit(wall=0.04, even=True)
+    for wall, words in ((lambda s: "a", "fit: wall: the function of arrays reference length fails: ValueError"),
+                        (lambda s: 0.5 - s, "fit: wall: must be greater than 0 at all reference lengths")):
+        with pytest.raises(fx.InputError, match=words):
+            design.fit(wall=wall)
     with pytest.raises(fx.InputError, match="no parameter has an effect"):
         fx.Design(lambda b: disc(), {"b": 1.0}).fit(wall=0.04, volume=None)
     with pytest.raises(fx.InputError, match="parameter 'd' is not known"):

@@ -304,6 +304,10 @@ REFUSED = [
         (([1.0, 2.0], [1.0], [1.0, 2.0]), "must be \\(n,\\)"),
         (([1.0, -2.0], [1.0, 1.0], [1.0, 2.0]), "must be above 0")]),
     (lambda: fx.TimedTest.constant_rate("uniaxial", 0, L, L), "rate = 0"),
+    (lambda: fx.TimedTest.constant_rate("uniaxial", 1.0, "x", L), "TimedTest: stretches = 'x': must be finite numbers"),
+    (lambda: fx.TimedTest.constant_rate("uniaxial", 1.0, [2.0, -1.0], L), "TimedTest: stretches = .*must be above 0"),
+    (lambda: fx.TimedTest.relaxation("uniaxial", 2.0, "x", L), "TimedTest: times = 'x': must be finite numbers"),
+    (lambda: fx.with_tests(RUBBER), "with_tests: no test is given"),
     # comparisons
     *of(lambda arguments: fx.compare(GOOD, GOOD, **arguments), [
         ({"columns": {"a": "a", "x": "b"}}, "^compare: ours: column 'x' is not known; known: 'a', 'b'"),

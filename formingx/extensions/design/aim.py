@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite, pair
+from ...errors import InputError, finite, pair, values
 from .run import DesignRun
 
 
@@ -78,7 +78,7 @@ class WallTarget:
         damping: Levenberg damping over the largest singular value of the sensitivities.
 
     Raises:
-        InputError: a wanted thickness that is not positive, or fewer than two nodes count.
+        InputError: a wanted thickness that is not positive, a function that fails, or fewer than two nodes count.
     """
 
     measured: Any = None
@@ -89,9 +89,9 @@ class WallTarget:
         self.wanted: np.ndarray | None = None
         if wall is not None:
             s = run.profile.reference_length[self.inside]
-            given = wall(s) if callable(wall) else np.full(len(s), finite("fit: wall", wall))
-            self.wanted = np.asarray(given, dtype=float)
-            if self.wanted.shape != s.shape or not np.all(self.wanted > 0):
+            self.wanted = (values("fit: wall", wall, {"reference length": s}) if callable(wall)
+                           else np.full(len(s), finite("fit: wall", wall)))
+            if not np.all(self.wanted > 0):
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
@@ -269,10 +269,10 @@ def _deviation(residual: np.ndarray, jacobian: np.ndarray, m: int, low: np.ndarr
     return float(np.sqrt(np.mean((residual + jacobian @ step)[:m] ** 2))), step
 
 
-def _range(values: np.ndarray) -> str:
+def _range(wall: np.ndarray) -> str:
     """Return the mean of wall thicknesses as text, with the lowest and the highest if they differ."""
-    low, high = values.min(), values.max()
-    return f"{values.mean():.4g}" + (f" on the mean ({low:.4g} to {high:.4g})" if high - low > 1e-9 * high else "")
+    low, high = wall.min(), wall.max()
+    return f"{wall.mean():.4g}" + (f" on the mean ({low:.4g} to {high:.4g})" if high - low > 1e-9 * high else "")
 
 
 def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:

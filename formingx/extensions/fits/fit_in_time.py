@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ...errors import InputError, count, positive, several
+from ...errors import InputError, count, finite_array, positive, several
 from ...materials import branches, homogeneous
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
@@ -60,8 +60,11 @@ class TimedTest(NamedTuple):
 
         Returns:
             The test.
+
+        Raises:
+            InputError: times that are not finite numbers.
         """
-        t = np.append(0.0, np.asarray(times, float))
+        t = np.append(0.0, finite_array("TimedTest: times", times))
         return cls(mode, t, np.full(len(t), stretch), np.append(np.nan, stress))
 
     @classmethod
@@ -76,8 +79,13 @@ class TimedTest(NamedTuple):
 
         Returns:
             The test.
+
+        Raises:
+            InputError: a rate or a stretch that is not a positive number.
         """
-        l = np.append(1.0, np.asarray(stretches, float))
+        l = np.append(1.0, finite_array("TimedTest: stretches", stretches))
+        if not np.all(l > 0):
+            raise InputError(f"TimedTest: stretches = {stretches!r}: must be above 0")
         times = np.abs(np.log(l)) / positive("TimedTest: rate", rate)
         return cls(mode, times, l, np.append(np.nan, stress), "strain")
 

@@ -143,12 +143,14 @@ def with_tests(material: Material, **stretches: Any) -> Material:
         The copy; its attribute `tested` is the range.
 
     Raises:
-        InputError: unknown test, or a stretch that is not above 0.
+        InputError: no test, an unknown test, or a stretch that is not above 0.
 
     >>> fx.with_tests(fx.NeoHookean(c10=0.4), uniaxial=(1.0, 3.0)).tested
     uniaxial 1 to 3
     """
     other = copy.copy(instance("with_tests: material", material, Material, "a material"))
+    if not stretches:
+        raise InputError("with_tests: no test is given: must be stretches of tests, such as uniaxial=(1, 4)")
     other.tested = MeasuredRange.from_stretches(stretches)
     return other
 
