@@ -67,6 +67,22 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
 
 
+def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the edges of triangles, and the number of triangles at each edge.
+
+    Args:
+        triangles: vertex numbers of m triangles, shape (m, 3).
+
+    Returns:
+        Vertex numbers of the first edges of all triangles, then of the second and the third edges, in the order of the
+        triangle, shape (3 m, 2); vertex numbers of the k distinct edges, in ascending order, shape (k, 2); number of
+        the distinct edge of each of the 3 m edges, shape (3 m,); number of triangles at each distinct edge, shape (k,).
+    """
+    directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    edges, numbers, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return directed, edges, numbers.ravel(), times
+
+
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """Return, for each body, the numbers of its triangles, shape (k,).
 
@@ -75,12 +91,10 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
-    n = len(triangles)
-    directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges, edge, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
-    link, count = edge.ravel().copy(), len(edges)
+    n, (directed, edges, edge, times) = len(triangles), edges_of(triangles)
+    link, count = edge.copy(), len(edges)
     for k in np.flatnonzero(times > 2):
-        sides = np.flatnonzero(edge.ravel() == k)
+        sides = np.flatnonzero(edge == k)
         for wedge in _wedges(points, triangles[sides % n], directed[sides], edges[k]):
             link[sides[wedge]], count = count, count + 1
     graph = coo_array((np.ones(3 * n), (np.tile(np.arange(n), 3), n + link)), shape=(n + count,) * 2)

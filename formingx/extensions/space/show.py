@@ -20,6 +20,7 @@ from ...results.show.report import PROCESS, scripts
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
+from .bodies import edges_of
 from .wall import wall_of
 
 _DRAWN, _FRAMES = 200_000, (10, 100)
@@ -87,9 +88,8 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     for plane, mask in zip(planes.planes, on):
         normal[mask, plane.axis] = 0.0
     normal *= wall.at_nodes[:, None] / 2 / np.linalg.norm(normal, axis=1, keepdims=True)
-    ends = np.concatenate([wall.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    _, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
-    rim = ends[(times[which.ravel()] == 1) & ~np.any([mask[ends].all(1) for mask in on] or [False], axis=0)]
+    directed, _, numbers, times = edges_of(wall.triangles)
+    rim = directed[(times[numbers] == 1) & ~np.any([mask[directed].all(1) for mask in on] or [False], axis=0)]
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
                            np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
     triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])

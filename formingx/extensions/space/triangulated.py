@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError, direction, instance, place, positive
 from ...io.stl import volume
-from .bodies import merged, separate_bodies
+from .bodies import edges_of, merged, separate_bodies
 from .solid_tool import SolidTool
 
 
@@ -156,10 +156,9 @@ def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> Non
         triangles: vertex numbers, shape (m, 3).
         caller: name of the caller, for messages.
     """
-    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges, which, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    directed, edges, numbers, times = edges_of(triangles)
     sense = np.zeros(len(edges))
-    np.add.at(sense, which.ravel(), np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))
+    np.add.at(sense, numbers, np.where(directed[:, 0] < directed[:, 1], 1.0, -1.0))
     for bad, words in ((times == 1, "is open: {n} edges have a triangle on one side only, one at {at}: close the holes"
                                     " where it was drawn"),
                        (times % 2 == 1, "has {n} edges with an odd number of triangles, one at {at}: it crosses itself,"

@@ -13,6 +13,7 @@ from ...errors import InputError, direction, pair, positive, triple
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...ranks import gathered
 from ...results.files.sheet import Sheet
+from .bodies import edges_of
 from .surface import wrinkled
 
 
@@ -187,8 +188,7 @@ class WallInSpace(Sheet):
             Deformed polylines, shape (k, 3) each, length.
         """
         size, found = positive("printed: size", size), []
-        edges = np.unique(np.sort(np.concatenate([self.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))]), 1),
-                          axis=0)
+        edges = edges_of(self.triangles)[1]
         for axis in (0, 1):
             a, b = self.rest[edges[:, 0]], self.rest[edges[:, 1]]
             low, high = self.rest[:, axis].min(), self.rest[:, axis].max()
