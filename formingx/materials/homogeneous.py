@@ -49,15 +49,15 @@ class Response:
 
     @np.errstate(all="ignore")
     def stress(self, stretches: Any, constants: Any) -> np.ndarray:
-        r"""Return the nominal stresses of a sheet that is stress-free in direction 3.
+        r"""Return the nominal stresses of an incompressible sheet that is stress-free in direction 3.
 
-        The condition in direction 3 eliminates the pressure of incompressibility:
+        The condition in direction 3 eliminates the pressure. With the strain energy W
 
         .. math:: P_i = \frac{\partial W}{\partial l_i} - \frac{l_3}{l_i} \frac{\partial W}{\partial l_3}
 
         Args:
-            stretches: stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: values of the constants, in the order of `names`.
+            stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
+            constants: values of the constants of the energy, in their order in `Response`.
 
         Returns:
             Stresses P in directions 1 and 2, shape (2, n), stress.
@@ -67,14 +67,14 @@ class Response:
         return g[:2] - l[2] / l[:2] * g[2]
 
     def derivatives(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        r"""Return the derivatives of the energy with respect to three independent stretches.
+        r"""Return the derivatives of the strain energy W with respect to three independent principal stretches.
 
         .. math:: W_{,i} = \frac{\partial W}{\partial l_i}, \qquad
                   W_{,ij} = \frac{\partial^2 W}{\partial l_i \, \partial l_j}
 
         Args:
-            stretches: stretches (l1, l2, l3), shape (3, n).
-            constants: values of the constants, in the order of `names`.
+            stretches: principal stretches (l1, l2, l3), shape (3, n).
+            constants: values of the constants of the energy, in their order in `Response`.
 
         Returns:
             First derivatives, shape (3, n), and second derivatives, shape (3, 3, n), stress.
@@ -84,7 +84,7 @@ class Response:
 
     @np.errstate(all="ignore")
     def logarithmic(self, stretches: Any, constants: Any) -> tuple[np.ndarray, np.ndarray]:
-        r"""Return gradient and Hessian of the energy in two logarithmic strains, at constant volume (l1 l2 l3 = 1).
+        r"""Return gradient and Hessian of the strain energy W in two logarithmic strains, at constant volume.
 
         .. math:: g_i = \frac{\partial W}{\partial \ln l_i} = \tau_i - \tau_3, \qquad
                   K_{ij} = \frac{\partial^2 W}{\partial \ln l_i \, \partial \ln l_j}, \qquad i, j = 1, 2
@@ -92,8 +92,8 @@ class Response:
         Here :math:`\tau_i` are the principal Kirchhoff stresses.
 
         Args:
-            stretches: stretches (l1, l2), shape (2, n).
-            constants: values of the constants, in the order of `names`.
+            stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
+            constants: values of the constants of the energy, in their order in `Response`.
 
         Returns:
             Gradient g, shape (2, n), and Hessian K, shape (2, 2, n), stress.

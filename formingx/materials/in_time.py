@@ -123,13 +123,17 @@ class Relaxing(Material):
         return None if self._equilibrium is None else self._relaxed_energy(F, constants)
 
     def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
-        """Return the equilibrium energy for F and {name: value} of all constants (UFL, stress); 0 if there is none."""
+        """Return the energy after complete relaxation at F (UFL, stress), from {name: value} of all constants.
+
+        It is 0 if all stress relaxes.
+        """
         if self._equilibrium is None:
             return 0
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
-        """Return the nominal stress of the equilibrium material in a test, shape of `stretches`; 0 if there is none."""
+        """Return the nominal stress after complete relaxation in a test, shape of `stretches`; 0 if all stress relaxes.
+        """
         return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     @property

@@ -126,7 +126,10 @@ class Material(Energies):
         return self._moduli(values, values.shape[1])[1]
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
-        """Return smallest and largest small-strain modulus along the axes for n sets of constants, shape (2, n)."""
+        """Return the smallest and the largest small-strain shear modulus for n sets of constants, shape (2, n), stress.
+
+        The moduli hold for strains along the axes of the section; they are equal for an isotropic material.
+        """
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
         half = np.hypot((a - b) / 2, (H[0, 0] - H[1, 1]) / math.sqrt(12))
@@ -136,7 +139,7 @@ class Material(Energies):
     def rest_stress(self) -> float:
         r"""Stress of the energy in the reference configuration, which the forms remove, stress.
 
-        For an energy that is a function of the invariants
+        For an energy W that is a function of the invariants I1 and I2
 
         .. math:: \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
                   = 2 \frac{\partial W}{\partial I_1} + 4 \frac{\partial W}{\partial I_2}
@@ -150,6 +153,8 @@ class Material(Energies):
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), *, true: bool = False) -> np.ndarray:
         r"""Return the nominal stress, force over reference area, in a homogeneous test of an incompressible sheet.
+
+        With the strain energy W and the principal stretches l_i
 
         .. math:: P_i = \frac{\partial W}{\partial l_i} - \frac{l_3}{l_i} \frac{\partial W}{\partial l_3}, \qquad
                   l_1 l_2 l_3 = 1
@@ -186,7 +191,9 @@ class Material(Energies):
     def largest_stretch(self, mode: str) -> float:
         r"""Return the stretch l of a test at which the energy becomes infinite.
 
-        .. math:: l^2 + l^{2k} + l^{-2 - 2k} = I_{1,max}, \qquad k = -\tfrac{1}{2}, 0, 1
+        .. math:: l^2 + l^{2k} + l^{-2 - 2k} = I_{1,max}
+
+        The right-hand side is the property `largest_I1`.
 
         Args:
             mode: "uniaxial" (k = -1/2), "pure_shear" (k = 0) or "equibiaxial" (k = 1).

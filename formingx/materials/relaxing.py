@@ -106,6 +106,8 @@ class RelaxingMaterial(Relaxing):
 
         .. math:: \sqrt{\max \mathrm{eig}(J^{-2/3} F M F^T)}, \qquad M = C_v^{-1} \text{ or } A
 
+        Cv or A is the internal variable of the branch, and J the determinant of F.
+
         Args:
             F: deformation gradient in the state (UFL, shape (3, 3)).
             internal: {name: internal variable in the state (UFL, shape (4,))}.
@@ -127,6 +129,9 @@ class RelaxingMaterial(Relaxing):
         r"""Return the strain energy per reference volume for a sudden deformation of the undeformed body.
 
         .. math:: W = W_{eq}(F) + \sum_k \frac{\mu_k}{2} (\mathrm{tr} \, \bar C - 3)
+
+        The first term is the equilibrium energy, mu_k the shear modulus of branch k, and :math:`\bar C` the isochoric
+        right Cauchy-Green tensor.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -331,7 +336,10 @@ class RelaxingMaterial(Relaxing):
     # the law of a branch: A is its internal variable, C the isochoric right Cauchy-Green tensor, both as entries
 
     def _metric(self, A: Entries) -> Entries:
-        """Return the entries of M of the elastic left Cauchy-Green tensor F M F^T, for the internal variable A."""
+        """Return the entries of the tensor M of a branch with the internal variable A.
+
+        F M F^T is the elastic left Cauchy-Green tensor of the branch.
+        """
         raise NotImplementedError
 
     def _stored(self, C: Entries, A: Entries) -> Any:
@@ -350,7 +358,10 @@ class RelaxingMaterial(Relaxing):
         raise NotImplementedError
 
     def _advanced(self, C: Entries, before: Any, A: Entries, x: Any) -> Entries:
-        """Return the internal variable of a branch at the end of a step; arguments as in `_step`."""
+        """Return the internal variable of a branch at the end of a step of length x = dt/tau.
+
+        C is isochoric at the end of the step, A the internal variable at its beginning, `before` the result of `_past`.
+        """
         raise NotImplementedError
 
     @staticmethod

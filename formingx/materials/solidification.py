@@ -61,7 +61,7 @@ class Solidification(Material):
 
     @property
     def base(self) -> Material:
-        """Material before any part of it has solidified."""
+        """Base material: the material before any part of it has solidified."""
         base = copy.copy(self._base)
         base.parameters = self._of_base(self.parameters)
         return base
@@ -91,9 +91,9 @@ class Solidification(Material):
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
         """Internal variables, {name: value in the reference configuration}.
 
-        They are the variables of the base material, C of the last two states, A, and the fraction phi that A includes.
-        A includes the material that solidifies in a step only from the beginning of the next step, when the temperature
-        at the end of the step is known.
+        They are the variables of the base material, C of the last two states, A, and the fraction phi that A includes,
+        with the symbols of `Solidification`. A includes the material that solidifies in a step only from the beginning
+        of the next step, when the temperature at the end of the step is known.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
@@ -122,6 +122,9 @@ class Solidification(Material):
 
         .. math:: W = W_{base}(F) + \frac{G \varphi}{2} (\mathrm{tr} \, C - 3)
 
+        The first term is the energy of the base material, G the modulus and phi the fraction of the solidified
+        material, and C the isochoric right Cauchy-Green tensor.
+
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
             constants: values of the constants by name.
@@ -137,8 +140,8 @@ class Solidification(Material):
         r"""Return the potential of a step in time, whose derivative by F is the nominal stress at the end of the step.
 
         Half of the material that solidifies in the step is stress-free in the shape at its beginning, half in the shape
-        at its end. With the values n at the beginning of the step, n + 1 at its end, and r the remaining part of the
-        solidified material if the fraction decreases,
+        at its end. A, C and phi are the symbols of `Solidification`, with the values n at the beginning of the step and
+        n + 1 at its end. If the fraction decreases, the part r of the solidified material remains:
 
         .. math:: W_{base} + \frac{G}{2} \left[\mathrm{tr}(C M) - \mathrm{tr} M\right], \qquad
                   M = r A_n + \tfrac{1}{2} \max(\varphi_{n+1} - \varphi_n, 0) \, C_n^{-1}, \qquad
@@ -180,7 +183,10 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Return A (entries) and phi at the beginning of a step, and phi at its end, from variables and constants."""
+        """Return tensor A (entries) and fraction phi at the beginning of a step, and phi at its end.
+
+        They follow from the internal variables at the beginning of the step and the constants, each {name: value}.
+        """
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))
@@ -240,5 +246,6 @@ def _fraction(between: Any, table: Any) -> _Fraction:
 
 
 def _remaining(before: Any, after: Any) -> Any:
-    """Return the factor (UFL) of A when the solidified fraction goes from `before` to `after`; 1 when it increases."""
+    """Return the part (UFL) of the solidified material that remains when the fraction changes from `before` to `after`.
+    """
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

@@ -16,18 +16,21 @@ class Viscoelastic(RelaxingMaterial):
 
     .. math::
         W = W_{eq}(C) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(C C_{v,k}^{-1}) - 3\right], \qquad
-        \frac{dC_{v,k}}{dt} = \frac{1}{\tau_k} \left[C - \tfrac{1}{3} \mathrm{tr}(C C_{v,k}^{-1}) C_{v,k}\right],
+        \frac{dC_{v,k}}{dt} = \frac{1}{\tau_k} \left[C - \tfrac{1}{3} \mathrm{tr}(C C_{v,k}^{-1}) C_{v,k}\right].
 
-    with det Cv_k = 1, and Cv_k = I in the reference configuration. C is the isochoric right Cauchy-Green tensor. The
-    law is known from Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and Govindjee
-    (1998), Kumar and Lopez-Pamies (2016). The small-strain relaxation modulus is
+    Branch k has the shear modulus mu_k, the relaxation time tau_k and the internal variable Cv_k, with det Cv_k = 1,
+    and Cv_k = I in the reference configuration. C is the isochoric right Cauchy-Green tensor, W_eq the equilibrium
+    energy. The law is known from Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and
+    Govindjee (1998), Kumar and Lopez-Pamies (2016). With the equilibrium modulus mu_eq the small-strain relaxation
+    modulus is
 
-    .. math:: G(t) = G_{eq} + \sum_k \mu_k \exp(-t / \tau_k).
+    .. math:: \mu(t) = \mu_{eq} + \sum_k \mu_k \exp(-t / \tau_k).
 
     In steady extension the stress of a branch is proportional to the rate, with the viscosity 3 mu tau.
 
-    A step of the implicit Euler method has a closed form (Shutov, Landgraf and Ihlemann 2013). Let G = Cv_n, x' =
-    dt/tau, a = det G and b = det(G + x' C). The new variable, and the potential, which is regular at dt = 0, are
+    A step of the implicit Euler method has a closed form (Shutov, Landgraf and Ihlemann 2013). Let Cv_n be the internal
+    variable at the beginning of the step, G = Cv_n, x' = dt/tau, a = det G and b = det(G + x' C). The internal variable
+    at the end of the step, and the potential of the step, which is regular at dt = 0, are
 
     .. math::
         C_v = \frac{G + x' C}{b^{1/3}}, \qquad
@@ -100,15 +103,16 @@ class TransientNetwork(RelaxingMaterial):
 
     .. math:: \tau_K = \mu F A F^T, \qquad \frac{dA}{dt} = \frac{C^{-1} - A}{\tau},
 
-    with A = I in the reference configuration and the isochoric right Cauchy-Green tensor C. The law is linear in C^-1:
-    in steady extension faster than 1/(2 tau) the stress grows without bound. The stored energy is
+    with the internal variable A, equal to I in the reference configuration, the isochoric right Cauchy-Green tensor C,
+    the shear modulus mu and the relaxation time tau. The law is linear in C^-1: in steady extension faster than
+    1/(2 tau) the stress grows without bound. The stored energy is
 
     .. math:: \frac{\mu}{2} \left[\mathrm{tr}(C A) - 3 - \ln \det A\right].
 
     A step takes C^-1 as a parabola in time, through its value at the end of the step and two earlier values. It is
     therefore of third order in time, and of second order however small tau is. For dt >> tau the stress follows the
-    rate at the end of the step, by BDF2 with variable steps. With x = dt/tau, and the ratio s of the step to the
-    previous one,
+    rate at the end of the step, by BDF2 with variable steps. Let n denote the beginning of the step, x = dt/tau, and s
+    the ratio of the step to the previous one. The potential of the step and A at its end are
 
     .. math::
         W_{step} &= \frac{\mu}{2} \mathrm{tr}(C M), \qquad A = M + (1 - m - p) C^{-1}, \\

@@ -308,9 +308,12 @@ def bind_pole_height(problem: Any) -> Bound:
 
 
 def bind_pole_stretch(problem: Any) -> Bound:
-    """Return the in-plane stretch of the sheet at the pole, on the axis, as an output quantity.
+    r"""Return the in-plane stretch of the sheet at the pole, on the axis, as an output quantity.
 
-    `pole_stretch` defines the stretch. On a remeshed body the thickness h_0 is the thickness on the first mesh.
+    .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
+
+    Here h is the current thickness on the axis, h_0 the thickness on the first mesh of the run. In a membrane the
+    stretch is 1 + du_r/dR.
 
     Args:
         problem: the `Problem`.

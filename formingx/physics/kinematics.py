@@ -96,8 +96,9 @@ class Kinematics:
         .. math:: a = w(X) \, J F^{-T} N = \begin{cases} 2 \pi (R + u_r) \, \mathrm{cof}(I + \nabla u) N &
                   \text{axisymmetric} \\ \mathrm{cof}(I + \nabla u) N & \text{else} \end{cases}
 
-        For quadratic displacements of an axisymmetric body it is a polynomial of degree 3, without division by R. In
-        three dimensions it is the area vector per unit reference area of the sheet.
+        F is the deformation gradient, J its determinant, and w the weight of `weight`. For quadratic displacements of
+        an axisymmetric body a is a polynomial of degree 3, without division by R. In three dimensions it is the area
+        vector per unit reference area of the sheet.
 
         Args:
             u: displacement (UFL, shape (2,) or (3,), length).
@@ -105,7 +106,7 @@ class Kinematics:
             N: unit normal of the line in the reference configuration (UFL, shape of u).
 
         Returns:
-            Area vector a (UFL, shape of u), in the unit of the weight w of `weight`.
+            Area vector a (UFL, shape of u), in the unit of w.
         """
         raise NotImplementedError
 
@@ -149,8 +150,8 @@ class Kinematics:
             number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
 
         Returns:
-            Functions from deformed positions, shape (m, 2), to amplitudes (U, W, V), shape (m, 3); empty if no rigid
-            motion has this wave number.
+            Functions from deformed positions, shape (m, 2), to amplitudes (U, W, V) of `mode_gradient`, shape (m, 3);
+            empty if no rigid motion has this wave number.
         """
         raise NotImplementedError
 
@@ -194,8 +195,8 @@ class Axisymmetric(Kinematics):
             number: number of waves n.
 
         Returns:
-            Functions from deformed positions (r, z), shape (m, 2), to amplitudes (U, W, V), shape (m, 3); empty for
-            other n.
+            Functions from deformed positions (r, z), shape (m, 2), to radial, axial and hoop amplitudes (U, W, V),
+            shape (m, 3); empty for other n.
         """
         def mode(*components):
             return lambda x: np.stack([c(x[:, 0], x[:, 1]) for c in components], 1)

@@ -90,8 +90,8 @@ class Pressure(Load):
 
     .. math:: \delta W = -p \int_{\gamma} n \cdot \delta u \, da = -p \int_{\Gamma} J F^{-T} N \cdot \delta u \, dA
 
-    Nanson's formula pulls the integral back to the reference face exactly. The unsymmetric load stiffness is part of
-    the tangent.
+    Nanson's formula pulls the integral over the deformed face (normal n) back to the reference face (normal N) exactly.
+    F is the deformation gradient and J its determinant. The unsymmetric load stiffness is part of the tangent.
 
     Args:
         on: name of the boundary. A positive pressure pushes into the body.

@@ -165,8 +165,9 @@ class MixedPressure(Model):
 
     .. math:: W(F) - \sigma_0 \ln J + p (J - 1) - \frac{\epsilon p^2}{16 \mu}
 
-    The stress :math:`\sigma_0` makes the reference configuration free of stress, see `formingx.materials.material`. The
-    pressure may jump across the interface of two materials.
+    W is the strain energy of the material, mu its shear modulus, p the pressure (positive in tension) and J the
+    determinant of the deformation gradient F. The stress :math:`\sigma_0` makes the reference configuration free of
+    stress, see `formingx.materials.material`. The pressure may jump across the interface of two materials.
 
     Args:
         eps: dimensionless penalty parameter epsilon; 0 preserves the volume exactly (weakly, in the pressure space).
@@ -256,8 +257,8 @@ class DisplacementPenalty(Model):
 
     .. math:: W(F) - \sigma_0 \ln J + \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad I_3 = J^2
 
-    The term with the stress :math:`\sigma_0` makes the reference configuration free of stress, see
-    `formingx.materials.material`.
+    W is the strain energy of the material, mu its shear modulus and J the determinant of the deformation gradient F.
+    The stress :math:`\sigma_0` makes the reference configuration free of stress, see `formingx.materials.material`.
 
     Args:
         eps: dimensionless penalty parameter epsilon, positive (thesis: 2e-2 to 1e-7).

@@ -57,7 +57,8 @@ class Support(Part):
         on: name of the supported boundary.
 
     Attributes:
-        resists: names of the components, "r" or "z", in which the stored energy resists a motion of the whole boundary.
+        resists: names of the components, "r" or "z", in which the stored energy of an elastic support resists a motion
+            of the whole boundary.
     """
 
     resists: tuple[str, ...] = ()

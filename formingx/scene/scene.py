@@ -205,7 +205,7 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """Items that a run can control; for a tool that meets several faces, only the first contact."""
+        """Loads, supports and contacts that a run can control; of a tool with several faces only the first contact."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.together(i)[0] == i]
 
