@@ -184,5 +184,4 @@ def test_a_mesh_too_coarse_for_the_heat_is_said(caplog):
         caplog.clear()
         _, there, found = laid_on(proposed)
         error = np.abs(found - np.interp(there, z[order], T[order])).max()
-        print(layers, proposed, error)
         assert error < 2e-3 * 120 and "in space" not in caplog.text

@@ -132,8 +132,6 @@ def test_order_3_in_space():
         body = body_of(fx.mesh.disc(radius=1.0, thickness=1.0, elements=(n, n)), start=mode,
                        materials={"sheet": UNIT})
         T = fixed_steps(body, end, 60)[0]
-        points = fem.Function(body.space)
-        points.x.array[: len(T)] = T
         R, Z = (body.points[:, k] for k in (0, 1))
         errors.append(np.abs(T - mode(R, Z, end)).max())
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
