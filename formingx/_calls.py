@@ -209,7 +209,7 @@ def _matches(value: Any, kind: Any) -> bool:
 
 
 def _alternatives(kinds: Sequence[Any]) -> list[Any]:
-    """Return the types of a union; those that make up `ArrayLike`, which is a union itself, are one entry."""
+    """Return the types of a union, with `ArrayLike`, which is a union itself, as one entry."""
     array = set(typing.get_args(ArrayLike))
     return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 

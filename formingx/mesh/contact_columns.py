@@ -94,19 +94,19 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     for item in touching:
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
             wall = thickness * fillet.area_ratio
-            wanted = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
-            wanted *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
-            wanted = max(wanted, _SHORTEST * longest)
-            shortest = min(shortest, wanted)
-            size = np.minimum(size, wanted + GROWTH * _distance(s, fillet))
+            column_length = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
+            column_length *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
+            column_length = max(column_length, _SHORTEST * longest)
+            shortest = min(shortest, column_length)
+            size = np.minimum(size, column_length + GROWTH * _distance(s, fillet))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
     through = max(fineness.through if bending >= _BENDING else min(fineness.through, 2),
                   int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
     for end in (0, -1):
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
-            away = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
-            size = np.minimum(size, _END * thickness / min(through, fineness.through) + GROWTH * away)
+            distance = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
+            size = np.minimum(size, _END * thickness / min(through, fineness.through) + GROWTH * distance)
     ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
@@ -129,5 +129,5 @@ def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:
         keep: True for at least as many elements through each layer as the mesh has.
     """
     share = preset.thickness / preset.thickness.sum()
-    least = np.array(preset.through if keep else np.ones(len(share)))
-    return np.maximum(np.ceil(through * share - 1e-9), least).astype(int).tolist()
+    minimum = np.array(preset.through if keep else np.ones(len(share)))
+    return np.maximum(np.ceil(through * share - 1e-9), minimum).astype(int).tolist()

@@ -1,10 +1,10 @@
 """Estimate of the part of an undeformed sheet that reaches each fillet of a tool.
 
-A sheet under pressure is nearly a membrane. In the tool its free surface is that of a ball that fits into the tool.
-The radius of this ball falls as the pressure grows. So a point of the tool is touched when this radius falls to the
-radius of the largest ball that touches the tool there. Points that touch stick, and the free part of the sheet
-stretches evenly along the section. The position of the fillet material is found to 5 %
-of the length of the sheet in a cup (tests/test_accuracy_in_moulds.py).
+A sheet under pressure is nearly a membrane. In the tool its free surface has the shape of a ball, whose radius falls as
+the pressure grows. So a point of the tool is touched when this radius falls to the radius of the largest ball that
+touches the tool there. Points that touch stick, and the free part of the sheet stretches evenly along the section.
+In a cup the estimated position of the material on the fillet is wrong by at most 5 % of the length of the sheet
+(tests/test_accuracy_in_moulds.py).
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
     pieces = np.diff(outline, axis=0)
     number = np.ceil(np.hypot(*pieces.T) / (_PIECE * np.ptp(outline, axis=0).max())).astype(int)
     x = np.concatenate([a + d * ((np.arange(n) + 0.5) / n)[:, None] for a, d, n in zip(outline, pieces, number)])
-    near = tool.nearest(x)
-    x = x - near.distance[:, None] * near.normal                   # chords of an arc lie beside it
-    near = tool.nearest(x - 1e-6 * length * near.normal)
+    closest = tool.nearest(x)
+    x = x - closest.distance[:, None] * closest.normal                   # chords of an arc lie beside it
+    closest = tool.nearest(x - 1e-6 * length * closest.normal)
     on_axis = face[0, 0] <= 1e-9 * length, face[-1, 0] <= 1e-9 * length
     first, last = (int(x[:, 0].argmin() if axis else np.hypot(*(x - end).T).argmin())
                    for axis, end in zip(on_axis, face[[0, -1]]))
     order = np.arange(first, last + 1) if first <= last else np.arange(first, last - 1, -1)
-    return x[order], near.normal[order], np.abs(near.curvature[order])
+    return x[order], closest.normal[order], np.abs(closest.curvature[order])
 
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:

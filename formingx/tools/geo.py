@@ -61,7 +61,7 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
 
 
 class _Drawing:
-    """Points, curves and named numbers of a script, to which `add` adds those of a statement.
+    """Points, curves and named numbers of a script; `add` reads one statement.
 
     Attributes:
         values: {name: number}.

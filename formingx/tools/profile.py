@@ -273,16 +273,17 @@ class Tool:
             det = _cross(u, v)
             with np.errstate(divide="ignore", invalid="ignore"):
                 s, t = _cross(w, v) / det, _cross(w, u) / det
-            hit = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s)
-            if hit.any():
-                k = int(np.argmax(hit))
+            crosses = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s)
+            if crosses.any():
+                k = int(np.argmax(crosses))
                 raise InputError(f"Tool: the profile crosses itself near (R, Z) = {show(a[i[k]] + s[k] * u[k])}")
             length = np.maximum(np.hypot(*u.T), 1e-300)
-            both = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
-            across, lies = np.abs(_cross(u, both)) / length, (u * both).sum(-1) / length
-            over = (across.max(0) < tolerance) & (lies.max(0) > tolerance) & (lies.min(0) < length - tolerance)
-            if over.any():
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {show(a[j[np.argmax(over)]])}")
+            ends = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
+            distance, position = np.abs(_cross(u, ends)) / length, (u * ends).sum(-1) / length
+            overlaps = (distance.max(0) < tolerance) & (position.max(0) > tolerance)
+            overlaps &= position.min(0) < length - tolerance
+            if overlaps.any():
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {show(a[j[np.argmax(overlaps)]])}")
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
