@@ -144,7 +144,7 @@ def test_a_tool_that_comes_in_remembers_nothing():
     contact, = problem.contacts
     x = np.random.default_rng(1).uniform(-0.01, 0.01, problem.n_owned)
     assert contact.history.position == pytest.approx(contact.points)
-    contact.come_in(x, -0.2)
+    contact.activate(x, -0.2)
     assert contact.history.position == pytest.approx(contact.positions(x, -0.2), rel=1e-12)
     assert not contact.history.slip.any()
 

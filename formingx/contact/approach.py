@@ -85,7 +85,7 @@ class Approach:
         self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
         self.points = face.comm.allreduce(len(face.rule.points))
         share = max(self.points // 100, 1) if face.contact.lagged else 1
-        self.at_once = (given or 1) * share * (1 if face.law.remembers or conducts else 10)
+        self.at_once = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:

@@ -88,7 +88,7 @@ class FaceContact:
         self._base, self._rate, self.present = base, rate, present
 
     def shift_distances(self, shift: np.ndarray) -> None:
-        """Reduce the signed distances of the points by `shift`, shape (n,), length; called after remeshing."""
+        """Reduce the signed distances of the points from the tool by `shift`, shape (n,), length, after remeshing."""
         self.shift = shift
         self.law = self._law(self._penalty)
 
@@ -107,7 +107,11 @@ class FaceContact:
             self.increment = Increment(self.law, self.history)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components), in the units of the unknowns `values`."""
+        """Return the displacement of the points, shape (n, components), in the units of `values`.
+
+        Args:
+            values: locally owned unknowns, shape (m,).
+        """
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -127,7 +131,7 @@ class FaceContact:
         return (self._base + self._rate * control) * self._way
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
-        """Return the motion of the points relative to the tool, shape (n, components), length.
+        """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
 
         Args:
             dx: change of the locally owned unknowns.
@@ -136,7 +140,7 @@ class FaceContact:
         return self._length * self.displacement(dx) - self._rate * step * self._way
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the contact tractions at the points in a state; after `linearise`, of the linearised law.
+        """Return the contact tractions at the points in a state; at the state last linearised, of the linearised law.
 
         Args:
             fields: locally owned unknowns of the state.
@@ -152,7 +156,7 @@ class FaceContact:
     def area(self) -> np.ndarray:
         """Reference area on which the contact forces act, shape (n,), length^2 (per depth: length).
 
-        With lagged contact it is 0 for points that closed their gap in the last step.
+        For tools in three dimensions it is 0 for points whose gap closed in the last step.
         """
         if self._memory is None or not self.contact.lagged:
             return self.rule.area
@@ -186,8 +190,8 @@ class FaceContact:
         start = None if old is None else self.positions(old, control)
         self.increment, self._guessed = Increment(self.law, self.history, start, self._guessed), None
 
-    def leave_out(self, points: np.ndarray) -> None:
-        """Keep some points (a mask, shape (n,)) open until the next increment begins."""
+    def keep_open(self, points: np.ndarray) -> None:
+        """Keep some points without contact forces until the next increment begins; points: their mask, shape (n,)."""
         law: Any = self.law                                  # see `ContactLaw`
         self.increment = Increment(law.without(points), self.history)
 
@@ -204,7 +208,10 @@ class FaceContact:
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the contact law for a Newton iteration at a state.
 
-        The difference between linearised and actual contact forces is added to `values`, the locally owned residual F.
+        Args:
+            values: locally owned entries of the residual F; the linearised minus the actual contact forces are added.
+            fields: locally owned unknowns of the state.
+            control: control of the state.
         """
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
@@ -240,9 +247,9 @@ class FaceContact:
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the contact stiffness towards the next step minus that in the last tangent, (n, c, c), stress/length.
+        """Return the change of the contact stiffness from the last tangent to the next step, at an accepted state.
 
-        The state is accepted. Entries are 0 for points at which the relative difference is below `_SAME_STIFFNESS`.
+        The result has the shape (n, c, c), stress/length; 0 for points whose relative change is below 1e-3.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -290,9 +297,9 @@ class FaceContact:
     # history
 
     @property
-    def remembers(self) -> bool:
+    def has_history(self) -> bool:
         """True if the contact forces depend on history variables."""
-        return self.law.remembers or self.contact.present_area
+        return self.law.has_history or self.contact.present_area
 
     @property
     def history(self) -> ContactHistory | None:
@@ -303,13 +310,14 @@ class FaceContact:
         """Set the history variables of the reference configuration, in which the points have not been in contact."""
         self._start_at(self.points)
 
-    def come_in(self, fields: np.ndarray, control: float) -> None:
-        """Set the history variables in the state in which the tool becomes active, before any contact."""
+    def activate(self, fields: np.ndarray, control: float) -> None:
+        """Set the history variables of points not yet in contact, at the state in which the tool becomes active."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
         """Set the history variables of points that begin at positions x relative to the tool, shape (n, c), length."""
-        self._take(Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x))) if self.remembers else None)
+        new = Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x)))
+        self._take(new if self.has_history else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
         """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.arrival`).
@@ -342,7 +350,7 @@ class FaceContact:
         self._take(Memory(history, arrived, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Return True if points under tension were separated from a tool in three dimensions; collective."""
+        """Open the points under tension at a tool in three dimensions; return True if there were any. Collective."""
         if self._memory is None or not (self.contact.lagged and self.contact.separates):
             return False
         history, x = self._memory.history, self.positions(fields, control)
@@ -355,12 +363,10 @@ class FaceContact:
         return found
 
     def close_penetrated(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Close the contact of points that penetrated a tool in three dimensions by more than `most` (length).
+        """Close the contact of points that penetrated a tool in three dimensions during the step; collective.
 
-        Each point sticks or slides from the position where its path in the step met the tool. Collective.
-
-        Returns:
-            True if there are such points.
+        Each point sticks or slides from the position where its path in the step met the tool. Points that are deeper
+        than `most` (length) count. Return True if there are such points.
         """
         if self._memory is None or not self.contact.lagged:
             return False

@@ -94,7 +94,7 @@ class Rule(Protocol):
 
 
 class _Nodes:
-    """Contact points that are nodes of the face: a point moves with the unknowns of its node."""
+    """Base of rules whose contact points are nodes of the face, so that a point moves with the unknowns of its node."""
 
     dofs: np.ndarray
 
@@ -115,6 +115,11 @@ class Lobatto(_Nodes):
     """Gauss-Lobatto rule: the contact points are the nodes of the face.
 
     The tributary areas `lumped` are exact for cubic functions along a facet. A node on the axis has the area 0.
+
+    Args:
+        solid: formulation of the body.
+        on: name of the boundary.
+        assemble: function that returns the locally owned entries of a compiled linear form.
     """
 
     def __init__(self, solid: Any, on: str, assemble: Any):
@@ -207,6 +212,10 @@ class Vertices(_Nodes):
     """Nodes of a sheet in three dimensions, each with a third of the area of the adjacent triangles.
 
     `lengths` is the square root of this area.
+
+    Args:
+        surface: formulation of the sheet.
+        assemble: function that returns the locally owned entries of a compiled linear form.
     """
 
     def __init__(self, surface: Any, assemble: Any):
@@ -242,9 +251,14 @@ class Vertices(_Nodes):
 
 
 class Gauss:
-    """Gauss rule with `count` points on each facet of a face whose adjacent cell this rank owns.
+    """Gauss rule: several contact points on each facet of a face whose adjacent cell this rank owns.
 
     Nodes of such a facet may be ghosts.
+
+    Args:
+        solid: formulation of the body.
+        on: name of the boundary.
+        count: number of points on each facet.
 
     Attributes:
         shapes: shape functions of the three nodes of the facet at the points, shape (n, 3).
@@ -283,7 +297,7 @@ class Gauss:
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values at the nodes, shape (n, 3), to the points, shape (n,).
+        """Interpolate values at the nodes of each point, shape (n, 3), to the points, shape (n,).
 
         A uniform field stays uniform to the last bit.
         """
@@ -318,7 +332,7 @@ def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Return a mask of the nodes of a face that lie on the axis and therefore have no tributary area.
 
     Args:
-        lumped: tributary areas of the points, shape (n,).
+        lumped: tributary areas of the points, shape (n,), length^2.
         lengths: their tributary lengths, shape (n,), length; 0 for points outside the face.
 
     Returns:

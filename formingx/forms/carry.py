@@ -158,7 +158,7 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
         control: control of the state.
         moved: True if the mesh of `problem` is a mesh of the deformed body in `state`.
     """
-    problem.look_at(x, control)
+    problem.set_fields_and_control(x, control)
     with source.state_context(state):
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
             """Return points of the mesh of `source` as points of the mesh of `problem`."""

@@ -31,7 +31,7 @@ class Histories:
         """Present control of the forms."""
         raise NotImplementedError
 
-    def look_at(self, x: np.ndarray, control: float) -> None:
+    def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
         """Set the fields and the control of the forms.
 
         Args:
@@ -90,7 +90,7 @@ class Histories:
 
     def advance(self, x: np.ndarray, control: float) -> None:
         if self.forms.histories:
-            self.look_at(x, control)
+            self.set_fields_and_control(x, control)
         known = self._predicted[1] if self._predicted[0] is x else []
         for history in self.histories[: len(self.histories) - len(known)]:
             history.advance(x[: self.n_owned], control)
@@ -111,7 +111,7 @@ class Histories:
         Returns:
             History variables of the forms at the end of the step.
         """
-        self.look_at(x, control)
+        self.set_fields_and_control(x, control)
         for history in self.forms.histories:
             history.advance(x[: self.n_owned], control, start)
         after = [history.get() for history in self.forms.histories]

@@ -56,7 +56,7 @@ class Probe:
         Returns:
             Displacement, shape (n, components), length.
         """
-        self._problem.place(x.array_r)
+        self._problem.set_fields(x.array_r)
         return self._read()
 
     def displacement_in(self, state: Any) -> np.ndarray:
@@ -71,7 +71,7 @@ class Probe:
         w = self._problem.forms.w.x.array
         before = w.copy()
         try:
-            self._problem.place(state.x)
+            self._problem.set_fields(state.x)
             return self._read()
         finally:
             w[:] = before

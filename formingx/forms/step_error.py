@@ -99,7 +99,7 @@ class StepError:
         """Return the stresses of the materials at the end of a step from the present history variables to x at a time.
         """
         self._at_time(time)
-        self._problem.place(x)
+        self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
 
     def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
@@ -110,7 +110,7 @@ class StepError:
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
         """Update the history variables of the materials to x at a time."""
-        self._problem.place(x)
+        self._problem.set_fields(x)
         self._at_time(time)
         for history in self._materials:
             history.advance(x, control)

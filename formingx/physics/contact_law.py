@@ -142,7 +142,7 @@ class ContactLaw:
         elastic_slip: elastic slip at which a point begins to slide, length.
         shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
         has_friction: True if tractions depend on the slip.
-        remembers: True if tractions depend on the history variables (`ContactHistory`).
+        has_history: True if tractions depend on the history variables (`ContactHistory`).
         pulls: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
         predictable: True if the law has `friction` and `depth`, as `formingx.physics.penalty.Law`; several gaps may
             then close in one step.
@@ -152,7 +152,7 @@ class ContactLaw:
     elastic_slip: float = 0.0
     shift: np.ndarray | float = 0.0
     has_friction: bool = False
-    remembers: bool = False
+    has_history: bool = False
     pulls: bool = False
     predictable: bool = False
 

@@ -60,7 +60,7 @@ class Law(NormalLaw):
         """Set the coefficients of friction and the flags that depend on them."""
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        self.remembers = self.has_friction or self.pulls
+        self.has_history = self.has_friction or self.pulls
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         """Return the mask of the points in contact with the tool, including bonded points.
@@ -179,7 +179,7 @@ class Law(NormalLaw):
         pressed, ahead = k * F, d - centre
         N = pressed + k * slope * ahead
         force = N[:, None] * n
-        kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.remembers else d            # stays in contact
+        kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.has_history else d            # stays in contact
         if not self.has_friction:
             return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
                              + outer(t, (pressed * bend)[:, None] * t), lambda: _history(x, kept_at, zero))

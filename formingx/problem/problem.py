@@ -34,7 +34,7 @@ from .units import Units
 
 
 class Problem(Stages, Units):
-    """Residual, tangent and derivative with respect to the control of a scene.
+    """Discrete problem of a scene: its residual F, and the derivatives of F by the unknowns x and by the control.
 
     `formingx.solve.equations` describes the members that the solver calls.
 
@@ -48,8 +48,8 @@ class Problem(Stages, Units):
         x: vector of unknowns; inside `state_context` the unknowns of the state.
         matrix: the tangent, reassembled by `tangent`.
         contacts: contacts of the scene (`FaceContact`).
-        present: the active contacts.
-        histories: arguments of F besides x and control (`History`).
+        present: contacts that are active in the present stage.
+        histories: history variables on which F depends (`History`): contacts, then materials, then the temperature.
         limit: limits of a step (`StepLimit`).
         admissible: admissibility check of the body, and its volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
@@ -67,7 +67,7 @@ class Problem(Stages, Units):
         forms.faces = self.contacts
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        self.histories: list[History] = [*(c for c in self.contacts if c.remembers), *forms.histories]
+        self.histories: list[History] = [*(c for c in self.contacts if c.has_history), *forms.histories]
         self.limit = StepLimit(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
@@ -102,14 +102,14 @@ class Problem(Stages, Units):
     def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
         for contact in self.contacts:
             if contact.contact is self.scene.items[number]:
-                contact.come_in(x, control)
+                contact.activate(x, control)
                 depth = penetration(contact, x, control)
                 if depth > 1e-6 * self.forms.length:
                     raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
                                      f" {depth:.6g} into the tool")
 
     def followed(self, points: np.ndarray) -> np.ndarray:
-        """Return points of the first mesh of a run as points of this mesh.
+        """Return the positions on this mesh of material points that are given on the first mesh of a run.
 
         Args:
             points: reference positions on the first mesh, shape (n, 2), length.
@@ -135,9 +135,9 @@ class Problem(Stages, Units):
             out.array_w += (control - 1) * stage.unbalanced
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
-        """Return the force of the body on a driven support, along its motion, all ranks.
+        """Return the force of the body on a driven support, along the motion of the support; collective.
 
-        The force is minus the sum of the unbalanced forces at the driven unknowns.
+        The force is minus the sum, over all ranks, of internal minus external forces at the driven unknowns.
 
         Args:
             number: number of the support in `Scene.items`.
@@ -152,7 +152,7 @@ class Problem(Stages, Units):
         return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
 
     def driven_unknowns(self, number: int) -> np.ndarray:
-        """Return the unknowns that a support drives.
+        """Return the unknowns whose values a driven support prescribes.
 
         Args:
             number: number of the support in `Scene.items`.
@@ -163,7 +163,7 @@ class Problem(Stages, Units):
         return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
-        """Return the internal minus the external forces, which supports carry.
+        """Return the internal minus the external forces, contact included, without the constraints of supports.
 
         Args:
             x: unknowns.
@@ -176,7 +176,9 @@ class Problem(Stages, Units):
         return self._forces(x.array_r[: self._n], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
-        """Return the internal minus the external forces without contact: reactions of supports and tools.
+        """Return the internal minus the external forces without contact forces and constraints.
+
+        In equilibrium these are the forces that supports and tools must supply.
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
@@ -185,18 +187,21 @@ class Problem(Stages, Units):
         Returns:
             Dimensionless forces, locally owned field unknowns, shape (n,).
         """
-        self.look_at(x, control)
+        self.set_fields_and_control(x, control)
         return self.assemble(self._residual)
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return `forces` at the state last set."""
+        """Return the internal minus the external forces, contact included, for fields that are set already.
+
+        fields: locally owned unknowns, shape (n,).
+        """
         values = self.assemble(self._residual)
         for contact in self.present:
             contact.add_residual(values, fields, control)
         return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """Check whether the body is inadmissible at a state; see `Admissible.holds`.
+        """Return True if an element of the body is inverted at a state, see `Admissible.holds`.
 
         Args:
             x: unknowns.
@@ -221,7 +226,7 @@ class Problem(Stages, Units):
             return self.admissible.furthest_volume_ratio()
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
-        """Return the root mean square of J - 1 in a state over the elements far from given positions; collective.
+        """Return the root mean square of the volume change J - 1 over elements far from given positions; collective.
 
         Args:
             state: a `State` of the path.

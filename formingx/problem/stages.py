@@ -19,7 +19,7 @@ from .vectors import Vectors
 
 
 class _Stage(NamedTuple):
-    """Equations of one set of step data, from a state on.
+    """Equations of one set of step data, for steps from the state at which it was set.
 
     Attributes:
         setting: the `StepData`.
@@ -39,7 +39,7 @@ class _Stage(NamedTuple):
 
 
 class Stages(Vectors):
-    """Equations of a problem for changing step data; see `formingx.solve.equations`.
+    """Part of `Problem` that follows the step data: constraints, loads and contacts; see `formingx.solve.equations`.
 
     Attributes:
         scene: the `Scene`.
@@ -61,7 +61,7 @@ class Stages(Vectors):
 
     @cached_property
     def _tangent(self) -> Tangent:
-        """Tangent of the scene with the constraints of the present stage."""
+        """Tangent matrix of the scene, with the constraints of the present stage."""
         made, stage = Tangent(self.forms, self._constraints, self.symmetric), self._stage
         made.enter(stage.active, stage.setting.rate, True)
         return made
@@ -133,17 +133,20 @@ class Stages(Vectors):
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Forces on the body that vanish as the control goes from 0 to 1 in a fading piece, shape (n,), or None."""
+        """Unbalanced forces that decrease to 0 as the control goes to 1, over 1 - control, shape (n,), or None.
+
+        They are dimensionless, for the locally owned field unknowns. None if the step data have no such forces.
+        """
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
 
     def motion(self, control: float) -> np.ndarray:
-        """Return the values of the constrained unknowns for a control.
+        """Return a vector of unknowns with the prescribed values of the constrained ones, and 0 elsewhere.
 
         Args:
-            control: dimensionless control.
+            control: dimensionless control, on which prescribed displacements depend.
 
         Returns:
-            Vector with these values and 0 elsewhere, locally owned entries of x.
+            Locally owned entries, shape (n,).
         """
         values = np.zeros(self.x.getLocalSize())
         values[self.constrained] = self._stage.place + self._stage.rate * control
@@ -160,7 +163,7 @@ class Stages(Vectors):
             The multipliers, on all ranks.
         """
         self.forms.control.value = control
-        self.place(x.array_r)
+        self.set_fields(x.array_r)
         multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
         if self.comm.rank == last:
             multipliers[:] = x.array_r[self._n:]
@@ -187,7 +190,7 @@ class Stages(Vectors):
             unbalanced.destroy()
 
     def _take(self, stage: _Stage) -> None:
-        """Set the forms, the contacts and the matrix to a stage."""
+        """Set the loads of the forms, the active contacts and the constraints of the matrix to those of `stage`."""
         before, self._stage = self._stage, stage
         if before is stage:
             return

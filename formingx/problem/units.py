@@ -13,7 +13,7 @@ from ..scene.scene import Scene
 
 
 class Units:
-    """Units of a problem for its present step data; see `formingx.solve.equations`.
+    """Part of `Problem` that converts dimensionless numbers to the user's units; see `formingx.solve.equations`.
 
     Attributes:
         scene: the `Scene`.

@@ -15,7 +15,7 @@ from ..forms.histories import Histories
 
 
 class Vectors(Histories):
-    """Vectors of unknowns of a problem, and its fields; see `formingx.solve.equations`.
+    """Part of `Problem` that assembles forms and holds the fields; see `formingx.solve.equations`.
 
     Attributes:
         comm: MPI communicator.
@@ -35,10 +35,15 @@ class Vectors(Histories):
         """Lumped mass of the displacement over the volume, locally owned entries, shape (n,)."""
         return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
 
-    def look_at(self, x: np.ndarray, control: float) -> None:
-        """Set the fields of the forms to x, locally owned entries, and their control."""
+    def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
+        """Set the fields and the control of the forms.
+
+        Args:
+            x: unknowns, locally owned entries, shape (n,).
+            control: dimensionless control.
+        """
         self.forms.control.value = control
-        self.place(x)
+        self.set_fields(x)
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Return the mean over the reference volume of the product of two displacement fields.
@@ -55,7 +60,7 @@ class Vectors(Histories):
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
         self.fill(out, self._metric * a.array_r[: self._n])
 
-    def place(self, x: np.ndarray) -> None:
+    def set_fields(self, x: np.ndarray) -> None:
         """Set the fields of the forms, and update the coefficients that depend on them.
 
         Args:
@@ -74,7 +79,7 @@ class Vectors(Histories):
         """Assemble a compiled linear form at the state last set.
 
         Args:
-            form: compiled form of rank 1.
+            form: compiled linear form.
 
         Returns:
             Locally owned entries, shape (n,).
@@ -85,7 +90,7 @@ class Vectors(Histories):
         """Assemble a compiled scalar form at the state last set, over all ranks.
 
         Args:
-            form: compiled form of rank 0.
+            form: compiled form without arguments.
 
         Returns:
             Value of the form.

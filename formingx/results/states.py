@@ -374,7 +374,7 @@ class States:
                 problem.clock = time
             time = problem.forms.time_at(control)
             problem.x.array_w[:] = x
-            problem.look_at(x, control)
+            problem.set_fields_and_control(x, control)
             for history in problem.materials:
                 history.advance(x, control)
             half = column.value(problem.x, control)

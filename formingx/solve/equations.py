@@ -153,7 +153,7 @@ class ContactFace(Protocol):
     def add(self, values: Array, forces: Array) -> None:
         """Add forces at the points, shape (n, c), to `values`, the locally owned entries of F."""
 
-    def leave_out(self, points: Array) -> None:
+    def keep_open(self, points: Array) -> None:
         """Keep points open until the next increment begins; `points`: a mask, shape (n,)."""
 
     def moved(self, dx: Array, step: float) -> Array:

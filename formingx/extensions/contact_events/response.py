@@ -65,7 +65,7 @@ class Response:
         self._x.array_w[:] = x
         faces: list[ContactFace] = list(self._problem.present)
         for face, given in zip(faces, forces, strict=True):
-            face.leave_out(~np.isnan(given[:, 0]))
+            face.keep_open(~np.isnan(given[:, 0]))
         self._problem.residual(self._x, control, self._F)
         for face, given in zip(faces, forces, strict=True):
             values = self._F.array_r.copy()

@@ -179,10 +179,10 @@ class _StateTransfer:
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):
             if face.present:
-                face.leave_out(closing)
+                face.keep_open(closing)
                 free = ~face.law.touching(face.positions(state.x[:n], state.control), face.history)
                 for perturbed in others:
-                    perturbed.leave_out(free | closing)
+                    perturbed.keep_open(free | closing)
 
     def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Move the points of the perturbed runs whose gap closes within a step to their positions of gap closure.
@@ -224,7 +224,7 @@ class _StateTransfer:
         """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
-            if not face.law.remembers or not face.present:
+            if not face.law.has_history or not face.present:
                 continue
             base = state.memory[self.problem.histories.index(face)]
             free = base.history.distance <= -face.law.theta

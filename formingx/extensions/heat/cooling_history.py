@@ -182,15 +182,15 @@ class CoolingHistory:
         self._before = self._time, self._state[0]
         if start is not None:
             after = [touch.conductance.copy() for touch, *_ in self._touches]
-            self._problem.place(start.x)
+            self._problem.set_fields(start.x)
             _set_conductances(self._body, self._touches, start.control)
             for (touch, *_), conductance in zip(self._touches, after):
                 touch.conductance[:] = (touch.conductance + conductance) / 2
-            self._problem.place((start.x[: len(x)] + x) / 2)
+            self._problem.set_fields((start.x[: len(x)] + x) / 2)
         self._body.update()
         self._state[0] = self._body.with_fixed_values(self._state[0])
         self._integrate(until)
-        self._problem.place(x)
+        self._problem.set_fields(x)
         self._take()
 
     def _integrate(self, until: float) -> None:

@@ -120,7 +120,7 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
     touches &= pressure > 0
     depth = law.depth(np.where(touches, pressure * share, 0.0))
     face.shift_distances(np.where(touches, d - depth, np.maximum(d + theta, 0.0)))
-    if not face.remembers:
+    if not face.has_history:
         return
     law, zero = face.law, np.zeros(len(x))
     slip, newly_closed = zero, np.zeros(len(x), dtype=bool)

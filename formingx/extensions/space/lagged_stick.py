@@ -47,7 +47,7 @@ class LaggedStick(ContactLaw):
         separates: True if points in tension separate at the end of a step, see `pulling`.
     """
 
-    remembers = pulls = sticks = True
+    has_history = pulls = sticks = True
     mu = np.inf
 
     def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):

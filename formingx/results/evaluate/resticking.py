@@ -48,7 +48,7 @@ def furthest(path: Any) -> Resticking | None:
         The point, or None if no point stuck again.
     """
     found = []
-    for number, contact in enumerate(c for c in path.problem.contacts if c.remembers):   # they come first in memory
+    for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # they come first in memory
         definition = contact.contact
         if definition.lagged or not (definition.sticks and definition.separates):
             continue
