@@ -1,13 +1,14 @@
-"""Do the tests notice? Lines that matter, each changed in a scratch copy of the tree, against the tests beside it.
+"""Mutation test: change lines of the package one by one, in a copy of the tree, and run the tests beside them.
 
     ./fx python3 benchmarks/mutants.py [number or word ...]
 
-A mutant is killed if one of its tests fails. The table, `mutants.csv` beside this file, is written anew row by row, so
-a run may be stopped and go on with the numbers that are left. It takes hours: it is no part of continuous integration.
+A mutant is killed if one of its tests fails. The table `mutants.csv` beside this file is rewritten after each mutant,
+so an interrupted run continues with the remaining numbers. All mutants take hours; continuous integration has none.
 """
 
 from __future__ import annotations
 
+import argparse
 import csv
 import os
 import shutil
@@ -23,7 +24,14 @@ LIMIT = 900          # seconds for the tests of one mutant; one that makes a run
 
 
 class Mutant(NamedTuple):
-    """A text that stands once in a file of the package, what stands there instead, and the tests that should fail."""
+    """A change of one text of the package.
+
+    Attributes:
+        file: file of the package.
+        old: text that occurs once in the file.
+        new: text in its place.
+        tests: names NAME of tests/test_NAME.py, of which one should fail.
+    """
 
     file: str
     old: str
@@ -162,13 +170,15 @@ MUTANTS = [Mutant(*row) for row in [
 
 
 def missing() -> list[str]:
-    """Mutants whose text does not stand exactly once in its file."""
-    return [f"{m.file}: {m.old!r} stands there {n} times" for m in MUTANTS
-            if (n := (ROOT / "formingx" / m.file).read_text().count(m.old)) != 1]
+    """Return messages on mutants whose text is not exactly once in its file, or whose tests do not exist."""
+    tests = sorted({name for m in MUTANTS for name in m.tests.split()})
+    return [f"{m.file}: {m.old!r} is in it {n} times" for m in MUTANTS
+            if (n := (ROOT / "formingx" / m.file).read_text().count(m.old)) != 1] + [
+        f"there is no tests/test_{name}.py" for name in tests if not (ROOT / "tests" / f"test_{name}.py").is_file()]
 
 
 def outcome(mutant: Mutant, tree: Path) -> str:
-    """"killed", "survived", or why it cannot be told; the tree is as it was afterwards."""
+    """Return "killed by ...", "survived", or why neither is known; the tree is restored."""
     file = tree / "formingx" / mutant.file
     before = file.read_text()
     file.write_text(before.replace(mutant.old, mutant.new))
@@ -189,7 +199,7 @@ def outcome(mutant: Mutant, tree: Path) -> str:
 
 
 def chosen(words: list[str]) -> list[int]:
-    """Numbers of the mutants that words name: a number, or a part of a file's name; all without words."""
+    """Return the numbers of the mutants that words name by number or by a part of the file's name (default: all)."""
     return [k for k, mutant in enumerate(MUTANTS, 1)
             if not words or any(word == str(k) or not word.isdigit() and word in mutant.file for word in words)]
 
@@ -217,4 +227,6 @@ def main(words: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("words", nargs="*", help="numbers of mutants, or parts of names of files (default: all)")
+    main(options.parse_args().words)
