@@ -43,18 +43,18 @@ def in_mould(mesh, material, tool, pressure, kinematics=None):
 
 
 def cup(mesh, kinematics=None):
-    """demos/cup.py; cm, psi."""
+    """Return the path of demos/cup.py; cm, psi."""
     return in_mould(mesh, fx.MooneyRivlin(c10=50.0, c01=15.0),
                     fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0), 160.0, kinematics)
 
 
 def trough(mesh):
-    """The cup in plane strain."""
+    """Return the path of the cup in plane strain."""
     return cup(mesh, fx.PlaneStrain())
 
 
 def pot(mesh):
-    """The README's, with a plug; mm, MPa."""
+    """Return the path of the README's pot, with a plug; mm, MPa."""
     tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
@@ -65,7 +65,7 @@ def pot(mesh):
 
 
 def bottle(mesh):
-    """demos/parison.py."""
+    """Return the path of demos/parison.py."""
     mould = fx.tools.bottle(radius=3.0, height=10.0, neck=1.5, shoulder=2.0, neck_height=1.5, base=-2.9, fillet=0.8,
                             shoulder_fillet=0.8)
     scene = fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("inner")],
@@ -74,14 +74,14 @@ def bottle(mesh):
 
 
 def dish(mesh):
-    """A conical dish with a rounded step half-way up; mm, MPa."""
+    """Return the path of a conical dish with a rounded step half-way up; mm, MPa."""
     tool = fx.tools.Tool([(0.0, 26.0), (22.0, 26.0), (30.0, 14.0), (38.0, 14.0), (48.0, 1.0), (100.0, 1.0)],
                          [0.0, 4.0, 3.0, 3.0, 2.0, 0.0])
     return in_mould(mesh, fx.NeoHookean(c10=0.3), tool, 0.3)
 
 
 def tub(mesh):
-    """A deep narrow tub with a small fillet, of a material that stiffens; mm, MPa."""
+    """Return the path of a deep narrow tub with a small fillet, of a material that stiffens; mm, MPa."""
     tool = fx.tools.cup(radius=30.0, depth=36.0, mouth=1.2, draft=4.0, fillet=2.5, lip=2.0)
     return in_mould(mesh, fx.Gent(mu=0.5, Jm=60.0), tool, 1.0)
 

@@ -1,4 +1,4 @@
-"""Processor time of what comes after a run: its states saved, loaded, made a report of; relaxing, warm, with friction.
+"""Measure the processor time of saving, loading and reporting a run with relaxation, heat and friction.
 
 The states of a short run are repeated until there are as many as in a long one. `--json FILE` writes the numbers.
 """
@@ -14,7 +14,7 @@ import formingx as fx
 
 
 def scene(elements: int) -> fx.Scene:
-    """A film that a plug pushes, chilled by it."""
+    """Return the scene of a film that a plug pushes and chills."""
     heat = fx.Cooling(fx.ThermalProperties(conductivity=1e-2, density=1.0, heat_capacity=1.0), unit="C",
                       tools={"plug": (0.025, 40.0)})
     return fx.Scene(mesh=fx.mesh.disc(radius=2.0, thickness=0.1, elements=(elements, 1)),

@@ -94,7 +94,7 @@ def write(stored: dict[str, Any]) -> None:
 
 
 def main() -> int:
-    """Run, compare, print; return the exit status."""
+    """Run the demos, compare their numbers and print; return the exit status."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("demos", nargs="*", metavar="DEMO", help="names without .py (default: all)")
     options.add_argument("--quick", action="store_true", help="run each with --quick")

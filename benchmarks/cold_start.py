@@ -1,12 +1,12 @@
-"""Processor time of the first run of a script: nothing compiled, and all forms compiled before.
+"""Measure the processor time of the first run of a script, with nothing and with all forms compiled before.
 
     ./fx python3 benchmarks/cold_start.py [--runs 3] [--against CHECKOUT] [--out DIR]
 
-* README's pot with its picture and its report, the whole process with all that it starts, and its parts;
-* set-up of Treloar's sheet (10 x 1), and of one that relaxes, up to the first state of its path; then a second scene
+* README's pot with its picture and its report: the whole process with its child processes, and its parts;
+* set-up of Treloar's sheet (10 x 1), elastic and relaxing, up to the first state of its path; then a second scene
   like it in the same process.
 
-Every process is a fresh one; "cold" has an empty cache of its own. Of several runs the median is given.
+Every process is a fresh one; "cold" has an empty cache of its own. The numbers are medians of several runs.
 """
 
 import argparse
@@ -26,18 +26,18 @@ CASES = {"pot": ("process", "import", "run", "picture", "report", "compiler"),
 
 
 def own():
-    """Processor time of this process, s."""
+    """Return the processor time of this process, s."""
     return time.process_time()
 
 
 def compiler():
-    """Processor time of the processes that have ended, s: of the compiler, but for the server of the picture."""
+    """Return the processor time of the child processes that have ended (the compiler), s."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def pot():
-    """{part: seconds} of README's script, in this process and its working folder."""
+    """Return {part: seconds} of README's script, run in this process and its working folder."""
     (script,) = re.findall(r"```python\n(.*?)```", (HERE / "README.md").read_text(), flags=re.S)
     began = own()
     import formingx as fx
@@ -59,7 +59,7 @@ def pot():
 
 
 def sheet(relaxes):
-    """{part: seconds} of the set-up of a sheet, in this process."""
+    """Return {part: seconds} of the set-up of a sheet, in this process."""
     import formingx as fx
     from formingx.solve.path_following import Run
     begun, follow = [], Run.follow
@@ -82,7 +82,7 @@ def sheet(relaxes):
 
 
 def measured(case, checkout, runs):
-    """{"cold" and "warm": {part: median of so many runs, s}}."""
+    """Return {"cold" and "warm": {part: median of the runs, s}}."""
     def run(cache):
         with tempfile.TemporaryDirectory() as folder:
             done = subprocess.run([sys.executable, str(Path(__file__).resolve()), "--child", case], cwd=folder,

@@ -1,4 +1,4 @@
-"""Compression far from the ordinary: slender and flat blocks, friction, sandwiches, meshes, with roll-over.
+"""Press blocks far from the ordinary: slender and flat, with friction, sandwiches, coarse and fine, with roll-over.
 
 Mooney, I1 constant 1.0 MPa, I2 constant 0.1 MPa; half height 1.25 cm unless said; pressed to H/h = 1.5.
 """
@@ -21,7 +21,7 @@ CASES = {
 
 
 def run(friction="stick", radius=RADIUS, ratio=None, elements=None):
-    """(path, how it ended)."""
+    """Return the path and how it ended."""
     elements = elements or ((8, 8) if radius < 2 * HALF_HEIGHT else (32, 4))
     soft, layers = fx.MooneyRivlin(c10=1.0, c01=0.1), HALF_HEIGHT
     materials = soft

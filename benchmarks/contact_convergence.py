@@ -1,7 +1,7 @@
-"""How the thickness of the cup of demos/cup.py converges with mesh, penalty and ramp width, and what each costs.
+"""Measure how the thickness of the cup of demos/cup.py converges with mesh, penalty and ramp, and the cost.
 
-The error of a run is the largest |t - t_ref| / t_ref over the nodes up to one thickness from the clamped rim (whose
-corner is singular), t_ref being that of the last row of its group; with it, the least thickness ratio.
+The error of a run is the largest |t - t_ref| / t_ref over the nodes up to one thickness from the clamped rim, whose
+corner is singular. t_ref is the thickness in the last row of its group. The smallest thickness ratio is given, too.
 """
 
 import argparse
@@ -25,7 +25,7 @@ GROUPS = {
 
 
 def measure(elements, friction, case):
-    """(thickness ratio by R at each pressure that was met, the path, seconds, how it ended)."""
+    """Return the thickness ratio by R at each pressure that was met, the path, seconds, and how it ended."""
     began = time.perf_counter()
     path, end = run(**{"elements": elements, **case}, friction=friction, pressures=PRESSURES)
     met = {p: path.met(fx.pressure(p)) for p in PRESSURES}
@@ -34,7 +34,7 @@ def measure(elements, friction, case):
 
 
 def error(profile, reference):
-    """Largest relative difference in thickness, away from the rim."""
+    """Return the largest relative difference in thickness, away from the rim."""
     R, h = profile.reference_radius, profile.original_thickness[0]
     exact = np.interp(R, reference.reference_radius, reference.thickness)
     return np.abs(profile.thickness / exact - 1)[R[-1] - h >= R].max()
@@ -43,8 +43,9 @@ def error(profile, reference):
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--elements", type=int, default=60, help="elements along the radius, for penalty and ramp")
-    options.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS), help="what to vary")
-    options.add_argument("--laws", nargs="+", choices=("stick", "none"), default=["stick", "none"], help="friction")
+    options.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS), help="groups of rows")
+    options.add_argument("--laws", nargs="+", choices=("stick", "none"), default=["stick", "none"],
+                         help="laws of friction")
     options.add_argument("--out", type=Path, default=Path("results/contact_convergence"), help="folder for table.csv")
     args = options.parse_args()
     head = [f"error at {p:g} psi" for p in PRESSURES] + [f"least t/t0 at {p:g} psi" for p in PRESSURES]

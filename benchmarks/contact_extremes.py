@@ -1,4 +1,4 @@
-"""Contact far from its defaults: penalties, ramps, fillets, friction, depths and thicknesses.
+"""Run contact far from its defaults: penalties, ramps, fillets, friction, depths and thicknesses.
 
 The cup of demos/cup.py on 30 x 2 x 2 triangles, to 60 psi times h0/0.3 cm.
 """
@@ -19,7 +19,7 @@ CASES = {
 
 
 def run(elements, *, layers=2, pressures=None, thickness=0.3, depth=5.0, fillet=1.0, friction="stick", **options):
-    """(path, what happened)."""
+    """Return the path and how it ended."""
     mesh = fx.mesh.disc(radius=10.0, thickness=thickness, elements=(elements, layers))
     targets = [fx.pressure(p) for p in pressures or (60.0 * thickness / 0.3,)]
     cup = fx.tools.cup(radius=10.0, depth=depth, mouth=thickness, fillet=fillet)

@@ -1,11 +1,11 @@
-"""Damaged files of every kind that is read: each ends in a right reading or an InputError in words, in time.
+"""Read damaged files of every format: each must end in a right reading or an InputError, in time.
 
-    python3 benchmarks/damaged_files.py [--files 5000] [--seed 0] [--kinds KIND ...]
+    ./fx python3 benchmarks/damaged_files.py [--files 5000] [--seed 0] [--kinds KIND ...]
 
 A kind is a format (msh22, msh41, msh22b, msh41b, text, geo, dxf, step, brep, mshtool, csv, tests, heat, checkpoint).
 File k of a seed is always the same. A file that lost its end, or in which a line is lost or there twice, must be
-refused or read as it was, where the format counts or closes what it holds; what a changed digit says cannot be known to
-be wrong, and is only counted ("another").
+refused or read as it was, where the format counts or closes its contents. A changed digit cannot be known to be wrong;
+such readings are only counted ("another").
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ STRUCTURE = ("cut", "line lost", "line twice")
 
 
 def damage(data: bytes, rng: random.Random) -> tuple[str, bytes]:
-    """(what was done, the data with it)."""
+    """Return the kind of damage, and the damaged data."""
     how = rng.choice([*STRUCTURE, *STRUCTURE, "swapped", "byte", "bytes", "number", "digit", "zeros", "moved"])
     n, lines = len(data), data.split(b"\n")
     k, m = rng.randrange(n), rng.randrange(len(lines))
@@ -71,7 +71,7 @@ def damage(data: bytes, rng: random.Random) -> tuple[str, bytes]:
 
 
 def sources(folder: Path) -> dict[str, tuple[Path, Callable[[Path], Any]]]:
-    """{kind: (a good file, what reads one and gives numbers that say what was read)}."""
+    """Return {kind: (a good file, a function that reads one and returns numbers of its contents)}."""
     sheet = fx.mesh.disc(radius=1.0, thickness={"a": 0.1, "b": 0.05}, elements=(6, 1))
     fx.mesh.write(sheet, folder / "msh22.msh")
     fx.mesh.write(sheet, folder / "text.txt")
@@ -116,7 +116,7 @@ Physical Curve("mould") = {1, 2, 3};\n""")
 
 
 def _numbers(points: np.ndarray) -> np.ndarray:
-    """A few numbers that change with any point, whatever their order."""
+    """Return a few numbers that change with any point, whatever the order of the points."""
     return np.array([len(points), *np.sum(points, axis=0, keepdims=True).ravel(), np.sum(np.sin(points * 7))])
 
 
@@ -153,7 +153,7 @@ def _with_gmsh(folder: Path) -> None:
 
 
 def run(files: int, seed: int = 0, kinds: tuple[str, ...] = (), found: Any = None) -> dict[str, Counter]:
-    """{kind: how many ended as what}; what must not be is printed: another ending, no end, another reading."""
+    """Return {kind: {ending: count}}; print each ending that must not be: other errors, no end, another reading."""
     found = {} if found is None else found
     signal.signal(signal.SIGALRM, _too_long)
     with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
@@ -213,7 +213,7 @@ def _too_long(*_: Any) -> None:
 def main() -> int:
     """Print the figures; 1 if anything ended badly."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--files", type=int, default=5000, help="of each kind")
+    parser.add_argument("--files", type=int, default=5000, help="files of each kind")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--kinds", nargs="*", default=[])
     options = parser.parse_args()

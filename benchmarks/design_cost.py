@@ -1,7 +1,8 @@
-"""Processor time of derivatives of a run over that of the run itself, by the number of parameters.
+"""Measure the processor time of derivatives of a run, over that of the run, by the number of parameters.
 
-The stuck cup of `demos/gradients.py` with a constant of so many knots over its radius, and the bottle of
-`demos/even_bottle.py` with a wall of so many over its meridian; the least of three. `--json FILE` writes the numbers.
+The stuck cup of `demos/gradients.py` with knots of its constant over the radius, and the bottle of
+`demos/even_bottle.py` with knots of its wall over the meridian; the smallest time of three. `--json FILE` writes the
+numbers.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from even_bottle import WALL, bottle  # noqa: E402
 
 
 def cup(constant, elements=(30, 1)):
-    """A sheet that sticks to a cup; its constant is a profile."""
+    """Return the scene of a sheet that sticks to a cup, with a profile of its constant, and its target."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.03, elements=elements)
     mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=0.03, draft=10.0, fillet=0.2)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * constant(R)),

@@ -1,14 +1,16 @@
-"""What engineers' runs cost, and where the time goes: moulds, plugs, bottles, with friction, time and heat.
+"""Measure the cost of engineers' runs by part: moulds, plugs, bottles, with friction, time and heat.
 
     ./fx python3 benchmarks/engineers.py [--against CHECKOUT] [--turns 3] [--finest] [--only pot cup] [--json FILE]
 
-Each run is a process of its own. Its row: accepted states, failed steps, Newton iterations, jumps; seconds of processor
-time while paths are followed, in all and by part (contact: laws, gap closures, local problems; tangents; LU factors;
-solves; rest), forms compiled before; what made steps shorter or fail. The limit is the time of tangents, LU factors and
-solves, one of each per iteration; "over" is the run over this limit. `--against` puts another version of the package
-beside it, also one that is older than this script. Both run in turns, `--turns` times; the fastest run counts.
-`--finest` adds the largest difference of the walls, farther than a thickness from the rim, to one node a step in steps
-of at most `LARGEST`.
+Each run is a process of its own. Its row has accepted states, failed steps, Newton iterations and jumps. Then it has
+seconds of processor time while paths are followed, in all and by part, with forms compiled before: contact (laws, gap
+closures, local problems), tangents, LU factors, solves, rest. Last are the reasons for which steps were shorter or
+failed. The limit is the time of tangents, LU factors and solves, one of each per iteration; "over" is the run over this
+limit.
+
+`--against` runs another version of the package, too, even one that is older than this script. Both run in turns,
+`--turns` times; the fastest run counts. `--finest` adds the largest difference of the walls, farther than a thickness
+from the rim, to a run with one node a step in steps of at most `LARGEST`.
 """
 
 import argparse
@@ -45,7 +47,7 @@ CLASSES = {                                                  # (module, class) i
 
 
 def called(function, *given, **more):
-    """Call a function of the package, with the names of arguments of the version at hand."""
+    """Return the value of a function of the package, called with the argument names of the version at hand."""
     known = inspect.signature(function).parameters
     return function(*given, **{name if name in known else OLDER.get(name, name): v for name, v in more.items()})
 
@@ -62,7 +64,7 @@ def classes(what):
 
 
 def contact(finest, *given, **more):
-    """A contact; for finest steps one that takes a node a step."""
+    """Return a contact; with `finest` it takes one node a step."""
     return called(fx.Contact, *given, **more, **({"nodes_per_step": 1} if finest else {}))
 
 
@@ -83,7 +85,7 @@ def plug_then_air(scene, travel, pressure, finest):
 
 
 def pot(finest):
-    """The README's."""
+    """Return the path of the README's pot."""
     tools = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
     return plug_then_air(disc(40.0, 1.2, (30, 1), fx.NeoHookean(c10=0.4), [
         contact(finest, "top", tools.mould, "stick", separates=False, name="mould"),
@@ -91,7 +93,7 @@ def pot(finest):
 
 
 def study(finest):
-    """A run of demos/pot_study.py."""
+    """Return the path of a run of demos/pot_study.py."""
     mould = fx.tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)
     plug = fx.tools.male(radius=22.0, height=120.0, base=-120.0, draft=3.0, fillet=6.0)
     return plug_then_air(disc(40.0, 1.2, (30, 1), fx.MooneyRivlin(c10=0.35, c01=0.05), [
@@ -100,7 +102,7 @@ def study(finest):
 
 
 def relaxing_pot(finest):
-    """A run of demos/relaxing_pot.py."""
+    """Return the path of a run of demos/relaxing_pot.py."""
     mould = fx.tools.cup(radius=10.0, depth=10.0, mouth=0.3, fillet=1.0)
     plug = fx.tools.male(radius=5.0, height=40.0, base=-40.0, fillet=1.5)
     scene = disc(10.0, 0.3, (30, 1), fx.Viscoelastic(fx.NeoHookean(c10=6.5), branches=[(117.0, 1.0)]), [
@@ -125,7 +127,7 @@ def blown(friction, finest):
 
 
 def bottle(finest):
-    """demos/parison.py."""
+    """Return the path of demos/parison.py."""
     return blown("stick", finest)
 
 
@@ -140,7 +142,7 @@ def in_cup(friction, finest):
 
 
 def cup(finest):
-    """demos/cup.py."""
+    """Return the path of demos/cup.py."""
     return in_cup("stick", finest)
 
 
@@ -149,7 +151,7 @@ def slippery_cup(finest):
 
 
 def williams(finest):
-    """demos/williams_plug.py to 8 cm, with friction."""
+    """Return the path of demos/williams_plug.py to 8 cm, with friction."""
     tool = fx.tools.male(radius=1.905, height=60.0, base=-60.0, fillet=0.35).mirrored().moved(z=0.6985)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(120, 2), concentrate={1.23825: 0.2}),
                      materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -158,9 +160,10 @@ def williams(finest):
 
 
 def blister(finest, target=None):
-    """A cavity of 8 mm in a warm film that relaxes, plug and mould colder; lengths mm, stresses MPa; an invented film.
+    """Return the path of a blister: a cavity of 8 mm in a warm film that relaxes, with a colder plug and mould.
 
-    target: of `StepControl`, None: its default."""
+    Lengths in mm, stresses in MPa; an invented film. target: argument of `StepControl`; None: its default.
+    """
     tools = fx.tools.pot(mouth=4.0, base=3.5, depth=4.0, sheet=0.25, fillet=0.8, lip=0.4, plug=2.6, nose=0.8)
     stiffness = fx.table({20: 500.0, 40: 300.0, 60: 100.0, 80: 20.0, 100: 3.0, 120: 1.0, 140: 0.6})
 
@@ -186,7 +189,7 @@ RUNS |= {f"blister_{n}": functools.partial(blister, target=n) for n in (4, 8, 12
 
 
 class Clock:
-    """Processor time of functions of classes, each without what it calls of the others."""
+    """Processor time of methods, each without the time of the watched methods that it calls."""
 
     def __init__(self):
         self.seconds, self._on, self._last = Counter(), [], 0.0
@@ -199,7 +202,7 @@ class Clock:
         self._last = now
 
     def watch(self, part, owner, *names, within=True):
-        """Count calls as of a part; within: only while another part runs."""
+        """Count the time of methods as that of a part; within: only while another part runs."""
         for name in names:
             if hasattr(owner, name):
                 setattr(owner, name, self._watched(getattr(owner, name), part, within, name))
@@ -224,7 +227,7 @@ class Clock:
 
 
 def measured(name, finest):
-    """The row of one run, in this process."""
+    """Return the row of one run, in this process."""
     clock = Clock()
     for owner in classes("path"):
         clock.watch("rest", owner, "follow", within=False)
@@ -254,7 +257,7 @@ def measured(name, finest):
 
 
 def in_child(name, finest, checkout, first=True):
-    """The row of one run with the package of a checkout; one that could not be made says why."""
+    """Return the row of one run with the package of a checkout; a run that failed has the reason instead."""
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "row.json"
         command = [sys.executable, __file__, "--row", name, "--json", str(file), *["--finest"] * finest]
@@ -273,7 +276,7 @@ def in_child(name, finest, checkout, first=True):
 
 
 def apart(row, other):
-    """Largest relative difference of two walls."""
+    """Return the largest relative difference of two walls."""
     if row.get("ended") or other.get("ended"):
         return None
     return float(np.abs(np.array(row["wall"]) / np.interp(row["length"], other["length"], other["wall"]) - 1).max())

@@ -1,8 +1,8 @@
-"""The extremes: one table of what happens far from the ordinary, with outcome, deviation and cost.
+"""Inflate sheets far from the ordinary: one table of outcome, deviation and cost.
 
-Every row inflates a sheet (radius 1, thickness 1/15.24 unless said otherwise) to a pole stretch and must end right,
-or with an error that says why not. "deviation" is that of the pressure (or the limit pressure) from what the row names.
-About 5 minutes (--quick: the subset that the tests run).
+Every row inflates a sheet (radius 1, thickness 1/15.24 unless said otherwise) to a pole stretch. It must end right, or
+with an error that says why not. "deviation" is that of the pressure (or of the limit pressure) from the reference that
+the row names. About 5 minutes (--quick: the subset that the tests run).
 """
 
 import argparse
@@ -27,7 +27,7 @@ RATIO = 15.24
 
 def inflate(until=3.0, ratio=RATIO, elements=(40, 2), material=None, model=None, support=None, layers=None, unit=1.0,
             stress=1.0, max_steps=200):
-    """The path of a sheet whose radius is 1 over `unit` and whose c10 is 1 over `stress`."""
+    """Return the path of a sheet whose radius is 1 over `unit` and whose c10 is 1 over `stress`."""
     thickness = 1 / (ratio * unit)
     material = material or fx.NeoHookean(c10=1.0 / stress)
     materials = layers or {"sheet": material}
@@ -39,17 +39,17 @@ def inflate(until=3.0, ratio=RATIO, elements=(40, 2), material=None, model=None,
 
 
 def last(path):
-    """Pressure at the end."""
+    """Return the pressure in the last state."""
     return path.last.measures["pressure"]
 
 
 def limit(path):
-    """Limit pressure."""
+    """Return the limit pressure."""
     return path.limit_points[0].measures["pressure"]
 
 
 def membrane(until, **options):
-    """Pressure of the membrane model for the same sheet."""
+    """Return the pressure of the membrane model for the same sheet."""
     return last(inflate(until, model=fx.Membrane(), elements=(80, 1), **options))
 
 
@@ -58,7 +58,7 @@ def ogden(alpha):
 
 
 def rows(quick):
-    """(group, name, options of inflate, value read, reference: a function, what the reference is)."""
+    """Yield (group, name, options of inflate, value read, function of the reference, its name) of each row."""
     standard = {}
 
     def ordinary():
@@ -109,10 +109,13 @@ def rows(quick):
 
 
 def why():
-    """Find the condition of the undeformed body's tangent, and Newton's radius there, for each form of the penalty.
+    """Return the condition of the tangent and the radius of Newton's method, for each form of the penalty.
 
-    The radius is the longest first step, as deflection over the radius of the sheet, from which Newton converges.
-    Returns {name: {eps: {"condition", "negative_eigenvalues", "first_step"}}}.
+    Both are in the reference configuration. The radius is the longest first step, as deflection over the radius of the
+    sheet, from which Newton converges.
+
+    Returns:
+        {name: {eps: {"condition", "negative_eigenvalues", "first_step"}}}.
     """
     table: dict = {}
     say(f"{'10x1 elements, at rest':44}{'condition':>12}{'negative eigenvalues':>22}{'first step':>12}")
@@ -147,7 +150,7 @@ def why():
 
 
 def run(group, name, options, read, reference, what):
-    """One row: outcome, deviation, cost."""
+    """Return one row: outcome, deviation, cost."""
     began = time.perf_counter()
     try:
         path = inflate(**options)

@@ -1,11 +1,11 @@
-"""Calls of everything public with random arguments and damaged files: each must end, and end well.
+"""Call all public functions with random arguments and damaged files: each call must end, and end well.
 
-    python3 benchmarks/fuzz.py [--calls 10000] [--seed 0] [--kinds KIND ...]
+    ./fx python3 benchmarks/fuzz.py [--calls 10000] [--seed 0] [--kinds KIND ...]
 
-A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s (whole runs, of the kind
-`processes`, in states that hold, see `fuzz_runs.py`, within 90 s). Call k of a seed is always
-the same one, so that one that ended badly can be repeated: `--only K --seed SEED`. The calls run in a process of their
-own, which is started again where one ends it.
+A call ends well in a result, an InputError, a ConvergenceError or an OSError, within 10 s. Whole runs, of the kind
+`processes`, end well in states that hold (see `fuzz_runs.py`), within 90 s. Call k of a seed is always the same one, so
+that a call that ended badly can be repeated: `--only K --seed SEED`. The calls run in a process of their own, which is
+started again if a call ends it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LONGEST = 6 * OF_RUNS                          # and of any, until the first cal
 
 
 class Ending(NamedTuple):
-    """How a call ended: "result", "InputError", ..., or what went wrong; `bad` if it must not end so."""
+    """Ending of a call: "result", "InputError", ..., or a fault; `bad` is True for a fault."""
 
     number: int
     call: str
@@ -48,7 +48,7 @@ class Ending(NamedTuple):
 
 
 def run(calls: int, seed: int = 0, kinds: tuple[str, ...] = ()) -> list[Ending]:
-    """The endings of so many calls, each watched from outside."""
+    """Return the endings of the calls, which run in child processes."""
     return list(_endings(calls, seed, kinds))
 
 
@@ -61,7 +61,7 @@ def _endings(calls: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
 
 
 def _watched(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Ending]:
-    """The calls of one process, up to the one that ends it or takes too long."""
+    """Yield the endings of the calls of one process, up to the call that ends it or takes too long."""
     options = ["--child", first, last, "--seed", seed, *(["--kinds", *kinds] if kinds else [])]
     child = subprocess.Popen([sys.executable, __file__, *map(str, options)],
                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=Path(__file__).parents[1])
@@ -97,13 +97,13 @@ def _limit(call: str) -> float:
 
 
 def _processor_time(process: int) -> float:
-    """Seconds that a process has used."""
+    """Return the processor time of a process (s)."""
     words = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def child(first: int, last: int, seed: int, kinds: tuple[str, ...]) -> None:
-    """Make the calls, and say before and after each what it is and how it ended."""
+    """Make the calls; print each call before it, and its ending after it."""
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)                              # what the libraries print goes nowhere
     warnings.simplefilter("ignore")
@@ -142,12 +142,12 @@ _EXTREMES: list[Any] = [
 
 
 def anything(rng: random.Random) -> Any:
-    """A value that is hardly ever right."""
+    """Return a value that is hardly ever right."""
     return rng.choice(_EXTREMES)
 
 
 def near(good: Any, rng: random.Random) -> Any:
-    """A value of the kind of a good one: often allowed, now and then far out."""
+    """Return a value of the kind of a good one: often allowed, sometimes far out."""
     if isinstance(good, bool) or good is None or isinstance(good, str):
         return good
     if isinstance(good, int):
@@ -163,7 +163,7 @@ def near(good: Any, rng: random.Random) -> Any:
 
 
 def varied(good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
-    """Arguments, some of them near to good ones, some anything, some left out."""
+    """Return arguments: some near to good ones, some arbitrary, some left out."""
     given = {}
     for name, value in good.items():
         chance = rng.random()
@@ -173,7 +173,7 @@ def varied(good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
 
 
 def damaged(data: bytes, rng: random.Random) -> bytes:
-    """A file with some bytes, words or lines lost, doubled, swapped or replaced."""
+    """Return the data of a file with some bytes, words or lines lost, doubled, swapped or replaced."""
     for _ in range(rng.randint(1, 4)):
         at = rng.randrange(len(data) + 1)
         to = min(len(data), at + rng.choice([1, 4, 30, 1000]))
@@ -207,12 +207,12 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
 # What is called.
 
 def _itself() -> dict[str, Callable[[random.Random], Any]]:
-    """Calls that end badly, to test what watches them."""
+    """Return calls that end badly, to test the watch."""
     return {"itself dies": lambda rng: os.abort(), "itself raises": lambda rng: 1 / 0}
 
 
 def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
-    """{kind and name: a call}; the first word is the kind."""
+    """Return {kind and name: a call}; the first word is the kind."""
     import formingx as fx
     sys.path.insert(0, str(Path(__file__).parent))
     import fuzz_runs
@@ -235,7 +235,7 @@ def cases(folder: Path) -> dict[str, Callable[[random.Random], Any]]:
 
 
 def _used(call: Any, given: dict[str, Any]) -> None:
-    """Make a thing, and use it up to the solve."""
+    """Call a function, and use its result up to the solve."""
     import reliability
     with reliability.unsolved(), contextlib.suppress(reliability.ReachedTheSolve):
         made = call.make(**given)
@@ -248,7 +248,7 @@ def _kind(name: str) -> str:
 
 
 def _required(call: Any, good: dict[str, Any], rng: random.Random) -> dict[str, Any]:
-    """Varied arguments; those without a default are there: to leave one out is a TypeError, as of any function."""
+    """Return varied arguments, but always those without a default: a missing one is a TypeError for any function."""
     import inspect
 
     import formingx as fx
@@ -281,7 +281,7 @@ Physical Curve("mould") = {1, 2, 3};\n""")
 
 
 def _cad(folder: Path) -> None:
-    """Files of gmsh's own: a square of six-node triangles, in its formats."""
+    """Write files of gmsh: a square of six-node triangles, in its formats."""
     import gmsh
     gmsh.initialize(interruptible=False)
     try:
@@ -318,7 +318,7 @@ def _of_fits() -> dict[str, Callable]:
 
 
 def _of_answers() -> dict[str, Callable]:
-    """Curves compared, and scenes looked over: every column, unit, stage and size that a user may mistake."""
+    """Return calls that compare curves and check scenes, with mistakes in columns, units, stages and sizes."""
     import reliability
 
     import formingx as fx
@@ -356,7 +356,7 @@ _LAWS = {"strain_energy", "step_energy", "stored_energy", "equilibrium_energy", 
 
 
 def _of_methods(made: Any) -> dict[str, Callable]:
-    """Methods of what a script has in its hands, and of what runs give back."""
+    """Return calls of methods of scenes, meshes, tools and results."""
     import inspect
 
     import formingx as fx
@@ -435,7 +435,7 @@ def _of_meshes() -> dict[str, Callable]:
 
 
 def _of_runs(folder: Path, made: Any) -> dict[str, Callable]:
-    """Checkpoints with damaged files, and processes that follow random tables."""
+    """Return calls on checkpoints with damaged files, and processes with random tables."""
     import reliability
 
     import formingx as fx

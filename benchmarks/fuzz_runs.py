@@ -1,8 +1,9 @@
-"""Whole runs of random scenes, for `fuzz.py`: each ends in states that hold, or in an error in words.
+"""Run random scenes for `fuzz.py`: each run ends in states that hold, or in an error message.
 
-A state holds if its numbers are finite, its wall is one, its face is on the right side of each tool, and the run's
-energy ledger closes: `Path.work()["unbalanced"]` against the largest of its entries. Where that does not, which may be
-the integrals over long steps, it must with steps of a fiftieth, and come to the same state.
+A state holds if its numbers are finite, its wall is positive, its face is on the right side of each tool, and the
+energy balance of the run closes: `Path.work()["unbalanced"]` against the largest of its entries. Where the balance does
+not close, which may be due to the integrals over long steps, it must close with steps of a fiftieth, with the same last
+state.
 """
 
 from __future__ import annotations
@@ -23,14 +24,17 @@ class Wrong(Exception):
 
 
 def cases() -> dict[str, Callable[[random.Random], Any]]:
-    """{kind and name: a run}."""
+    """Return {kind and name: a run}."""
     return {"processes blown": _blown, "processes plugged": _plugged, "processes in time": _in_time,
             "processes moulded": _moulded, "processes cooled": _cooled}
 
 
 def _scene(rng: random.Random, contact: Callable | None = None, relaxes: bool = False, pressed: bool = False,
            **more: Any) -> tuple:
-    """(scene, radius, thickness) of a sheet, of one layer or two, round or in plane strain; pressed: by air, too."""
+    """Return the scene, radius and thickness of a sheet, with one layer or two, axisymmetric or in plane strain.
+
+    pressed: True if air acts on it, too.
+    """
     import formingx as fx
     radius = rng.uniform(10, 60)
     thickness = radius * 10 ** rng.uniform(-2.2, -0.8)
@@ -47,7 +51,7 @@ def _scene(rng: random.Random, contact: Callable | None = None, relaxes: bool = 
 
 
 def _material(rng: random.Random, c10: float, relaxes: bool, warm: bool) -> Any:
-    """Of a stiffness of about c10, at the highest temperature if it depends on that."""
+    """Return a material with a stiffness of about c10, at the highest temperature if it depends on temperature."""
     import formingx as fx
     if warm:
         return fx.NeoHookean(c10=fx.table({20: rng.uniform(1, 5) * c10, 100: 1.2 * c10, 200: c10}))
@@ -61,7 +65,7 @@ def _material(rng: random.Random, c10: float, relaxes: bool, warm: bool) -> Any:
 
 
 def _ball(rng: random.Random) -> Callable:
-    """A plug above a sheet: a ball, or a flat one with a rounded edge."""
+    """Return a function that makes the contact with a plug: a ball, or a flat plug with a rounded edge."""
     import formingx as fx
 
     def contact(radius, thickness):
@@ -91,7 +95,7 @@ def _plugged(rng: random.Random) -> None:
 
 
 def _in_time(rng: random.Random) -> None:
-    """Tables, flows and holds of a sheet that relaxes."""
+    """Run a sheet that relaxes, with a table of a plug or a flow, and judge it."""
     import formingx as fx
     if rng.random() < 0.5:
         scene, radius, _ = _scene(rng, _ball(rng), relaxes=True)
@@ -105,7 +109,7 @@ def _in_time(rng: random.Random) -> None:
 
 
 def _cup(rng: random.Random) -> Callable:
-    """A cup over a sheet, or a male mould that it is draped over, rounded as far as elements feel it."""
+    """Return a function that makes the contact with a cup, whose edges are as round as the elements resolve."""
     import formingx as fx
 
     def contact(radius, thickness):
@@ -125,7 +129,7 @@ def _moulded(rng: random.Random) -> None:
 
 
 def _cooled(rng: random.Random) -> None:
-    """A hot sheet that a plug pushes, or air blows, in cold air."""
+    """Run a hot sheet in cold air, pushed by a plug or blown, and judge it."""
     import formingx as fx
     heat = fx.Cooling(fx.ThermalProperties(conductivity=1.0, density=1.0, heat_capacity=1.0),
                       [fx.Convection("top", h=10 ** rng.uniform(-2, 1), air=20.0)], unit="C", tolerance=0.1)
@@ -138,7 +142,7 @@ def _cooled(rng: random.Random) -> None:
 
 
 def _table(rng: random.Random, most: float) -> list[tuple[float, float]]:
-    """Up, now and then standing still or partly back."""
+    """Return a table that goes up, sometimes stands still or goes partly back."""
     times = np.cumsum([10 ** rng.uniform(-2, 1) for _ in range(rng.randint(1, 4))])
     values = [most, rng.choice([most, 0.5 * most]), rng.uniform(0.3, 1) * most, most]
     return [(0.0, 0.0), *zip(times.tolist(), values)]
@@ -160,7 +164,7 @@ def _judge(run: Callable[..., Any]) -> None:
 
 
 def _unbalanced(path: Any) -> float:
-    """Of the ledger, over its largest entry."""
+    """Return the unbalanced energy over the largest entry."""
     ledger = path.work()
     largest = max(float(np.abs(row).max()) for name, row in ledger.items() if name != "unbalanced")
     return float(np.abs(ledger["unbalanced"]).max()) / max(largest, 1e-300)

@@ -1,9 +1,9 @@
-"""Newton iterations for each state, over all paths of all demos: what step control and contact cost.
+"""Count Newton iterations for each state, over all paths of all demos: the cost of step control and contact.
 
     ./fx python3 benchmarks/iterations.py [--demos treloar cup] [--full]
 
 Runs each demo with --quick (unless its summary is in the folder already) and reads states and iterations of each path
-from its summary.json; what was cut back counts.
+from its summary.json. Iterations of failed steps count, too.
 """
 
 import argparse
@@ -17,7 +17,7 @@ SECONDS = 600                                               # that a demo may ta
 
 
 def paths(summary, name=""):
-    """(name, states, iterations) of every path in a summary."""
+    """Yield (name, states, iterations) of every path in a summary."""
     if isinstance(summary, dict):
         if "steps" in summary and "newton_iterations" in summary:
             yield name, summary["steps"], summary["newton_iterations"]
@@ -31,8 +31,8 @@ def paths(summary, name=""):
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--demos", nargs="+", choices=NAMES, default=NAMES)
-    options.add_argument("--full", action="store_true", help="not --quick")
-    options.add_argument("--out", type=Path, default=Path("results/iterations"), help="where the demos' results are")
+    options.add_argument("--full", action="store_true", help="run the demos without --quick")
+    options.add_argument("--out", type=Path, default=Path("results/iterations"), help="folder of the demos' results")
     args = options.parse_args()
     found = []
     for demo in args.demos:

@@ -1,16 +1,18 @@
-"""How far branches with Gaussian springs are from a K-BKZ melt, and what K-BKZ would need in a scene.
+"""Measure how far branches with Gaussian springs are from a K-BKZ melt, and the past states that K-BKZ needs.
 
 Prints tables and writes results/kbkz_branches/summary.json, from which docs/make_pages.py takes the tables of
-docs/kbkz.md. The melts are illustrative: a spectrum of five decades and two dampings, no measured material. Seconds.
+docs/kbkz.md. The melts are illustrative: a spectrum of five decades and two dampings, no measured material. Takes
+seconds.
 """
 
+import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from common import parser, say, summarise  # noqa: E402
+from common import say, summarise  # noqa: E402
 
 import formingx as fx  # noqa: E402
 
@@ -21,29 +23,30 @@ MODES, RATES, STRETCHES = ("uniaxial", "equibiaxial"), (0.1, 1.0, 10.0), (1.5, 2
 
 
 def measured(modes=MODES):
-    """What tests of the melt would give."""
+    """Return tests of the melt, as a laboratory would measure them."""
     l = np.linspace(1.1, 5.0, 14)
     return [fx.TimedTest.constant_rate(mode, rate, l, MELT.constant_rate(mode, rate, l))
             for mode in modes for rate in RATES]
 
 
 def misfits(law, melt):
-    """{mode: {rate: {stretch: stress of a law over that of a melt, minus 1}}}."""
+    """Return {mode: {rate: {stretch: stress of a law over that of a melt, minus 1}}}."""
     return {mode: {f"{rate:g}": {f"{l:g}": float(a / b - 1) for l, a, b in zip(
         STRETCHES, law.constant_rate(mode, rate, STRETCHES), melt.constant_rate(mode, rate, STRETCHES))}
         for rate in RATES} for mode in MODES}
 
 
 def strained(damping, l1, l2):
-    """tau_1 - tau_3 and tau_2 - tau_3 over the modulus, of a step of strain."""
+    """Return tau_1 - tau_3 and tau_2 - tau_3 over the modulus, after a step of strain."""
     squares = np.array([l1**2, l2**2, (l1 * l2) ** -2])
     return damping(squares.sum(), (1 / squares).sum()) * (squares[:2] - squares[2])
 
 
 def no_potential(damping):
-    """(work by the stretches 1, 1 -> 3, 1 -> 3, 3 over that straight on, minus 1; asymmetry of the tangent at 3, 1.5).
+    """Return two measures of the lack of a potential, 0 if there is one.
 
-    Steps of strain, so fast that nothing relaxes. Both are 0 if the stress has a potential.
+    They are the work by the stretches 1, 1 -> 3, 1 -> 3, 3 over that straight on, minus 1, and the asymmetry of the
+    tangent at 3, 1.5. The steps of strain are so fast that nothing relaxes.
     """
     x, w = np.polynomial.legendre.leggauss(40)
     end = np.log(3.0)
@@ -59,9 +62,9 @@ def no_potential(damping):
 
 
 def kept(mode, rate, count, steps=160):
-    """Largest error of the stress if only so many past states are kept, at ages in geometric progression.
+    """Return the largest error of the stress if only some past states are kept, at ages in geometric progression.
 
-    The path to stretch 5 in equal steps of strain; what is integrated goes linearly between the states that are kept.
+    The path leads to stretch 5 in equal steps of strain. The integrand is linear between the kept states.
     """
     times = np.linspace(0, np.log(5.0) / rate, steps + 1)
     worst = 0.0
@@ -83,17 +86,19 @@ def kept(mode, rate, count, steps=160):
 
 
 def row(*cells):
-    """A line of a Markdown table."""
+    """Return a line of a Markdown table."""
     return f"| {' | '.join(cells)} |"
 
 
 def head(*cells):
-    """Its first two lines."""
+    """Return the first two lines of a Markdown table."""
     return row(*cells) + "\n" + "|---" * len(cells) + "|"
 
 
 def main():
-    out = parser("kbkz_branches", __doc__.splitlines()[0]).parse_args().out
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--out", type=Path, default=Path("results/kbkz_branches"), help="folder for results")
+    out = options.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     fit = fx.fit(fx.Viscoelastic(None, SPECTRUM), measured())
     only = fx.fit(fx.Viscoelastic(None, SPECTRUM), measured(("uniaxial",)))

@@ -1,7 +1,7 @@
-"""How near a run is to what its linear algebra costs: CPU time over iterations x (tangent, factors, two solves).
+"""Compare a run with the cost of its linear algebra: iterations times (tangent, factors, two solves).
 
-Inflation of Treloar's sheet to pole stretch 8.2, and the shallow cup with stick to 30 psi. `--profile` says where the
-rest goes. CPU seconds of one process: what else runs on the machine hardly enters.
+Inflation of Treloar's sheet to pole stretch 8.2, and the shallow cup with stick to 30 psi. `--profile` lists the
+functions that take the rest. Times are processor seconds of one process, on which other work has little effect.
 """
 
 import argparse
@@ -29,14 +29,14 @@ LARGE = {"inflation": [(160, 8), (320, 16), (1000, 55)], "cup": [(120, 4), (240,
 
 
 def inflation(elements):
-    """(scene, target): Treloar's sheet, far beyond its limit point."""
+    """Return the scene of Treloar's sheet, and a target far beyond its limit point."""
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=elements)
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), loads=[fx.Pressure("bottom")],
                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")]), fx.pole_stretch(8.2)
 
 
 def cup(elements):
-    """(scene, target): a clamped sheet that sticks to a shallow cup."""
+    """Return the scene of a clamped sheet that sticks to a shallow cup, and its target."""
     mesh = fx.mesh.disc(radius=10.0, thickness=0.3, elements=elements)
     mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0)
     return fx.Scene(mesh=mesh, materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("bottom")],
@@ -46,7 +46,10 @@ def cup(elements):
 
 @contextlib.contextmanager
 def clocked(*methods, clock=time.process_time):
-    """CPU seconds (or those of another clock) of each call of some methods, (class, name), while open: {name: list}."""
+    """Yield {name: list} with the processor seconds of each call of some methods, (class, name), while it is open.
+
+    Another clock may be given.
+    """
     spent = {name: [] for _, name in methods}
 
     def with_clock(function, calls):
@@ -64,13 +67,14 @@ def clocked(*methods, clock=time.process_time):
 
 
 def measure(case, elements, profile=None):
-    """What a run costs: set-up and path (CPU seconds), its iterations, one iteration's linear algebra, and the ratio.
+    """Return the cost of a run: set-up and path, its iterations, the linear algebra of one iteration, and the ratio.
 
-    Set-up: all that a run to the state at rest takes (forms, columns, the first factorisation with its analysis). What
-    linear algebra costs is measured in the run itself, where what comes between empties the caches. Look ahead: of a
-    state, `Curve.look_ahead`.
+    Set-up is the time of a run up to the unloaded state (forms, columns, the first factorisation with its analysis).
+    The linear algebra is measured in the run itself, where other work empties the caches. "look ahead" is the time of
+    `Curve.look_ahead` at a state.
 
-    profile: a `cProfile.Profile` that looks on, or None.
+    Args:
+        profile: a `cProfile.Profile` that records the run, or None.
     """
     scene, target = case(elements)
     began = time.process_time()
@@ -93,10 +97,10 @@ def measure(case, elements, profile=None):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--quick", action="store_true", help="the smallest of each")
+    options.add_argument("--quick", action="store_true", help="the smallest mesh of each case")
     options.add_argument("--large", action="store_true", help="1e5 and 1e6 unknowns, too (minutes)")
-    options.add_argument("--case", choices=SIZES, help="one of them alone")
-    options.add_argument("--profile", action="store_true", help="where the time goes")
+    options.add_argument("--case", choices=SIZES, help="run this case alone")
+    options.add_argument("--profile", action="store_true", help="list the functions that take the rest of the time")
     options.add_argument("--out", type=Path, default=Path("results/limit"))
     args = options.parse_args()
     results, head = [], f"{'':12}{'elements':>10}"

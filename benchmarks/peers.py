@@ -1,10 +1,10 @@
-"""formingx beside NGSolve and FElupe: time, error and memory on the same problems, one thread each.
+"""Compare formingx with NGSolve and FElupe: time, error and memory on the same problems, one thread each.
 
     ./fx python3 benchmarks/peers.py [--only treloar cup] [--codes formingx ngsolve] [--sizes 20x1 40x2] [--repeat 3]
 
-On first use each peer gets a virtual environment of its own in .cache/peers, from PyPI. What they run is in
-benchmarks/peers, a short file for each code and problem. Runs alternate; medians count. The error is that against the
-code's own solution on the finest mesh, so that no code is measured by another's.
+On first use each peer gets a virtual environment of its own in .cache/peers, from PyPI. Their scripts are in
+benchmarks/peers, a short file for each code and problem. Runs alternate; medians count. The error is relative to the
+code's own solution on the finest mesh, so that no code is measured by another one.
 """
 
 import argparse
@@ -28,7 +28,7 @@ SECONDS, LONG = 600, 20                                     # of CPU that a run 
 
 
 def python(code):
-    """The interpreter that a code runs with."""
+    """Return the interpreter of a code."""
     if not PACKAGES[code]:
         return sys.executable
     folder = ROOT / ".cache" / "peers" / code
@@ -44,7 +44,7 @@ def script(code, case):
 
 
 def run(code, case, size):
-    """What one run reports, or None if it fails, which is said."""
+    """Return the report of one run, or None if it fails (printed)."""
     command = [python(code), script(code, case), *size.split("x")]
     threads = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     done = subprocess.run(command, env=os.environ | threads, capture_output=True, text=True,
@@ -57,7 +57,7 @@ def run(code, case, size):
 
 
 def measure(case, codes, sizes, repeat):
-    """{(size, code): medians}, with the error against the code's own solution of the last size (which has none)."""
+    """Return {(size, code): medians}, with the error against the code's own solution of the last size."""
     found: dict = {}
     failed = set()
     for size in sizes:
@@ -80,7 +80,10 @@ def measure(case, codes, sizes, repeat):
 
 
 def table(found, codes, sizes):
-    """Markdown: a row for each size and code; times but the wall's are CPU times; the ratio is that of the paths."""
+    """Yield the lines of a Markdown table with a row for each size and code.
+
+    All times but the wall time are processor times; the ratio is that of the paths.
+    """
     yield ("| elements | code | unknowns | iterations | set-up, s | path, s | wall, s | error | memory, MB |"
            " path over formingx |")
     yield "|---|---|---|---|---|---|---|---|---|---|"
@@ -96,7 +99,7 @@ def table(found, codes, sizes):
 
 
 def at_equal_error(found, codes, errors=(1e-2, 1e-3, 1e-4, 1e-5)):
-    """Markdown: CPU seconds of the path at those errors that lie between runs, on logarithmic axes."""
+    """Yield the lines of a Markdown table: processor seconds of the path at errors between runs (log-log)."""
     yield "| error |" + "".join(f" {code}, s |" for code in codes)
     yield "|---|" + "---|" * len(codes)
     for error in errors:
@@ -111,7 +114,7 @@ def at_equal_error(found, codes, errors=(1e-2, 1e-3, 1e-4, 1e-5)):
 
 
 def draw(results, file):
-    """Error against CPU for the path; CPU of an iteration against unknowns for the loading."""
+    """Draw error against processor time of the path, and processor time of an iteration against unknowns."""
     from formingx.results.show import plots
     figure, (left, right) = plots.figure(2)
     for code in PACKAGES:
@@ -127,11 +130,12 @@ def draw(results, file):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--only", nargs="+", choices=SIZES, default=list(SIZES), help="which problems")
+    options.add_argument("--only", nargs="+", choices=SIZES, default=list(SIZES), help="problems to run")
     options.add_argument("--codes", nargs="+", choices=PACKAGES, default=list(PACKAGES))
     options.add_argument("--sizes", nargs="+", help="elements along the radius and through the thickness, as 40x2")
     options.add_argument("--repeat", type=int, default=3)
-    options.add_argument("--out", type=Path, default=Path("results/peers"), help="keeps what other runs left there")
+    options.add_argument("--out", type=Path, default=Path("results/peers"),
+                         help="folder for results; those of other runs are kept")
     args = options.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     summary = args.out / "summary.json"

@@ -1,11 +1,11 @@
-"""The stress peak under the edge of a plug: with a fillet it converges, at a sharp edge it does not.
+"""Refine the mesh at the edge of a plug: the stress peak converges with a fillet, not at a sharp edge.
 
 Sheet and plug of Williams' experiments (Song 1993, section 6.2): r0 = 8.89 cm, h0 = 0.6985 cm, neo-Hookean, c10 = 0.448
-MPa, plug radius 1.905 cm; it travels 2 cm, at the most. Elements are packed around the edge, in R and towards the face
-that the plug touches, and halved, and so on. For every mesh: the largest sigma_1 within two plug radii, the estimated
-error of the stress there, and the place where the estimate leaves most room for a larger one (`StressField.peak`). A
-peak has converged where nothing is left to be found within 5 % of it. Contact acts at nodes, so a sharp edge acts like
-a fillet of an element's size: its peak grows with every refinement.
+MPa, plug radius 1.905 cm; it travels 2 cm at most. Elements are small around the edge, in R and towards the face that
+the plug touches; they are halved again and again. For every mesh: the largest sigma_1 within two plug radii, the
+estimated error of the stress there, and the place at which a larger one is possible by the estimate
+(`StressField.peak`). A peak has converged if no larger one is possible within 5 % of it. Contact acts at nodes, so a
+sharp edge acts like a fillet of an element's size: its peak grows with every refinement.
 """
 
 import argparse
@@ -29,7 +29,7 @@ KEYS = ("sigma_1_MPa", "R_cm", "Z_cm", "error_MPa", "doubtful_MPa", "doubtful_R_
 
 
 def press(fillet, friction, refinement, travels=TRAVELS):
-    """(path to the last travel or to where it ended, what happened); the smallest elements are 0.07 cm / refinement."""
+    """Return the path as far as it came, and how it ended; the smallest elements are 0.07 cm / refinement."""
     edge = PLUG - 0.7 * fillet                                         # where it touches
     layers = {"lower": THICKNESS / 2, "middle": THICKNESS / 3, "upper": THICKNESS / 6}
     mesh = fx.mesh.disc(radius=RADIUS, thickness=layers, elements=(28 * refinement, refinement),
@@ -47,13 +47,13 @@ def press(fillet, friction, refinement, travels=TRAVELS):
 
 
 def peak(path, travel):
-    """The peak at a travel, or None if it was not reached."""
+    """Return the peak at a travel, or None if it was not reached."""
     state = path.met(fx.travel(travel))
     return None if state is None else path.stress(state).peak(radii=(0.0, 2 * PLUG))
 
 
 def draw(rows, last, out):
-    """Peaks against element size, and the estimated error around the edge on the finest meshes."""
+    """Draw peaks against element size, and the estimated error around the edge on the finest meshes."""
     figure, axes = plots.figure(1 + len(last), width=4.6, height=4.0)
     for k, case in enumerate(dict.fromkeys(row["case"] for row in rows)):
         mine = [row for row in rows if row["case"] == case and row["travel_cm"] == TRAVELS[-1] and row["sigma_1_MPa"]]
@@ -74,7 +74,7 @@ def draw(rows, last, out):
 
 
 def _error_map(axes, path):
-    """The deformed elements around the edge, shaded by their estimated errors."""
+    """Draw the deformed elements around the edge; return their colours by the estimated errors."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
     fields = Fields(path)

@@ -1,8 +1,8 @@
-"""Plugs far from the ordinary: slender and wide, sharp and round, sheets thick and thin, any friction, out and back.
+"""Push plugs far from the ordinary: slender and wide, sharp and round, sheets thick and thin, any friction.
 
 r0 = 10 cm, clamped; Mooney, I1 constant 0.4 MPa, I2 constant 0.04 MPa; r0/h0 = 20, plug radius 2.5 cm, edge fillet
-h0/2 unless said; travel to three plug radii. Withdrawn: pushed, held at its travel, brought back to 0. Every row ends
-in a converged state or in an error that keeps the last good one; anything else is printed as a DEFECT.
+h0/2 unless said; travel to three plug radii. Withdrawn plugs are pushed, wait, and move back to 0. Every row ends in a
+converged state or in an error that keeps the last good one; anything else is printed as a DEFECT.
 """
 
 import argparse
@@ -25,10 +25,11 @@ LAWS = ("frictionless", 0.1, 0.3, 1.0, 3.0, 10.0, "stick", "held")
 
 @dataclass(frozen=True)
 class Plug:
-    """A plug and its sheet: radius over r0, fillet over h0 ("round": the plug's radius), r0/h0.
+    """A plug and its sheet.
 
-    law: of `plugs.LAWS`, or a coefficient of friction; back: held at its travel and withdrawn; cone: its end is
-    one of 45 degrees, not flat, nose and edge rounded by the fillet; refine: all elements are divided by this.
+    radius is over r0, fillet over h0 ("round": the plug's radius); r0/h0. law: one of `plugs.LAWS`, or a coefficient of
+    friction. back: it waits at its travel and is withdrawn. cone: its end is a cone of 45 degrees, with nose and edge
+    rounded by the fillet. refine: divisor of the size of all elements.
     """
 
     radius: float = 0.25
@@ -41,13 +42,13 @@ class Plug:
 
     @property
     def lengths(self) -> tuple[float, float, float]:
-        """Plug radius, fillet, thickness, cm."""
+        """Return plug radius, fillet and thickness, cm."""
         radius, thickness = self.radius * RADIUS, RADIUS / self.slenderness
         return radius, radius if self.fillet == "round" else self.fillet * thickness, thickness
 
     @property
     def tool(self) -> fx.Tool:
-        """The plug, on the sheet."""
+        """Return the plug, on the sheet."""
         radius, fillet, thickness = self.lengths
         if not self.cone:
             return plugs.plug(radius, thickness, fillet)
@@ -66,12 +67,13 @@ CASES = {
 
 
 def mesh_for(plug):
-    """The one rule: at the edge three elements to the fillet, or two to h0, and not smaller than h0/10; r0/30 far away.
+    """Return the mesh for a plug.
 
-    At the rim, where a clamped sheet is creased, they are a third of that: it alone changes the first forces by 1 %.
-    Where the sheet may slide over the edge there are four to the fillet from 0.6 plug radii on, for they come to the
-    edge stretched, and nodes slide off it one by one: with 1.3 the force goes up and down by 6 %. A sheet thicker than
-    half a plug radius has four elements through it, others two.
+    At the edge the fillet has three elements, or h0 two, none below h0/10; far away they are r0/30. At the rim, where a
+    clamped sheet is creased, elements are a third of that: this alone changes the first forces by 1 %. Where the sheet
+    may slide over the edge there are four to the fillet from 0.6 plug radii on. They reach the edge stretched, and
+    nodes slide off it one by one: with 1.3 the force goes up and down by 6 %. A sheet thicker than half a plug radius
+    has four elements through it, others two.
     """
     radius, fillet, thickness = plug.lengths
     slides, largest = plug.law not in ("held", "stick"), RADIUS / 30
@@ -117,7 +119,7 @@ def run(plug, max_steps=None, intermediate=(), **options):
 
 
 def ended(error) -> str:
-    """Reason, cause and advice of an error, in one line."""
+    """Return reason, cause and advice of an error, in one line."""
     found = error.diagnosis
     if found is None:
         return str(error)
@@ -126,7 +128,7 @@ def ended(error) -> str:
 
 
 def smallest_J(path, state) -> float:
-    """det F where it is smallest."""
+    """Return the smallest det F in a state."""
     with path.problem.state_context(state) as problem:
         return float(body(problem, problem.x, state.control).J.min())
 
@@ -155,7 +157,7 @@ def main():
 
 
 def row(path, plug, elements) -> str:
-    """The numbers of one row."""
+    """Return the numbers of one row."""
     if path is None or not path.states:
         return f"{elements:9d}" + 70 * " "
     radius, _, thickness = plug.lengths

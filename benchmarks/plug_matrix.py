@@ -1,10 +1,10 @@
-"""Every plug with every friction on every sheet: does it come to three plug radii, at what cost, how sure is its force?
+"""Push every plug with every friction into every sheet: does it reach three plug radii, and how exact is its force?
 
-Flat plugs with four fillets, a sphere, a cone; mu from 0 to 10 and stick; r0/h0 from 5 to 300; elements as
-`plug_extremes` makes them, and halved: 720 runs of seconds to minutes, made in a shuffled order, each added to
-results/plug_matrix/rows.csv. A run made again goes on with what that table lacks; --minutes ends it after a while: what
-is there is a fair sample. Then it prints how many arrived, what ended the others, and by how much halved elements
-change the force.
+Flat plugs with four fillets, a sphere, a cone; mu from 0 to 10 and stick; r0/h0 from 5 to 300; elements as in
+`plug_extremes`, and halved: 720 runs of seconds to minutes, in a shuffled order, each added to
+results/plug_matrix/rows.csv. A new run continues with the missing rows; --minutes ends it after a time, and the rows so
+far are a fair sample. Then it prints how many plugs arrived, what ended the others, their cost, and the change of the
+force by halved elements.
 """
 
 import argparse
@@ -34,7 +34,7 @@ KEY = 4                                                      # so many of them n
 
 
 def plug(end, mu, slenderness, refine) -> Plug:
-    """The plug of a row."""
+    """Return the plug of a row."""
     made = Plug(slenderness=slenderness, law=mu, refine=refine, **ENDS[end])
     if end == "flat h0/2":
         return made
@@ -43,7 +43,7 @@ def plug(end, mu, slenderness, refine) -> Plug:
 
 
 def row(key, seconds) -> list:
-    """One row; `seconds` of CPU time: after so many it is ended."""
+    """Return one row; it ends after `seconds` of processor time."""
     def late(*_):
         raise KeyboardInterrupt
 
@@ -66,7 +66,7 @@ def row(key, seconds) -> list:
 
 
 def tell(rows) -> None:
-    """What the table shows."""
+    """Print the findings of the table."""
     arrived = [r for r in rows if r["ended"] == "arrived"]
     print(f"{len(rows)} of {len(keys())} rows: {len(arrived)} arrived, {sum(r['jumps'] != '0' for r in rows)} with"
           " jumps; the others:")
@@ -88,7 +88,7 @@ def tell(rows) -> None:
 
 
 def keys() -> list:
-    """What names each row, shuffled, both meshes of a plug one after the other."""
+    """Return the keys of all rows, shuffled; both meshes of a plug follow each other."""
     found = list(itertools.product(ENDS, FRICTIONS, SLENDERNESS))
     random.Random(1).shuffle(found)
     return [(*key, refine) for key in found for refine in (1, 2)]
@@ -97,7 +97,7 @@ def keys() -> list:
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--minutes", type=float, default=600, help="time for all rows")
-    options.add_argument("--row-seconds", type=int, default=600, help="CPU time for one")
+    options.add_argument("--row-seconds", type=int, default=600, help="processor time for one row")
     options.add_argument("--out", type=Path, default=Path("results/plug_matrix"), help="folder of the table")
     args = options.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)

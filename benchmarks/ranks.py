@@ -1,8 +1,8 @@
-"""What a second rank gains: time of an iteration's parts, of a clamped disc with some 3e5 unknowns.
+"""Measure the gain of a second rank: time of the parts of an iteration, for a clamped disc with some 3e5 unknowns.
 
 Run it on one rank and on two: `./fx python3 benchmarks/ranks.py`, `./fx mpirun -n 2 python3 benchmarks/ranks.py`. The
-time is wall time, which means nothing on a busy machine; with `--processor` it is the processor time of the rank that
-takes the most.
+time is wall time, which has no meaning on a busy machine; with `--processor` it is the processor time of the slowest
+rank.
 """
 
 import argparse
@@ -27,7 +27,7 @@ PARTS = {"tangent": (Problem, "tangent"), "residual": (Problem, "residual"), "fa
 
 
 def wall() -> float:
-    """Seconds, of the last rank that comes here."""
+    """Return the wall time (s) at which the last rank arrives."""
     COMM.barrier()
     return time.perf_counter()
 

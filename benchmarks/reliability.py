@@ -1,16 +1,17 @@
-"""How reliable the package is, in figures: bad input, ranks, and files that cannot be written.
+"""Count failures of the package: wrong arguments, ranks, killed runs, and files that cannot be written.
 
-    python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]      (damaged files: benchmarks/damaged_files.py)
+    ./fx python3 benchmarks/reliability.py [bad] [ranks] [restarts] [files]    (damaged files: damaged_files.py)
 
 bad: every public argument wrong in turn; counts how many gave an InputError (or a TypeError, for an unknown or a
 missing argument) before any solve. ranks: a free and a formed sheet on 1, 2, 3, 4 ranks; the largest relative
-difference of any measure of any state. restarts: a run killed (kill -9) at random moments, and gone on with from its
-checkpoint: how often it came to the same path. files: a full disk, a folder that cannot be written: a clear error, and
-the earlier file is still there.
+difference of any measure of any state. restarts: runs killed (kill -9) at random moments and continued from their
+checkpoints; counts how many reached the same path. files: a full disk, a folder that cannot be written: a clear error,
+and the earlier file is kept.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import inspect
 import json
@@ -50,7 +51,7 @@ BAD: dict[str, dict[str, Any]] = {
 
 
 class Call(NamedTuple):
-    """A public callable, its arguments as {name: (kind, a good value)}, and what uses the result up to the solve."""
+    """A public callable, {name: (kind, a good value)} of its arguments, and the use of its result up to the solve."""
 
     name: str
     make: Callable
@@ -59,7 +60,7 @@ class Call(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a wrong argument led to: "right", "accepted" or "wrong error"."""
+    """Outcome of a wrong argument: "right", "accepted" or "wrong error"."""
 
     call: str
     argument: str
@@ -69,12 +70,12 @@ class Outcome(NamedTuple):
 
 
 class ReachedTheSolve(Exception):
-    """A run was about to solve: what it was given was taken for good input."""
+    """Raised when a run is about to solve: its arguments were taken as good ones."""
 
 
 @contextlib.contextmanager
 def unsolved() -> Iterator[None]:
-    """Runs end with `ReachedTheSolve` where they would begin to solve."""
+    """Within this context, runs end with `ReachedTheSolve` before they solve."""
     def stop(*_: Any) -> None:
         raise ReachedTheSolve
     start, Curve.start = Curve.start, stop
@@ -99,7 +100,7 @@ def _run(scene: Any, until: Any = None) -> None:
 
 
 def _named() -> fx.Scene:
-    """A scene for a process: a pressure and a plug, with names."""
+    """Return a scene for a process: a pressure and a plug, with names."""
     plug = fx.Contact("top", fx.tools.sphere(radius=0.5, z=0.1), "none", direction=(0, -1), name="plug")
     return _scene(loads=[fx.Pressure("bottom", name="air")], contacts=[plug])
 
@@ -113,7 +114,7 @@ def _staged(**stage: Any) -> None:
 
 
 def calls(made: fx.Scene, saved: str) -> list[Call]:
-    """Every public callable that takes what a user types; `saved`: a checkpoint of the scene `made`."""
+    """Return every public callable with arguments that a user types; `saved`: a checkpoint of the scene `made`."""
     positive, number, word, name = ("positive", 1.0), ("number", 0.1), ("word", "bottom"), ("name", None)
     optional = ("positive or None", None)
     materials = [Call(m.__name__, m, {k: (kind, v) for k, (kind, v) in args.items()}, lambda m: _scene(materials=m))
@@ -234,7 +235,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
 
 
 def _time_and_heat() -> list[Call]:
-    """Calls of materials that relax, and of heat."""
+    """Return calls of materials that relax, and of heat."""
     positive, number, where = ("positive", 1.0), ("number", 0.1), ("word", "top")
     rubber, material = ("optional thing", fx.NeoHookean(c10=1.0)), ("thing", fx.ThermalProperties(
         conductivity=0.2, density=1e3, heat_capacity=2e3))
@@ -307,7 +308,7 @@ _LEFT_OUT = {"comm", "self"}
 
 
 def bad_input() -> list[Outcome]:
-    """Every argument of every call wrong in turn, one left out, one unknown."""
+    """Return the outcomes of all calls with every argument wrong in turn, one left out, one unknown."""
     made, found = _scene(), []
     with tempfile.TemporaryDirectory() as folder:
         saved = os.path.join(folder, "run")
@@ -319,7 +320,7 @@ def bad_input() -> list[Outcome]:
 
 
 def _bad_calls(call: Call) -> Iterator[Outcome]:
-    """One call with every argument wrong in turn, one left out, one unknown."""
+    """Yield one call with every argument wrong in turn, one left out, one unknown."""
     parameters = inspect.signature(fx.Process.run if call.name == "Process.run" else call.make).parameters
     left = set(parameters) - set(call.arguments) - _LEFT_OUT
     assert not left, f"{call.name}: no bad values are known for {left}"
@@ -365,7 +366,7 @@ if MPI.COMM_WORLD.rank == 0:
 
 
 def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
-    """{sheet: largest difference of a measure from that on 1 rank, over its largest value (mass_error: as it is)}."""
+    """Return {sheet: largest difference of a measure from one rank, over its largest value (mass_error: absolute)}."""
     root = FilePath(__file__).parents[1]
     results = []
     for n in counts:
@@ -387,7 +388,7 @@ def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
 
 
 def restarts(kills: int = 50) -> tuple[int, float]:
-    """(of so many runs killed at random moments, how many went on to the same path; largest relative difference)."""
+    """Return how many of the killed runs reached the same path, and the largest relative difference."""
     sys.path.insert(0, str(FilePath(__file__).parents[1] / "tests"))
     from test_restart import SCENES, killed_after, numbers
     make, until = SCENES["stick"]
@@ -406,7 +407,7 @@ def restarts(kills: int = 50) -> tuple[int, float]:
 
 
 def files() -> dict[str, str]:
-    """{what was tried: "right" or what went wrong}: an error that names the file, and the earlier file stays."""
+    """Return {attempt: "right" or the fault}: an error must name the file, and the earlier file must be kept."""
     path = fx.trace(_scene(), until=fx.pole_height(0.05), progress=False)
     writers: dict[str, Callable] = {
         "path.to_csv": path.to_csv,
@@ -472,7 +473,7 @@ def _file_as_folder(folder: str) -> FilePath:
 
 
 def main(what: list[str]) -> None:
-    """Print the figures."""
+    """Print the counts."""
     if not what or "bad" in what:
         found = bad_input()
         right = sum(o.outcome == "right" for o in found)
@@ -492,4 +493,7 @@ def main(what: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("parts", nargs="*", choices=["bad", "ranks", "restarts", "files", []], metavar="PART",
+                         help="bad, ranks, restarts or files (default: all)")
+    main(options.parse_args().parts)

@@ -1,8 +1,8 @@
-"""What a fine sheet in three dimensions costs, and if L D L^T would pay: the tray of `demos/tray.py`, 20,000 triangles.
+"""Measure the cost of a fine sheet in three dimensions, with L U and with L D L^T (20,000 triangles).
 
-CPU time of a run and of its parts, and its memory; then how far a tangent is from symmetric, and
-time and memory of its factorisation and of a solution by L U and by L D L^T (MUMPS). `--friction MU` slides;
-`--symmetric` makes the whole run with L D L^T, as if the problem had said that its tangent is symmetric.
+The sheet is the tray of `demos/tray.py`: processor time of a run and of its parts, and its memory; then how far a
+tangent is from symmetric, and time and memory of its factorisation and of a solution by L U and by L D L^T (MUMPS).
+`--friction MU` lets the sheet slide; `--symmetric` makes the whole run with L D L^T, as if its tangent were symmetric.
 """
 
 import argparse
@@ -63,8 +63,8 @@ def factorised(matrix, symmetric):
 
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--size", type=float, default=0.013, help="of the triangles; the box is 1 x 1.5 x 1")
-    options.add_argument("--friction", type=float, help="default: the sheet sticks")
+    options.add_argument("--size", type=float, default=0.013, help="size of the triangles; the box is 1 x 1.5 x 1")
+    options.add_argument("--friction", type=float, help="coefficient of friction (default: the sheet sticks)")
     options.add_argument("--symmetric", action="store_true", help="solve with L D L^T")
     options.add_argument("--out", type=Path, default=Path("results/sheet_cost"))
     args = options.parse_args()

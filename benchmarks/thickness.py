@@ -1,13 +1,13 @@
-"""What `accuracy` keeps of its promise from thick discs to thin ones, and why triangles must not be slim across them.
+"""Check the promise of `accuracy` from thick discs to thin ones, and the effect of slim triangles.
 
-A hinged sheet of radius 1 is inflated to pole stretches of 1.02, 1.2, 2 and 3; every mesh is compared at the same pole
-heights with a reference: near-square elements, continuous pressures (P1); its own error is taken from the default
-pressures (P1dg) on the same mesh. Errors are those of pressure and pole thickness, and of the meridional stress of the
-top face one thickness inside the rim, but between r0/20 and r0/2 (nearer than that to the rim thin sheets bend over a
-few thicknesses).
+A hinged sheet of radius 1 is inflated to pole stretches of 1.02, 1.2, 2 and 3. Every mesh is compared at the same pole
+heights with a reference: near-square elements, continuous pressures (P1). The error of the reference is estimated by
+the default pressures (P1dg) on the same mesh. Errors are those of pressure and pole thickness, and of the meridional
+stress of the top face one thickness inside the rim, but between r0/20 and r0/2. (Nearer to the rim, thin sheets bend
+over a few thicknesses.)
 
-Prints the inf-sup constants of a strip, the table of r0/h0, that of slim triangles, and where the rim's face creases;
-writes results/thickness/. About 40 minutes (--quick: three ratios without "fine", 2 minutes).
+Prints the inf-sup constants of a strip, the table of r0/h0, that of slim triangles, and where the face at the rim
+creases; writes results/thickness/. About 40 minutes (--quick: three ratios without "fine", 2 minutes).
 """
 
 import argparse
@@ -43,16 +43,16 @@ TALL = (0.1, 0.5, 1, 2, 4, 8, 16, 32)                  # height over width of tr
 
 
 class Unrefused(fx.MixedPressure):
-    """Also on meshes that a scene refuses, as it locks in them: to show how much."""
+    """Elements that a scene does not refuse when they lock, to show by how much."""
 
     def check(self, scene):
         pass
 
 
 def inflate(ratio, c01=0.0, space="P1dg", stretches=STRETCHES, heights=None, **mesh):
-    """(path, seconds) to pole stretches, or to pole heights; `mesh`: elements or accuracy, grading.
+    """Return the path to pole stretches, or to pole heights, and its seconds.
 
-    A path that does not arrive is returned as far as it goes.
+    A path that does not arrive is returned as far as it goes. mesh: elements or accuracy, and grading.
     """
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1 / ratio, **mesh),
                      materials={"sheet": fx.MooneyRivlin(c10=1 - c01, c01=c01)}, loads=[fx.Pressure("bottom")],
@@ -68,7 +68,7 @@ def inflate(ratio, c01=0.0, space="P1dg", stretches=STRETCHES, heights=None, **m
 
 
 def measures(path, ratio):
-    """{quantity: values at the targets that were met}."""
+    """Return {quantity: values at the targets that were met}."""
     near_rim = [(1 - np.clip(1 / ratio, 0.05, 0.5), 1 / ratio)]
     met = [s for s in path.states if s.met]
     return {"heights": [s.measures["pole_height"] for s in met],
@@ -78,7 +78,7 @@ def measures(path, ratio):
 
 
 def errors(found, reference):
-    """{quantity: relative errors at the heights that were met}."""
+    """Return {quantity: relative errors at the heights that were met}."""
     return {q: np.abs(np.array(found[q]) / reference[q][:len(found[q])] - 1) for q in QUANTITIES}
 
 
@@ -89,7 +89,7 @@ def row(name, error, seconds):
 
 
 def over_ratios(ratios, accuracies, materials):
-    """The promises of `accuracy` at every r0/h0."""
+    """Print and return the errors of each `accuracy` at every r0/h0."""
     results = {}
     for ratio in ratios:
         elements, grading = RATIOS[ratio]
@@ -112,7 +112,7 @@ def over_ratios(ratios, accuracies, materials):
 
 
 def slim_triangles():
-    """Taller and taller triangles at r0/h0 = 2: the default pressures lock, continuous ones do not."""
+    """Print and return errors of ever taller triangles at r0/h0 = 2: default pressures lock, continuous ones not."""
     reference, results = measures(inflate(2, space="P1", elements=RATIOS[2][0])[0], 2), {}
     say("", "slim triangles at r0/h0 = 2", f"{'':32}{'p, h pole':>12}{'rim >= 1.2':>12}{'rim 1.02':>12}{'s':>9}")
     for space in ("P1dg", "P1"):
@@ -126,7 +126,7 @@ def slim_triangles():
 
 
 def rim_faces():
-    """Creases: the least stretch along the rim's face, on three meshes, which agree up to there."""
+    """Print and return the smallest stretch along the face at the rim, on three meshes, which agree up to a crease."""
     stretches, results = (1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 2.0), {}
     say("", "least stretch along the rim's face, at pole stretches of",
         " " * 32 + "".join(f"{s:8g}" for s in stretches))
@@ -146,9 +146,10 @@ def least_along_rim(stress, h):
 
 
 def inf_sup(space, tall, along=16, through=2):
-    """The inf-sup constant of P2 (P1dg: and bubbles) / `space` on a plane strip held at one end.
+    """Return the inf-sup constant of P2 (P1dg: with bubbles) / `space` on a plane strip held at one end.
 
-    The least root of B A^-1 B^T q = beta^2 M q, with A the H1 product, B the divergence, M the mass of the pressures.
+    It is the least root of B A^-1 B^T q = beta^2 M q, with A the H1 product, B the divergence, M the mass of the
+    pressures.
     """
     mesh = fx.mesh.disc(radius=along / tall / through, thickness=1.0, elements=(along, through))
     domain, pressure = mesh.domain, fx.MixedPressure(space=space).pressure

@@ -1,13 +1,13 @@
-"""What time costs: a step of a material with two branches over an iteration, and a step, of the elastic one.
+"""Measure the cost of time: steps of a material with two branches over steps and iterations of the elastic one.
 
-Processor time of a step, all included (limit points, columns, error in time), of two bodies: Treloar's sheet
-as a solid, blown up by a flow and held at its volume, and a block that is stretched at once and held. The elastic
-material has the same instantaneous modulus; it is blown up by arc length, or stretched. Readings, by medians of
+Processor time of a step, all included (limit points, columns, error in time), of two bodies: Treloar's sheet as a
+solid, inflated by a flow and kept at its volume, and a block that is stretched at once and kept so. The elastic
+material has the same instantaneous modulus; it is inflated by arc length, or stretched. Readings are medians of
 repetitions:
 
-    iteration        one iteration with branches, put on at once, over one elastic iteration
+    iteration        one iteration with branches, loaded at once, over one elastic iteration
     step             one step in time over one elastic iteration
-    step_over_step   the same over one elastic step
+    step_over_step   one step in time over one elastic step
 """
 
 import argparse
@@ -39,7 +39,7 @@ def block(material, elements):
 
 
 def stages(body):
-    """(at once, in time) for a body."""
+    """Return the stages at once and in time of a body."""
     if body is block:
         once = fx.Stage("at once", control="pull", until=fx.travel(STRETCH - 1))
         return [once], [once, fx.Stage("hold", duration=20.0)]
@@ -50,7 +50,7 @@ def stages(body):
 
 
 def cost(body, material, schedule, elements, accuracy):
-    """{stage: (seconds of the processor, steps, iterations)} from its first state on, failed steps counted, too."""
+    """Return {stage: (processor seconds, steps, iterations)}, from the first state on, with failed steps."""
     path = fx.Process(body(material, elements)).run(schedule, accuracy=accuracy, max_steps=5000, progress=False,
                                                     record={"cpu": lambda problem: time.process_time()})
     found = {}
@@ -63,7 +63,7 @@ def cost(body, material, schedule, elements, accuracy):
 
 
 def compare(body, elements, accuracy, repeat):
-    """{reading: value} of a body."""
+    """Return {reading: value} of a body."""
     once, in_time = stages(body)
     rows = []
     for _ in range(repeat):                                  # one after the other: the machine does other things, too

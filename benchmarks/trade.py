@@ -1,8 +1,8 @@
-"""The trade of speed for accuracy: three scenes, every way to model them, against a fine reference.
+"""Measure error against time of three scenes, for every way to model them.
 
-Prints a table per scene, draws error against time with its Pareto front, writes results/trade/. Each way runs in a
-process of its own (peak memory), twice: the first compiles. "solve" is the run alone, "total" has mesh and set-up.
-About 15 minutes (--quick: one scene, coarse ways).
+Prints a table per scene, draws error against time with its Pareto front, writes results/trade/. The errors are relative
+to a fine reference. Each way runs in a process of its own (peak memory), twice: the first compiles. "solve" is the run
+alone, "total" includes mesh and set-up. About 15 minutes (--quick: one scene, coarse ways).
 """
 
 import argparse
@@ -44,7 +44,7 @@ QUANTITIES = ("pressure", "pole_thickness", "rim_stress")
 
 
 def ways(quick):
-    """Every way to model a scene: model, elements, and what departs from the defaults."""
+    """Yield every way to model a scene: model, elements, and options that are not the defaults."""
     meshes = ((5, 1), (10, 1), (20, 1), (40, 2), (80, 4))
     for model in ("membrane", "P2/P0", "P2/P1", "P2+/P1dg"):
         for along, through in meshes[:3] if quick else meshes:
@@ -61,7 +61,7 @@ def ways(quick):
 
 
 def one(scene, way):
-    """Trace one scene in one way (its elements, or an accuracy that picks them); its key numbers and cost."""
+    """Return key numbers and cost of one scene in one way (its elements, or an accuracy that chooses them)."""
     size = SCENES[scene]
     began = time.perf_counter()
     mesh = fx.mesh.disc(radius=size["radius"], thickness=size["thickness"], **(
@@ -93,7 +93,7 @@ def one(scene, way):
 
 
 def measured(scene, way):
-    """The numbers of a way from a process of its own, compiled before."""
+    """Return the numbers of a way from a process of its own, with forms compiled before."""
     for _ in range(2):
         done = subprocess.run([sys.executable, __file__, "--one", json.dumps([scene, way])], capture_output=True,
                               text=True, timeout=900)
@@ -109,7 +109,7 @@ def label(way):
 
 
 def pareto(points):
-    """Those of (seconds, error, name) that no other beats in both, by time."""
+    """Return those of (seconds, error, name) that no other one beats in both, sorted by time."""
     best, front = float("inf"), []
     for point in sorted(points):
         if point[1] < best:
@@ -119,7 +119,7 @@ def pareto(points):
 
 
 def draw(results, out):
-    """Error of pressure and pole thickness (the larger) against time, one plot per scene."""
+    """Draw the larger error of pressure and pole thickness against time, a plot for each scene."""
     figure, axes = plots.figure(len(results), width=5.2, height=4.6)
     axes = [axes] if len(results) == 1 else axes
     for a, (scene, rows) in zip(axes, results.items(), strict=True):

@@ -1,4 +1,4 @@
-"""Treloar's sheet under mesh refinement, and what the thesis' penalty makes of it.
+"""Inflate Treloar's sheet under mesh refinement, also with the thesis' penalty.
 
 Writes results/treloar_mesh/summary.json, for docs/validation.md. About 2 minutes (--quick: seconds).
 """
@@ -18,7 +18,7 @@ STRETCHES = (1.2, 1.5, 2.0, 3.0, 4.0, 6.0, 8.5)
 
 
 def pressures(elements, support, model=None, grading=1.0, until=8.5, max_steps=200):
-    """Limit pressure and pressures at the stretches; None where the run stopped before."""
+    """Return the limit pressure and pressures at the stretches; None where the run stopped before."""
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=elements, grading=grading)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=2.0), supports=[fx.Symmetry("axis"), support],
                      loads=[fx.Pressure("bottom")], model=model)

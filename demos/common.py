@@ -30,11 +30,12 @@ def parser(name: str, about: str, elements: int | None = None, layers: int | Non
     options = argparse.ArgumentParser(prog=f"demos/{name}.py", description=about.splitlines()[0],
                                       formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, help="folder for results")
-    options.add_argument("--quick", action="store_true", help="coarse mesh, no 3-D view: seconds")
+    options.add_argument("--quick", action="store_true", help="coarse mesh and no 3-D view: takes seconds")
     if elements is not None:
         options.add_argument("--elements", type=int, default=elements, help="elements along the sheet")
     if layers is not None:
-        options.add_argument("--layers", type=int, default=layers, help="elements through its thickness, or each layer")
+        options.add_argument("--layers", type=int, default=layers,
+                             help="elements through the sheet, or through each of its layers")
     if accuracy is not None:
         options.add_argument("--accuracy", type=float, default=accuracy, help="relative error in time")
     return options

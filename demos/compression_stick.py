@@ -35,7 +35,8 @@ def tanner(deflection, c=1.1):
 
 def main():
     options = parser("compression_stick", __doc__)
-    options.add_argument("--elements", type=int, default=16, help="along the radius, and along the half height")
+    options.add_argument("--elements", type=int, default=16,
+                         help="elements along the radius, and along the half height")
     args = options.parse_args()
     n = 6 if args.quick else args.elements
     travels = [d / 2 for d in DEFLECTIONS]

@@ -50,7 +50,7 @@ def key_numbers(path, mould):
 
 def main():
     options = parser("deep_cup", __doc__, elements=60, layers=2)
-    options.add_argument("--depth", type=float, default=10.0, help="of the cup, cm")
+    options.add_argument("--depth", type=float, default=10.0, help="depth of the cup, cm")
     options.add_argument("--draft", type=float, default=5.0, help="angle of the wall, degrees")
     options.add_argument("--fillet", type=float, default=2.0, help="radius of the bottom edge, cm")
     args = options.parse_args()

@@ -42,7 +42,7 @@ def key_numbers(path, targets):
 
 def main():
     options = parser("disc_in_space", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025], help="of the triangles")
+    options.add_argument("--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025], help="sizes of the triangles")
     args = options.parse_args()
     sizes, summary = [0.1, 0.05] if args.quick else args.sizes, {}
     for size in sizes:

@@ -38,7 +38,7 @@ def bottle(wall, elements=(60, 1)):
 
 def main():
     options = parser("even_bottle", __doc__, elements=60)
-    options.add_argument("--runs", type=int, default=6, help="at most so many")
+    options.add_argument("--runs", type=int, default=6, help="largest number of runs")
     args = options.parse_args()
     elements = (24 if args.quick else args.elements, 1)
     design = fx.Design(lambda wall: bottle(wall, elements),

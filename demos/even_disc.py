@@ -54,7 +54,7 @@ def numbers(answer, name):
 
 def main():
     options = parser("even_disc", __doc__, elements=80)
-    options.add_argument("--knots", type=int, default=21, help="of the splines")
+    options.add_argument("--knots", type=int, default=21, help="number of knots of the splines")
     args = options.parse_args()
     elements, knots = ((14, 1), 8) if args.quick else ((args.elements, 1), args.knots)
     stretches, walls = (STRETCHES[:1], WALLS[:1]) if args.quick else (STRETCHES, WALLS)

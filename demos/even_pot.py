@@ -53,7 +53,7 @@ def cv(path):
 
 def main():
     options = parser("even_pot", __doc__)
-    options.add_argument("--runs", type=int, default=8, help="of the search with derivatives, at most")
+    options.add_argument("--runs", type=int, default=8, help="largest number of runs of the search with derivatives")
     options.add_argument("--search", type=int, default=32, help="runs of Nelder and Mead's search")
     args = options.parse_args()
     elements, runs, search = ((12, 1), 2, 2) if args.quick else ((24, 1), args.runs, args.search)

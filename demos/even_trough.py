@@ -66,8 +66,8 @@ def arc(answer):
 
 def main():
     options = parser("even_trough", __doc__, elements=60)
-    options.add_argument("--knots", type=int, default=21, help="of the table")
-    options.add_argument("--runs", type=int, default=6, help="of each search, at most")
+    options.add_argument("--knots", type=int, default=21, help="number of knots of the table")
+    options.add_argument("--runs", type=int, default=6, help="largest number of runs of each search")
     args = options.parse_args()
     elements, knots, runs = ((16, 1), 5, 2) if args.quick else ((args.elements, 1), args.knots, args.runs)
     summary = {}

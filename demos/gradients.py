@@ -99,7 +99,7 @@ def ratios(path):
 
 def main():
     options = parser("gradients", __doc__)
-    options.add_argument("--elements", type=int, default=80, help="along the radius of the inflated sheet")
+    options.add_argument("--elements", type=int, default=80, help="elements along the radius of the inflated sheet")
     args = options.parse_args()
     elements = (10 if args.quick else args.elements, 1)
     summary = {}

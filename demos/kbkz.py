@@ -71,7 +71,7 @@ def numbers(path):
 
 def main():
     options = parser("kbkz", __doc__)
-    options.add_argument("--accuracy", type=float, help="relative error in time; default 1e-3, quick 2e-3")
+    options.add_argument("--accuracy", type=float, help="relative error in time (None: 1e-3, with --quick 2e-3)")
     args = options.parse_args()
     accuracy = args.accuracy or (2e-3 if args.quick else 1e-3)
     summary: dict = {"largest_error_of_blocks": {}, "disc": {}}

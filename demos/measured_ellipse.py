@@ -110,7 +110,7 @@ def draw(path, rows, file):
 
 def main():
     options = parser("measured_ellipse", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[2.0, 1.0, 0.5], help="of the triangles, mm")
+    options.add_argument("--sizes", type=float, nargs="+", default=[2.0, 1.0, 0.5], help="sizes of the triangles, mm")
     args = options.parse_args()
     sizes = [4.0, 2.0] if args.quick else args.sizes
     meshes, summary = {}, {}

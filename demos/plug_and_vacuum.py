@@ -89,7 +89,7 @@ def case(arguments):
 
 def main():
     options = parser("plug_and_vacuum", __doc__, elements=60, layers=2)
-    options.add_argument("--radius", type=float, default=5.0, help="of the plug, cm")
+    options.add_argument("--radius", type=float, default=5.0, help="radius of the plug, cm")
     args = options.parse_args()
     elements = (30, 1) if args.quick else (args.elements, args.layers)
     paths = {"straight": form("stick", elements, DEPTH, DRAFT, FILLET)[0]}

@@ -37,7 +37,7 @@ FACE_STRETCHES = (1.01, 1.05, 1.1, 1.2, 1.35, 1.5, 1.75, 2, 2.5, 3.2, 5, 10, 25,
 def main():
     options = parser("plug_friction", __doc__)
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
-    options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
+    options.add_argument("--refine", type=int, default=1, help="divisor of the size of all elements")
     options.add_argument("--mu", type=float, nargs="+", default=FRICTIONS, help="coefficients of friction")
     args = options.parse_args()
     frictions, travels = ((0.3,), (2, 4, 6, 8)) if args.quick else (args.mu, TRAVELS)

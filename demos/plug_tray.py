@@ -58,7 +58,7 @@ def numbers(path):
 
 def main():
     options = parser("plug_tray", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[6.0, 3.0], help="of the triangles, mm")
+    options.add_argument("--sizes", type=float, nargs="+", default=[6.0, 3.0], help="sizes of the triangles, mm")
     args = options.parse_args()
     sizes, summary = [16.0] if args.quick else args.sizes, {}
     runs = [(part, size) for size in sizes for part in ("quarter", "half") if part == "quarter" or size == sizes[-1]]

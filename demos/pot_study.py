@@ -58,8 +58,8 @@ MEASURES = {"evenness": uniformity, "least_wall": min_wall, "plug_force": plug_f
 
 def main():
     options = parser("pot_study", __doc__)
-    options.add_argument("--workers", type=int, help="processes at a time; default one for each core")
-    options.add_argument("--search", type=int, default=15, help="runs of the search on top")
+    options.add_argument("--workers", type=int, help="parallel processes (None: one for each core)")
+    options.add_argument("--search", type=int, default=15, help="runs of the search after the 60 runs")
     args = options.parse_args()
     began, spent = time.perf_counter(), sum(os.times()[:4])
     found = fx.study(pot, QUICK if args.quick else DESIGN, MEASURES, goal={"evenness": "max", "plug_force": "min"},

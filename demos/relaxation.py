@@ -104,7 +104,7 @@ def over_time(path):
 
 def main():
     options = parser("relaxation", __doc__)
-    options.add_argument("--accuracy", type=float, help="relative error in time; default 5e-7, quick 2e-3")
+    options.add_argument("--accuracy", type=float, help="relative error in time (None: 5e-7, with --quick 2e-3)")
     args = options.parse_args()
     accuracy = args.accuracy or (2e-3 if args.quick else 5e-7)
     summary: dict = {"relaxation": {}, "rate": {}, "largest_error_of_homogeneous_tests": {}, "accuracy": accuracy}

@@ -106,8 +106,9 @@ def numbers(path):
 
 def main():
     options = parser("ribbed_tray", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0, 3.0], help="of the triangles, mm")
-    options.add_argument("--adapted", type=int, default=2, help="how often the mesh is then made by what a run showed")
+    options.add_argument("--sizes", type=float, nargs="+", default=[8.0, 5.0, 3.0], help="sizes of the triangles, mm")
+    options.add_argument("--adapted", type=int, default=2,
+                         help="number of meshes that are then adapted to the run before")
     args = options.parse_args()
     sizes, more, step = ([16.0], 0, 3.0) if args.quick else (args.sizes, args.adapted, 1.25)
     if COMM.rank == 0:

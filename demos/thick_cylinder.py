@@ -237,7 +237,8 @@ def draw_curves(kind, path, targets, out, grids=None):
 
 def main():
     options = parser("thick_cylinder", __doc__)
-    options.add_argument("--elements", type=int, default=16, help="elements through the wall; also a quarter, a half")
+    options.add_argument("--elements", type=int, default=16,
+                         help="elements through the wall; a quarter and a half of them are run, too")
     args = options.parse_args()
     n = 12 if args.quick else args.elements
     counts = [max(n // 4, 1), max(n // 2, 2), n]

@@ -98,8 +98,8 @@ def key_numbers(sheet, law, path, end, travels) -> dict:
 
 def main():
     options = parser("throne_plug", __doc__)
-    options.add_argument("--fillet", type=float, default=FILLETS[0], help="radius of the edge over the plug's")
-    options.add_argument("--refine", type=int, default=1, help="elements along the radius multiplied by this")
+    options.add_argument("--fillet", type=float, default=FILLETS[0], help="radius of the edge over that of the plug")
+    options.add_argument("--refine", type=int, default=1, help="factor on the number of elements along the radius")
     args = options.parse_args()
     sheets = {k: s for k, s in SHEETS.items() if not args.quick or k != "thin_throne"}
     travels = QUICK_TRAVELS if args.quick else TRAVELS

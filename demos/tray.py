@@ -62,7 +62,7 @@ def trough(size):
 
 def main():
     options = parser("tray", __doc__)
-    options.add_argument("--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025], help="of the triangles")
+    options.add_argument("--sizes", type=float, nargs="+", default=[0.1, 0.05, 0.025], help="sizes of the triangles")
     args = options.parse_args()
     sizes = [0.1] if args.quick else args.sizes
     mould = fx.tools.box(**BOX)

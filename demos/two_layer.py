@@ -142,7 +142,7 @@ def draw(paths, out, quick):
 def main():
     options = parser("two_layer", __doc__, elements=40, layers=2)
     options.add_argument("--stack", type=int, nargs="+", choices=CONSTANTS, metavar="MATERIAL", default=None,
-                         help="one more case: materials 1, 2 or 3 of its layers, from the bottom up")
+                         help="a further case: material 1, 2 or 3 of each layer, from the bottom up")
     args = options.parse_args()
     elements = (10, 1) if args.quick else (args.elements, args.layers)
     cases = CASES | ({"stack": tuple(args.stack)} if args.stack else {})

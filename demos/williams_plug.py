@@ -30,7 +30,7 @@ QUICK = {"held": ((40, 2), None), "frictionless": ((50, 2), 2.0)}
 def main():
     options = parser("williams_plug", __doc__)
     options.add_argument("--fillet", type=float, default=0.35, help="radius of the plug's edge, cm")
-    options.add_argument("--refine", type=int, default=1, help="all elements divided by this")
+    options.add_argument("--refine", type=int, default=1, help="divisor of the size of all elements")
     args = options.parse_args()
     limit = plugs.force_limit(PLUG, THICKNESS, C10)
     summary, paths = {"thesis": THESIS, "force_limit_without_friction_N": limit}, {}

@@ -29,7 +29,7 @@ PICTURE = re.compile(r"\]\(pictures/(\w+\.png)\)")
 
 
 def store(picture: Path, file: Path) -> None:
-    """Store a picture small: at most 560 pixels wide, 64 colours."""
+    """Store a picture with at most 560 pixels a side and 64 colours."""
     with Image.open(picture) as image:
         image.thumbnail((560, 560))
         image.convert("RGB").quantize(64).save(file, optimize=True)

@@ -1,4 +1,4 @@
-"""The comparisons of the page validation.md: number of ours, reference with its source, unit."""
+"""Comparisons of the page validation.md: our number, reference with its source, unit."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Row(NamedTuple):
 
     Attributes:
         what: the quantity, in words.
-        ours: NAME/KEY/... in results/NAME/summary.json, or `A OVER B` of two.
+        ours: key NAME/KEY/... of our number in results/NAME/summary.json, or `A OVER B` of two.
         reference: a number; a key such as `ours`; a function that computes it; None if there is none.
-        source: of the reference.
-        unit: of both.
+        source: source of the reference.
+        unit: unit of both.
         style: format of both numbers.
-        absolute: the deviation is the difference, for references of 0.
+        absolute: True if the deviation is the difference, for references of 0.
         note: a remark beside the deviation, or in its place.
     """
 

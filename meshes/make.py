@@ -1,7 +1,9 @@
-"""Writes the coarse grids of the thesis' examples (Song 1993), for comparison with other solvers.
+"""Write the coarse grids of the thesis' examples (Song 1993), for comparison with other solvers.
 
-./fx python3 meshes/make.py    six-node triangles, coordinates (R, Z) in the thesis' units, parts named: as gmsh files
-(MSH 2.2, text) and in the text format of formingx.mesh.text, corners first
+    ./fx python3 meshes/make.py
+
+Six-node triangles with named layers and boundaries, coordinates (R, Z) in the thesis' units: as gmsh files (MSH 2.2,
+text) and in the text format of formingx.mesh.text, corners first.
 """
 
 from pathlib import Path

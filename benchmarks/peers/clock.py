@@ -1,4 +1,4 @@
-"""What all codes measure alike. Standard library only."""
+"""Times, sizes and maxima for the scripts of all codes. Standard library only."""
 
 import json
 import resource
@@ -7,7 +7,7 @@ import time
 
 
 class Clock:
-    """CPU and wall seconds since it was made, or since the last lap."""
+    """Processor and wall seconds since its creation, or since the last lap."""
 
     def __init__(self):
         self.lap()
@@ -19,7 +19,7 @@ class Clock:
 
 
 def sizes():
-    """Elements along the radius and through the thickness, from the command line."""
+    """Return the elements along the radius and through the thickness, from the command line."""
     return int(sys.argv[1]), int(sys.argv[2])
 
 
@@ -31,7 +31,7 @@ def report(setup, path, **numbers):
 
 
 def maximum(x, y, slopes):
-    """The first maximum of the cubics through points with slopes dy/dx."""
+    """Return the first maximum of the cubics through points with slopes dy/dx."""
     for k in range(len(x) - 1):
         if slopes[k] > 0 > slopes[k + 1]:
             h, rise = x[k + 1] - x[k], y[k + 1] - y[k]

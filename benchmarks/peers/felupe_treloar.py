@@ -43,7 +43,7 @@ iterations = 0
 
 
 def put(x):
-    """Put the free unknowns where FElupe sees them."""
+    """Put the free unknowns into FElupe's fields; return the two multipliers."""
     values = np.zeros(len(free) + len(held))
     values[free] = x[:-2] * scale
     for part, start in zip(field.fields, [0, *np.cumsum(field.fieldsizes)]):
@@ -53,14 +53,14 @@ def put(x):
 
 
 def forces(x, pressure, *_):
-    """Internal less external forces, and the mean displacements of the rim."""
+    """Return internal less external forces, and the mean displacements of the rim."""
     multipliers = put(x)
     load.update(pressure)
     return np.append(fem.tools.fun([solid, load], field)[free] + C.T @ multipliers, C @ x[:-2])
 
 
 def by_state(x, pressure, *_):
-    """Their derivative by the state."""
+    """Return the derivative of `forces` by the state."""
     global iterations
     iterations += 1
     put(x)
@@ -70,7 +70,7 @@ def by_state(x, pressure, *_):
 
 
 def by_pressure(x, pressure, *_):
-    """Their derivative by the pressure."""
+    """Return the derivative of `forces` by the pressure."""
     put(x)
     load.update(1.0)
     return np.append(fem.tools.fun([load], field)[free], [0.0, 0.0])

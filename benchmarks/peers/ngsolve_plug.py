@@ -32,7 +32,7 @@ setup = clock.lap()
 
 
 def lift(_, rise):
-    """Take the plug up."""
+    """Move the plug up."""
     state.vec.data += rise * up.vec
 
 

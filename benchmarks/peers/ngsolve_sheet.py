@@ -1,17 +1,17 @@
-"""A sheet with NGSolve, axisymmetric: what the scripts for NGSolve share."""
+"""An axisymmetric sheet with NGSolve, for its scripts."""
 
 from ngsolve import Det, Grad, Id, InnerProduct, log, x
 from ngsolve.meshes import MakeStructured2DMesh
 
 
 def triangles(elements, radius, thickness):
-    """The triangles of formingx: elements along the radius and through the thickness."""
+    """Return the triangles of formingx: elements along the radius and through the thickness."""
     n, m = elements
     return MakeStructured2DMesh(quads=False, nx=n, ny=m, mapping=lambda s, t: (radius * s, thickness * t))
 
 
 def energy(u, p, c10, c01=0.0):
-    """Incompressible Mooney, no stress at rest, times R: of displacement u and pressure p."""
+    """Return the energy density times R of an incompressible Mooney body with displacement u and pressure p."""
     F, hoop = Id(2) + Grad(u), 1 + u[0] / x
     J, in_plane = Det(F) * hoop, InnerProduct(F, F)
     W = c10 * (in_plane + hoop**2 - 3) - 2 * (c10 + 2 * c01) * log(J) + p * (J - 1)
@@ -21,16 +21,18 @@ def energy(u, p, c10, c01=0.0):
 
 
 def load(u, v):
-    """Work of a unit pressure, which follows the bottom, on v: n da = r (-dz/dR, dr/dR) dR."""
+    """Return the work of a unit follower pressure on the bottom: n da = r (-dz/dR, dr/dR) dR."""
     along = Grad(u).Trace()
     return (x + u[0]) * (-along[1, 0] * v[0] + (1 + along[0, 0]) * v[1])
 
 
 class Steps:
-    """Steps by hand: a guess along the last two states, half the step on failure, longer ones after success.
+    """Load steps with a guess along the last two states, half the step on failure, longer ones after success.
 
     Args:
-        form: of the residual. state: `GridFunction` of (displacement, pressure); inverse: pardiso's, of its free dofs.
+        form: form of the residual.
+        state: `GridFunction` of displacement and pressure.
+        inverse: pardiso's inverse of its free unknowns.
     """
 
     def __init__(self, form, state, inverse):
@@ -39,7 +41,7 @@ class Steps:
         self.accepted = [(0.0, state.vec.CreateVector(copy=True))]
 
     def follow(self, target, step, put):
-        """From 0 to a target; put(value, increment) sets what is driven, before the guess along two states."""
+        """Follow the path from 0 to a target; put(value, increment) sets the load before the guess."""
         now = 0.0
         while now < target:
             ahead = min(now + step, target)
@@ -60,7 +62,7 @@ class Steps:
             step *= min(2.0, 8 / k)
 
     def _correct(self):
-        """Newton's method; the number of iterations, or None."""
+        """Return the number of iterations of Newton's method, or None if it fails."""
         last, n = 1.0, self.state.space.components[0].ndof
         for k in range(1, 21):
             residual = self.form.Apply(self.state.vec)

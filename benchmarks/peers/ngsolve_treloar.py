@@ -47,7 +47,7 @@ iterations = 0
 
 
 def inner(a, b):
-    """Of two displacement fields, over the reference volume."""
+    """Return the inner product of two displacement fields, over the reference volume."""
     return InnerProduct(a, (metric * b).Evaluate())
 
 
@@ -56,7 +56,7 @@ def norm(a, pressure):
 
 
 def linearise(now):
-    """Factorise the tangent at (state, pressure now); returns the change of the state with the pressure."""
+    """Factorise the tangent at (state, pressure now); return the change of the state with the pressure."""
     global iterations
     iterations += 1
     pressure.Set(now)
@@ -67,7 +67,7 @@ def linearise(now):
 
 
 def correct(now, gradient, slope, value):
-    """Newton's method for equilibrium with gradient . state + slope * pressure = value.
+    """Solve for equilibrium with gradient . state + slope * pressure = value, by Newton's method.
 
     Returns the pressure, the change of the state with the pressure, and the number of iterations.
     """

@@ -1,4 +1,4 @@
-"""Treloar's sheet, hinged by the mean of its rim: what every code solves. Standard library only.
+"""Problem data: Treloar's sheet, hinged by the mean displacement of its rim. Standard library only.
 
 Neo-Hookean, W = C10 (I1 - 3), incompressible; R <= RADIUS, 0 <= Z <= THICKNESS; a follower pressure on the bottom, from
 0 through its maximum until the point in the middle of the pole has risen by HEIGHT (pole stretch 8.2). u_R = 0 on the
