@@ -85,7 +85,7 @@ class _UserDefined(_Recorded):
             raise InputError(f"record: {self._name!r} gave {found!r}: must be a number") from None
 
 
-def own(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
+def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
     """Return the output quantities that a user adds to the columns of a run.
 
     Args:
@@ -191,14 +191,14 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         sizes = {"contact_length": resultants.length} if scene.kinematics.components == 2 else {
             "contact_area": resultants.area, "reference_contact_area": resultants.length}
         for column, size in sizes.items():
-            found[column] = _Nodal(problem, lambda c, *at, size=size: factors[c] * size(c, *at), sum)
+            found[column] = _Nodal(problem, lambda c, *state, size=size: factors[c] * size(c, *state), sum)
         found["penetration"] = _Nodal(problem, resultants.penetration, max)
         tooling = Tooling.of_problem(problem)
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
         for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # moving tools come first
-            force = _Nodal(problem, lambda c, *at: factors[c] * (resultants.force(c, *at) @ resisting(c.contact)), sum,
-                           tools[name])
+            force = _Nodal(problem, lambda c, *state: factors[c] * (resultants.force(c, *state) @ resisting(c.contact)),
+                           sum, tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:
                 found[f"{name}_force"] = force

@@ -149,16 +149,16 @@ class Sag(Bound):
         self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
         self.size = self._scale = forms.length
         self._so_far: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
-        if (brought := forms.scene.preformed) is not None:
+        if (preformed := forms.scene.preformed) is not None:
             space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
             order = np.argsort(numbers)
             nodes_at = of_space(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
-            self._so_far = (nodes_at - brought.first_places(nodes_at))[:, -1] / forms.length
+            self._so_far = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
 
     def _deepest(self, x: Any) -> tuple[float, int]:
         """Return the sag over the length of the body, and the rank that owns the lowest node; `x`: unknowns."""
-        mine = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
-        found = self._problem.comm.allgather(float(mine))
+        sag = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
+        found = self._problem.comm.allgather(float(sag))
         return max(found), int(np.argmax(found))
 
     def value(self, x, control):

@@ -122,11 +122,11 @@ class ElasticStretches:
                 self._parts.append((compiled, own, len(stretches)))
         self.count = max((count for *_, count in self._parts), default=0)
         if self._parts:
-            at: Any
+            points: Any
             weights: Any
-            at, weights = basix.make_quadrature(forms.domain.basix_cell(), problem.scene.quadrature_degree)
+            points, weights = basix.make_quadrature(forms.domain.basix_cell(), problem.scene.quadrature_degree)
             root = np.sqrt(np.abs(weights))[:, None]
-            basis, at_places = (np.column_stack([np.ones(len(x)), x]) for x in (at, places))
+            basis, at_places = (np.column_stack([np.ones(len(x)), x]) for x in (points, places))
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def now(self, cells: int) -> np.ndarray:

@@ -37,18 +37,18 @@ class Locking(NamedTuple):
     Attributes:
         error: expected relative error of the bending stiffness of the body.
         slenderness: height over width of the triangle with the largest expected error.
-        at: place of this triangle.
+        place: place of this triangle.
     """
 
     error: float
     slenderness: float
-    at: Place
+    place: Place
 
     def __str__(self) -> str:
         share = "several" if self.error > _WRONG else "about one"
         return (f"triangles are up to {self.slenderness:.3g} times taller than wide across the thickness (at"
-                f" {self.at}): the default element locks in them, and bending comes out too stiff, by {share} per cent:"
-                f" use more elements through the thickness (at most 1.5 times taller than wide), fewer along the"
+                f" {self.place}): the default element locks in them, and bending comes out too stiff, by {share} per"
+                f" cent: use more elements through the thickness (at most 1.5 times taller than wide), fewer along the"
                 f" sheet, or MixedPressure(space='P1')")
 
 

@@ -34,7 +34,7 @@ class _View:
 
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
-        self.columns |= standard_columns.own(problem, columns, self.columns)
+        self.columns |= standard_columns.user_defined(problem, columns, self.columns)
         self.profiles, self.stresses = Profiles(problem), Stresses(problem)
         self.admissibility = AdmissibilityCheck(problem)
 

@@ -82,11 +82,12 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
                 depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
-                    at = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
+                    position = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
-                    raise InputError(f"{caller}: tools overlap: {_at(a, where[i])} and {_at(b, where[j])} reach"
-                                     f" {depth[worst]:.6g} into each other at ({axes}) = ({at}); leave one out"
-                                     f" with inactive=[...], or end the travel earlier")
+                    raise InputError(f"{caller}: tools overlap: {_with_travel(a, where[i])} and"
+                                     f" {_with_travel(b, where[j])} reach {depth[worst]:.6g} into each other at"
+                                     f" ({axes}) = ({position}); leave one out with inactive=[...], or end the travel"
+                                     f" earlier")
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
@@ -101,6 +102,6 @@ def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
     return np.concatenate([*(a + parts * (b - a)), points[-1:]])
 
 
-def _at(contact: Contact, travel: float) -> str:
+def _with_travel(contact: Contact, travel: float) -> str:
     """Return a contact and the travel of its tool as text."""
     return f"{contact!r}" + (f" at travel {travel:g}" if contact.direction else "")

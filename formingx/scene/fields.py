@@ -65,7 +65,8 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     else:
         found = np.full(len(points), finite(name, field))
     if not np.all(np.isfinite(found)):
-        raise InputError(f"{name} = {field!r}: is not a finite number at {_at(points, np.isfinite(found), axes)}")
+        raise InputError(f"{name} = {field!r}: is not a finite number at"
+                         f" {_first_false(points, np.isfinite(found), axes)}")
     return found
 
 
@@ -120,30 +121,30 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
         if name in table.units and table.units[name] is not None:
             raise InputError(f"{table.name}: column {name!r} is in {table.units[name]!r}: a temperature is read as it"
                              f" is: turn it into the script's units and leave the unit out of the header")
-    at, T = np.column_stack([table.take(names[k]) for k in axes]), table.take("T")
-    at, place = np.unique(at, axis=0, return_inverse=True)
-    low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)
+    nodes, T = np.column_stack([table.take(names[k]) for k in axes]), table.take("T")
+    nodes, place = np.unique(nodes, axis=0, return_inverse=True)
+    low, high = np.full(len(nodes), np.inf), np.full(len(nodes), -np.inf)
     np.minimum.at(low, place.ravel(), T)
     np.maximum.at(high, place.ravel(), T)
     if np.any(low != high):
         k = int(np.argmax(high - low))
         raise InputError(f"{table.name}: two temperatures, {low[k]:.6g} and {high[k]:.6g}, at"
-                         f" {' and '.join(names[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in at[k])}")
-    requested, spans = points[:, axes], np.ptp(at, axis=0)
+                         f" {' and '.join(names[axis] for axis in axes)} = {', '.join(f'{x:.6g}' for x in nodes[k])}")
+    requested, spans = points[:, axes], np.ptp(nodes, axis=0)
     if len(axes) == 1:
         x, near = requested[:, 0], 1e-9 * spans[0]
-        _inside(table.name, points, names, (x >= at[0, 0] - near) & (x <= at[-1, 0] + near))
-        return np.interp(x, at[:, 0], low)
+        _inside(table.name, points, names, (x >= nodes[0, 0] - near) & (x <= nodes[-1, 0] + near))
+        return np.interp(x, nodes[:, 0], low)
     if spans.min() <= 1e-9 * spans.max():
         name = names[int(np.argmin(spans))]
         raise InputError(f"{table.name}: all its points have the same {name}, and the body is not flat: leave the"
                          f" column {name} out if the temperature is the same along it")
-    centre = at.mean(0)
+    centre = nodes.mean(0)
     inner = centre + (requested - centre) * (1 - 1e-9)         # a point on the outline is inside
     try:
-        found = LinearNDInterpolator(at / spans, low)(inner / spans)
+        found = LinearNDInterpolator(nodes / spans, low)(inner / spans)
     except QhullError:
-        raise InputError(f"{table.name}: its {len(at)} points lie on one line: give {names[0]} and T alone,"
+        raise InputError(f"{table.name}: its {len(nodes)} points lie on one line: give {names[0]} and T alone,"
                          f" {names[1]} and T alone, or points all around the body") from None
     _inside(table.name, points, names, np.isfinite(found))
     return found
@@ -152,10 +153,11 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
 def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
     """Raise an InputError unless the mask `inside` is True for all points; `name` is the name of a file."""
     if not np.all(inside):
-        raise InputError(f"{name}: point {_at(points, inside, axes)} of the body lies outside the points of the file")
+        raise InputError(f"{name}: point {_first_false(points, inside, axes)} of the body lies outside the points of"
+                         f" the file")
 
 
-def _at(points: np.ndarray, fine: np.ndarray, axes: str) -> str:
-    """Return the first point whose entry in the mask `fine` is False, as text with the names of the axes."""
-    first, second = points[np.argmin(fine)]
+def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
+    """Return the first point whose entry in the mask is False, as text with the names of the axes."""
+    first, second = points[np.argmin(mask)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -156,8 +156,9 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
         if kinematics.axisymmetric and axis == 0 or axis >= COORDINATES:      # a flat sheet lies in z = 0
             continue
         low, high = body[:, axis]
-        at = mesh.nodes_of(support.on)[:, axis]
-        ends = [end for end in (low, high) if np.ptp(at) < near and abs(at.mean() - end) < near < high - low]
+        positions = mesh.nodes_of(support.on)[:, axis]
+        flat = np.ptp(positions) < near < high - low
+        ends = [end for end in (low, high) if flat and abs(positions.mean() - end) < near]
         found += [MirrorPlane(axis, float(end), bool(end == low), str(support.on)) for end in ends]
     first = {(plane.axis, plane.above): plane for plane in reversed(found)}.values()
     alone = [plane for plane in first if not any(o.axis == plane.axis and o.above != plane.above for o in first)]

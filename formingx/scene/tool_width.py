@@ -71,9 +71,10 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     way = -near.normal[np.argmax(near.distance)]
     if contact.direction:
         way = contact.way / np.hypot(*contact.way)
-    at = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
+    fractions = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
-    points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1]) for s in (at, np.linspace(0, 1, _PLACES)))
+    points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1])
+                      for s in (fractions, np.linspace(0, 1, _PLACES)))
     travel, furthest = 0.0, 2 * (tool.size + float(np.ptp(ends, axis=(0, 1)).max()))
     for _ in range(_MOVES):
         gap = -float(tool.signed_distance(points.reshape(-1, points.shape[-1]) - travel * way).max())
