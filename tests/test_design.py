@@ -152,11 +152,11 @@ def test_what_is_not_reached_is_said():
     """A wall, a volume and a minimum wall beyond the bounds."""
     design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
     answer = design.fit(wall=1.0, volume=None)
-    assert "within the bounds, would be 0.9 % better" in answer.why
+    assert "within the bounds, would be 0.9 % better" in answer.reason
     wall = answer.best.wall
     assert f"the wanted wall was not reached: wanted 1, reached {wall.mean():.4g} on the mean" in str(answer)
     assert f"the largest deviation is {100 * (wall.min() - 1):+.3g} %, at reference length" in str(answer)
-    assert "It is stopped by bounds: h" in str(answer) and "the volume" not in answer.lack
+    assert "It is stopped by bounds: h" in str(answer) and "the volume" not in answer.missed
     lines = {line.get_label(): line.get_ydata() for line in answer.plot_wall().lines}
     assert np.all(lines["wanted"] == 1.0)
     wanted = 1.01 * design.run().wall.mean()

@@ -24,7 +24,8 @@ class Search:
             be below this share without it.
         damping: Levenberg damping over the largest singular value of the sensitivities.
         damping_measured: the same for the fit to a measured wall, which contains scatter.
-        min_improvement: the search ends after two runs that each lower the cost by less than this part.
+        min_improvement: the search ends after two runs that each lower the cost by less than this part, or before a
+            step for which the derivatives predict so little.
         shortest_step: smallest part of a step that is tried, after halving a step that brought no improvement.
     """
 

@@ -43,9 +43,9 @@ class Answer:
         runs: all successful runs, in order.
         failed: error messages of the failed runs.
         inside: mask of the nodes that count in the search, shape (k,).
-        why: reason for the end of the search, as text.
+        reason: reason for the end of the search, as text.
         predicted: wall of the best run as predicted by the derivatives of the run before it, shape (k,), length.
-        lack: text that names the missed targets (volume, wall or minimum wall) and the reason; "" if all were met.
+        missed: text that names the missed targets (volume, wall or minimum wall) and the reason; "" if all were met.
         wanted: wanted wall at the m nodes that count, shape (m,), length; None if no wall was wanted.
         measured: the `MeasuredWall` of a fit, or None.
     """
@@ -55,9 +55,9 @@ class Answer:
     runs: list[DesignRun]
     failed: list[str]
     inside: np.ndarray
-    why: str
+    reason: str
     predicted: np.ndarray
-    lack: str = ""
+    missed: str = ""
     wanted: np.ndarray | None = None
     measured: Any = None
 
@@ -132,7 +132,8 @@ class Answer:
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
         deviation = abs(self.predicted - self.best.wall)[self.inside].max() / after.mean()
-        lines = [f"{self.paths} runs" + f", of which {len(self.failed)} failed" * bool(self.failed) + f"; {self.why}",
+        failed = f", of which {len(self.failed)} failed" * bool(self.failed)
+        lines = [f"{self.paths} runs{failed}; {self.reason}",
                  f"{'':24}{'before':>12}{'after':>12}",
                  f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",
                  f"{'minimum wall':24}{before.min():12.5g}{after.min():12.5g}",
@@ -151,7 +152,7 @@ class Answer:
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(absent)}" for absent in [self.without_effect()] if absent]
         lines += [f"the best run: {found.text}" for found in alarming(self.best.path.findings())]
-        return "\n".join([*lines, *[self.lack] * bool(self.lack), *(f"failed: {text}" for text in self.failed)])
+        return "\n".join([*lines, *[self.missed] * bool(self.missed), *(f"failed: {text}" for text in self.failed)])
 
     __repr__ = __str__
 

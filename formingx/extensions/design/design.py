@@ -168,14 +168,14 @@ class Design:
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, taken, predicted, before = first, [first], first.wall, 1.0
         notes: list[str] = []
-        why = f"runs = {most} were used up"
+        reason = f"runs = {most} were used up"
         while len(taken) + len(notes) < most:
             try:
                 residual, jacobian = target.residual(best)
             except InputError as error:
                 if best is first:
                     raise
-                why = str(error)
+                reason = str(error)
                 break
             if not np.any(np.abs(jacobian * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
@@ -186,7 +186,7 @@ class Design:
             gain = np.sqrt(np.mean((jacobian @ step) ** 2))
             better = 1 - np.sum((residual + jacobian @ step) ** 2) / np.sum(residual**2)
             if gain < good or better < SEARCH.min_improvement:
-                why = f"the next step would change the wall by {gain:.1e}" if gain < good else (
+                reason = f"the next step would change the wall by {gain:.1e}" if gain < good else (
                     f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
@@ -200,18 +200,18 @@ class Design:
                     notes.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                why = "no shorter step brings an improvement" if share < SEARCH.shortest_step else why
+                reason = "no shorter step brings an improvement" if share < SEARCH.shortest_step else reason
                 break
             predicted = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - target.cost(new) / target.cost(best)
             best = new
             if max(gained, before) < SEARCH.min_improvement:     # a single small improvement may precede a larger one
-                why = f"the last run was {100 * gained:.1f} % better"
+                reason = f"the last run was {100 * gained:.1f} % better"
                 break
             before = gained
             log.info("design: run %d, cost %.3g", len(taken), target.cost(best))
         missed = [missed_target("volume", target.volume, best.volume), target.shortfall(best)]
-        return Answer(first, best, taken, notes, target.inside, why, predicted, "\n".join(filter(None, missed)),
+        return Answer(first, best, taken, notes, target.inside, reason, predicted, "\n".join(filter(None, missed)),
                       target.wanted, target.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
@@ -239,7 +239,7 @@ class Design:
         first = self._run(self.parameters.start.copy())
         inside = mask_of_range(first, within)
         unit = min(least, first.wall[inside].min())
-        best, taken, predicted, reach, why = first, [first], first.wall, 0.25, f"runs = {most} were used up"
+        best, taken, predicted, reach, reason = first, [first], first.wall, 0.25, f"runs = {most} were used up"
         notes: list[str] = []
 
         def cost(run: DesignRun) -> float:
@@ -251,7 +251,7 @@ class Design:
             except InputError as error:
                 if best is first:
                     raise
-                why = str(error)
+                reason = str(error)
                 break
             grows = best.derivative("volume")[1][0] / first.volume
             n = len(size)
@@ -264,7 +264,7 @@ class Design:
             step = found.x[:n] * size
             gain = cost(best) - (best.volume / first.volume + found.fun)
             if gain < 1e-5:
-                why = f"the next step would save {max(gain, 0.0):.1e} of the volume"
+                reason = f"the next step would save {max(gain, 0.0):.1e} of the volume"
                 break
             try:
                 new = self._run(np.clip(best.vector + step, low, high))
@@ -276,8 +276,8 @@ class Design:
                 notes.append(str(error).splitlines()[0])
             reach /= 4
             if reach < 1e-4:
-                why = "no shorter step brings an improvement"
+                reason = "no shorter step brings an improvement"
                 break
         thinnest = best.wall[inside].min()
-        return Answer(first, best, taken, notes, inside, why, predicted,
+        return Answer(first, best, taken, notes, inside, reason, predicted,
                       missed_target("minimum wall", least, min(thinnest, least)))

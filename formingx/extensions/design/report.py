@@ -40,11 +40,11 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "minimum wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
              (str(answer.paths), "runs were taken")]
-    notes = [("bad", text) for text in [answer.lack, *(f.text for f in alarming(best.path.findings()))]]
+    notes = [("bad", text) for text in [answer.missed, *(f.text for f in alarming(best.path.findings()))]]
     notes += [("", f"A run failed: {text}") for text in answer.failed]
     notes += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     notes += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
-    how = [f"Why it ended: {answer.why}.",
+    how = [f"Why it ended: {answer.reason}.",
            f"The run before the best predicted its wall to {100 * deviation:.2g} %.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
