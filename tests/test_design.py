@@ -161,7 +161,7 @@ def test_what_is_not_reached_is_said():
     assert np.all(lines["wanted"] == 1.0)
     wanted = 1.01 * design.run().wall.mean()
     near = design.fit(wall=wanted, volume=None, runs=3)
-    assert near.wanted.mean() == pytest.approx(wanted) and near.best.wall.mean() == pytest.approx(wanted, rel=1e-3)
+    assert near.target_wall.mean() == pytest.approx(wanted) and near.best.wall.mean() == pytest.approx(wanted, rel=1e-3)
     held = design.fit(wall=1.2 * design.run().wall.mean(), runs=3)
     assert "It is stopped by the volume, which is held at" in str(held)
     assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))

@@ -74,7 +74,7 @@ class WallTarget:
     Attributes:
         inside: mask of the nodes that count, shape (k,).
         volume: prescribed reference volume, length^3, or None.
-        wanted: wanted thickness at the m nodes that count, shape (m,), length; None for an even or a measured wall.
+        target_wall: wanted thickness at the m nodes that count, shape (m,), length; None for an even or measured wall.
         measured: the `MeasuredWall` of a fit, or None.
         damping: Levenberg damping over the largest singular value of the sensitivities.
 
@@ -87,12 +87,12 @@ class WallTarget:
 
     def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, volume: float | None):
         self.inside, self.volume = mask_of_range(run, within), volume
-        self.wanted: np.ndarray | None = None
+        self.target_wall: np.ndarray | None = None
         if wall is not None:
             s = run.profile.reference_length[self.inside]
-            self.wanted = (values("fit: wall", wall, {"reference length": s}) if callable(wall)
+            self.target_wall = (values("fit: wall", wall, {"reference length": s}) if callable(wall)
                            else np.full(len(s), finite("fit: wall", wall)))
-            if not np.all(self.wanted > 0):
+            if not np.all(self.target_wall > 0):
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
@@ -112,10 +112,10 @@ class WallTarget:
         """
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
-        target = wall.mean() if self.wanted is None else self.wanted
+        target = wall.mean() if self.target_wall is None else self.target_wall
         residual = wall / target - 1
         slopes = jacobian / np.reshape(target, (-1, 1))
-        if self.wanted is None:
+        if self.target_wall is None:
             slopes -= np.outer(wall / target**2, jacobian.mean(0))
         return self._with_volume(run, residual, slopes)
 
@@ -147,7 +147,7 @@ class WallTarget:
             Cost, dimensionless; the best run has the lowest.
         """
         wall = run.wall[self.inside]
-        residual = np.mean((wall / (wall.mean() if self.wanted is None else self.wanted) - 1) ** 2)
+        residual = np.mean((wall / (wall.mean() if self.target_wall is None else self.target_wall) - 1) ** 2)
         return float(residual + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
@@ -159,16 +159,16 @@ class WallTarget:
         Returns:
             The text; "" if all deviations are below 1 %, or no wall was wanted.
         """
-        if self.wanted is None:
+        if self.target_wall is None:
             return ""
         wall = run.wall[self.inside]
-        deviation = wall / self.wanted - 1
+        deviation = wall / self.target_wall - 1
         worst = int(np.argmax(np.abs(deviation)))
         if abs(deviation[worst]) < SEARCH.wall_tolerance:
             return ""
         s = run.profile.reference_length[self.inside]
-        return (f"the wanted wall was not reached: wanted {_range(self.wanted)}, reached {_range(wall)}; the largest"
-                f" deviation is {100 * deviation[worst]:+.3g} %, at reference length {s[worst]:.4g}."
+        return (f"the wanted wall was not reached: wanted {_range(self.target_wall)}, reached {_range(wall)}; the"
+                f" largest deviation is {100 * deviation[worst]:+.3g} %, at reference length {s[worst]:.4g}."
                 f" {self._limits(run)}.")
 
     def _limits(self, run: DesignRun) -> str:
@@ -182,7 +182,7 @@ class WallTarget:
             return f"No further step is known: {error}"
         p = run.parameters
         low, high = (p.low - run.vector) / p.size - 1e-12, (p.high - run.vector) / p.size + 1e-12
-        m = len(self.wanted) if self.wanted is not None else len(residual)
+        m = len(self.target_wall) if self.target_wall is not None else len(residual)
         far = np.full(len(p.size), np.inf)
         now, step = _deviation(residual, jacobian * p.size, m, low, high)
         free = _deviation(residual[:m], jacobian[:m] * p.size, m, low, high)[0] if self.volume is not None else now

@@ -46,7 +46,7 @@ class Answer:
         reason: reason for the end of the search, as text.
         predicted: wall of the best run as predicted by the derivatives of the run before it, shape (k,), length.
         missed: text that names the missed targets (volume, wall or minimum wall) and the reason; "" if all were met.
-        wanted: wanted wall at the m nodes that count, shape (m,), length; None if no wall was wanted.
+        target_wall: wanted wall at the m nodes that count, shape (m,), length; None if no wall was wanted.
         measured: the `MeasuredWall` of a fit, or None.
     """
 
@@ -58,7 +58,7 @@ class Answer:
     reason: str
     predicted: np.ndarray
     missed: str = ""
-    wanted: np.ndarray | None = None
+    target_wall: np.ndarray | None = None
     measured: Any = None
 
     @cached_property
@@ -139,9 +139,9 @@ class Answer:
                  f"{'minimum wall':24}{before.min():12.5g}{after.min():12.5g}",
                  f"{'mean wall':24}{before.mean():12.5g}{after.mean():12.5g}",
                  f"{'volume':24}{self.before.volume:12.5g}{self.best.volume:12.5g}"]
-        if self.wanted is not None:
-            lines.insert(3, f"{'wanted wall, mean':24}{'':12}{self.wanted.mean():12.5g}")
-            a, b = (np.abs(wall / self.wanted - 1).max() for wall in (before, after))
+        if self.target_wall is not None:
+            lines.insert(3, f"{'wanted wall, mean':24}{'':12}{self.target_wall.mean():12.5g}")
+            a, b = (np.abs(wall / self.target_wall - 1).max() for wall in (before, after))
             lines.insert(4, f"{'largest deviation, %':24}{100 * a:12.4g}{100 * b:12.4g}")
         if self.measured is not None:
             a, b = (self.measured.compare(run.path).rms_percent for run in (self.before, self.best))
@@ -170,8 +170,9 @@ class Answer:
             axes = figure(width=7)[1]
         for run, label, colour in ((self.before, "before", "0.6"), (self.best, "after", "C0")):
             axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
-        if self.wanted is not None:
-            axes.plot(self.best.profile.reference_length[self.inside], self.wanted, "k--", linewidth=1, label="wanted")
+        if self.target_wall is not None:
+            s = self.best.profile.reference_length[self.inside]
+            axes.plot(s, self.target_wall, "k--", linewidth=1, label="wanted")
         if self.measured is not None:
             found = self.measured.compare(self.best.path)
             axes.plot(found.reference_length, found.measured, "ko", markersize=4, label="measured")

@@ -212,7 +212,7 @@ class Design:
             log.info("design: run %d, cost %.3g", len(taken), target.cost(best))
         missed = [missed_target("volume", target.volume, best.volume), target.shortfall(best)]
         return Answer(first, best, taken, notes, target.inside, reason, predicted, "\n".join(filter(None, missed)),
-                      target.wanted, target.measured)
+                      target.target_wall, target.measured)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
         """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.

@@ -180,8 +180,8 @@ def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
     s = answer.best.profile.reference_length
     axes.plot(s, answer.before.wall, color="0.6", label="before")
     axes.plot(s, answer.predicted, "--", color="C1", linewidth=1, label="predicted by the run before the best")
-    if answer.wanted is not None:
-        axes.plot(s[answer.inside], answer.wanted, "k--", linewidth=1, label="wanted")
+    if answer.target_wall is not None:
+        axes.plot(s[answer.inside], answer.target_wall, "k--", linewidth=1, label="wanted")
     if not np.all(answer.inside):
         axes.axvspan(*s[answer.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
     _line(axes, answer.best, "C0", "after", spread, deviations, units)
