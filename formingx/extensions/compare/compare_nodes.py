@@ -44,17 +44,17 @@ class NodalComparison:
 
     @property
     def difference(self) -> np.ndarray:
-        """Norm of the displacement difference at each node, shape (n,), length."""
+        """Norm of the difference between both programs' displacements at each node, shape (n,), length."""
         return np.linalg.norm(self.theirs - self.ours, axis=1)
 
     @property
     def maximum(self) -> float:
-        """Largest norm of the displacement difference over the nodes, length."""
+        """Largest norm of the difference between both programs' displacements at a node, length."""
         return float(self.difference.max())
 
     @property
     def rms(self) -> float:
-        """Root mean square of the norm of the displacement difference over the nodes, length."""
+        """Root mean square over the nodes of the difference between both programs' displacements, length."""
         return float(np.sqrt(np.mean(self.difference**2)))
 
     def __str__(self) -> str:

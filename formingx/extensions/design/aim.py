@@ -137,8 +137,8 @@ class WallTarget:
     def cost(self, run: DesignRun) -> float:
         """Return the cost by which runs of a search are compared.
 
-        It is the mean square of the relative deviations of the wall, plus the square of the relative deviation of a
-        prescribed volume.
+        It is the mean square of the relative deviations of the thickness from the wanted thickness; for an even wall,
+        from the mean thickness. The square of the relative deviation of a prescribed volume is added.
 
         Args:
             run: a run of the search.

@@ -74,9 +74,9 @@ def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray,
         triangles: vertex numbers of m triangles, shape (m, 3).
 
     Returns:
-        Vertex numbers of the first edges of all triangles, then of the second and the third edges, in the order of the
-        triangle, shape (3 m, 2); vertex numbers of the k distinct edges, in ascending order, shape (k, 2); number of
-        the distinct edge of each of the 3 m edges, shape (3 m,); number of triangles at each distinct edge, shape (k,).
+        Edges of all triangles in the order of their vertices, the first of each triangle first, shape (3 m, 2). Then
+        the k distinct edges with ascending vertex numbers, shape (k, 2). Then the number of the distinct edge for each
+        of the 3 m edges, shape (3 m,). Last the number of triangles at each distinct edge, shape (k,).
     """
     directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     edges, numbers, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)

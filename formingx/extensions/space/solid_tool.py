@@ -24,7 +24,9 @@ _PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
-    """Rigid tool in three dimensions.
+    """Rigid tool in three dimensions, the base class of swept profiles and of surfaces from STL files.
+
+    A subclass defines `_distance` and `_surface`.
 
     Attributes:
         components: number of coordinates, 3.
@@ -107,14 +109,15 @@ class Swept(SolidTool):
     """Rigid tool whose profile (r, z) is swept along a curve in the plane of x and y.
 
     The kind of the tool determines the coordinate r of a position. Of a revolved tool r is the distance from the axis
-    x = y = 0. Of a tool extruded along y it is x, along x it is y. Of a box it is min(half) on the outline of a rounded
-    rectangle and 0 on its middle line, and curves of constant r are parallel to the outline.
+    x = y = 0. Of a tool extruded along y it is x, along x it is y. Of a box it is min(half) on the outline of a
+    rectangle with rounded corners. There curves of constant r are parallel to this outline, and r is 0 on its middle
+    line.
 
     Args:
         profile: profile in the plane (r, z), with the solid to its left.
         kind: "revolved", "extruded" or "box".
         half: half widths of the rectangle along x and y, length, for "box".
-        corner: radius of its corners, length, for "box".
+        corner: radius of the corners of the rectangle, length, for "box".
         along: axis along which the profile is extruded, "x" or "y", for "extruded".
     """
 
