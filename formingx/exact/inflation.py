@@ -187,7 +187,9 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
 
 def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
-    """Return the first pressure maximum of an inflated circular membrane, or None below a pole stretch of 12.
+    """Return the first pressure maximum of an inflated circular membrane with a fixed rim.
+
+    The search ends at a pole stretch of 12.
 
     Args:
         radius: reference radius, length.
@@ -196,7 +198,7 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
         c01: Mooney constant, stress.
 
     Returns:
-        The pole stretch and the state at the maximum.
+        The pole stretch and the state at the maximum, or None if the pressure has no maximum up to there.
 
     >>> from formingx.exact.inflation import membrane_limit_point
     >>> stretch, state = membrane_limit_point(radius=1.25, thickness=0.082, c10=2.0)
@@ -311,13 +313,15 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
 
 
 def thick_sphere_limit_point(**wall: float) -> tuple[float, ThickWallState] | None:
-    """Return the first pressure maximum of an inflated thick sphere, or None below an inner stretch of 20.
+    """Return the first pressure maximum of an inflated thick sphere.
+
+    The search ends at a stretch of 20 of the inner face.
 
     Args:
         wall: arguments inner_radius, outer_radius, c10, c01 and R of `thick_wall`.
 
     Returns:
-        The inner stretch and the state at the maximum.
+        The inner stretch and the state at the maximum, or None if the pressure has no maximum up to there.
     """
     from scipy.optimize import minimize_scalar
 

@@ -80,7 +80,7 @@ class Body:
 
     @property
     def load(self) -> float:
-        """Load of the body in its present state."""
+        """Load of the body in its present state: a nominal stress, a pressure, or p R0/H0 of a balloon, stress."""
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
@@ -131,7 +131,7 @@ class Body:
     def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
         """Return the times at which the degree of freedom s reaches given values under the present load.
 
-        The body must creep up to `end`: there may be no s before at which it stays in equilibrium.
+        At no s before `end` may the relaxed body be in equilibrium under this load, because creep would end there.
 
         Args:
             targets: values of s, shape (n,).

@@ -24,7 +24,7 @@ def own_cells(domain: Any) -> np.ndarray:
 
 
 def of_mesh(domain: Any) -> np.ndarray:
-    """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, COORDINATES), length."""
+    """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, 2), length."""
     return domain.geometry.x[:, :COORDINATES]
 
 
@@ -36,7 +36,7 @@ def span(domain: Any, comm: Any) -> np.ndarray:
         comm: MPI communicator.
 
     Returns:
-        Coordinates, shape (2, COORDINATES), length.
+        Coordinates, shape (2, 2), length: lowest first.
     """
     X = of_mesh(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
@@ -44,7 +44,7 @@ def span(domain: Any, comm: Any) -> np.ndarray:
 
 
 def of_space(space: Any) -> np.ndarray:
-    """Return the reference positions of the (blocked) unknowns of a function space, shape (n, COORDINATES), length."""
+    """Return the reference positions of the (blocked) unknowns of a function space, shape (n, 2), length."""
     return space.tabulate_dof_coordinates()[:, :COORDINATES]
 
 

@@ -128,8 +128,8 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
 
     Args:
         file: name of the file, for messages.
-        layers: {name: triangles, shape (m, 6)}, rows of the nodes.
-        boundaries: {name: edges, shape (k, 3)}: first, last and middle node.
+        layers: {name: triangles, shape (m, 6)}, indices of their nodes.
+        boundaries: {name: edges, shape (k, 3)}, indices of first, last and middle node.
         numbers: node numbers in the file, shape (n,), for messages.
 
     Raises:
