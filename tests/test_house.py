@@ -161,7 +161,7 @@ def test_the_solver_sees_equations_alone():
 
 def test_protocols_say_what_they_take():
     """No argument or result of an interface is just anything, but what a history remembers and matplotlib gives."""
-    memories = {"get", "put.memory", "save.memory", "load", "carry", "carry.memory", "carry.source"}
+    memories = {"get", "put.memory", "save.memory", "load", "transfer", "transfer.memory", "transfer.source"}
     found = set()
     for file in (file for file in FILES if name_of(file) != "figures"):
         for kind in (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ClassDef)):

@@ -244,7 +244,7 @@ def axial_stress(path, state):
     """The integral of the stress along Z over the body: minus the force of a plate times its height."""
     import basix
 
-    from formingx.forms.carry import in_own_cells
+    from formingx.forms.transfer import in_own_cells
     problem = path.segment(state).problem
     forms = problem.forms
     places, weights = map(np.asarray, basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree))
@@ -381,7 +381,7 @@ def test_a_deformation_is_carried_to_other_elements():
     import ufl
 
     from formingx.extensions.remeshing.preformed import Preformed
-    from formingx.forms.carry import in_own_cells
+    from formingx.forms.transfer import in_own_cells
     places = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
 
     def deformation(r, z):

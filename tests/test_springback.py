@@ -12,7 +12,7 @@ from test_solidification import BASE, air, balance, block, draw
 import formingx as fx
 from formingx.extensions.heat import cooling
 from formingx.extensions.release.part import part_along
-from formingx.forms.carry import take_fields
+from formingx.forms.transfer import take_fields
 from formingx.problem.problem import Problem
 
 

@@ -9,7 +9,7 @@ from test_contact import cup, form
 from test_cooling import press, pressed
 
 import formingx as fx
-from formingx.forms.carry import Carrier, carry, fitted_shapes
+from formingx.forms.transfer import MovingLeastSquares, fitted_tensors, transfer_histories
 from formingx.problem.problem import Problem
 
 
@@ -20,16 +20,17 @@ def test_quadratics_are_exact_and_other_functions_converge_with_order_three():
         R, Z = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 0.3, n // 3))
         source = np.column_stack([R.ravel(), Z.ravel()])
         source += rng.normal(0, 0.1 / n, source.shape)
-        carrier = Carrier(MPI.COMM_SELF, source, target)
+        interpolation = MovingLeastSquares(MPI.COMM_SELF, source, target)
 
         def smooth(X):
             return np.sin(5 * X[:, 0]) * np.exp(X[:, 1])
 
         def quadratic(X):
             return 1 + X[:, 0] - 2 * X[:, 1] + 3 * X[:, 0] * X[:, 1] + X[:, 1] ** 2
-        assert np.abs(carrier.fitted(quadratic(source)) - quadratic(target)).max() < 1e-12
-        errors.append(np.sqrt(np.mean((carrier.fitted(smooth(source)) - smooth(target)) ** 2)))
-        assert Carrier(MPI.COMM_SELF, source, source).fitted(smooth(source)) == pytest.approx(smooth(source), rel=1e-12)
+        assert np.abs(interpolation.fitted(quadratic(source)) - quadratic(target)).max() < 1e-12
+        errors.append(np.sqrt(np.mean((interpolation.fitted(smooth(source)) - smooth(target)) ** 2)))
+        same = MovingLeastSquares(MPI.COMM_SELF, source, source)
+        assert same.fitted(smooth(source)) == pytest.approx(smooth(source), rel=1e-12)
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 2.5), errors
 
 
@@ -50,7 +51,7 @@ def test_strains_since_a_past_state_are_carried_as_logarithms():
         C = np.swapaxes(F, 1, 2) @ (v * np.exp(w)[:, None]) @ np.swapaxes(v, 1, 2) @ F
         return np.stack([C[:, 0, 0], C[:, 1, 1], C[:, 0, 1], C[:, 2, 2]], axis=1), F
     (values, there), (wanted, here) = shapes(source), shapes(target)
-    found = fitted_shapes(Carrier(MPI.COMM_SELF, source, target), values, there, here)
+    found = fitted_tensors(MovingLeastSquares(MPI.COMM_SELF, source, target), values, there, here)
     assert found == pytest.approx(wanted, rel=1e-9, abs=1e-9)
     assert (found[:, 0] * found[:, 1] - found[:, 2] ** 2) * found[:, 3] == pytest.approx(np.ones(50), rel=1e-9)
 
@@ -70,7 +71,7 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
     assert here.last.time == pytest.approx(there.last.time)
     for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
         with problem.state_context(path.last):
-            carry(other.problem, other.last, problem, path.last.x, path.last.control)
+            transfer_histories(other.problem, other.last, problem, path.last.x, path.last.control)
             found, = problem.memory
         wanted, = path.last.memory
         assert found.time == wanted.time
@@ -84,7 +85,7 @@ def test_temperatures_and_the_lines_of_tools():
     memory = path.last.memory
     T = memory[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
     there = replace(path.last, memory=[*memory[:-1], T])
-    carry(path.problem, there, fine, np.zeros(fine.x.getLocalSize()), 0.0)
+    transfer_histories(path.problem, there, fine, np.zeros(fine.x.getLocalSize()), 0.0)
     body, found = fine.histories[-1]._body, fine.memory[-1]
     assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
     assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
@@ -109,7 +110,7 @@ def parts(scene, elements):
 def test_contact_comes_back_as_it_was(points):
     path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
     here, kept = Problem(path.problem.scene), path.last.memory[0]
-    carry(path.problem, path.last, here, path.last.x, path.last.control)
+    transfer_histories(path.problem, path.last, here, path.last.x, path.last.control)
     found = here.memory[0]
     touched = kept.history.distance > -here.contacts[0].law.theta
     assert touched.sum() > 3 and np.abs(kept.history.slip).max() > 0

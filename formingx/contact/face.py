@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..forms.carry import Carrier
 from ..forms.history import Start
+from ..forms.transfer import MovingLeastSquares
 from ..physics.contact import Contact
 from ..physics.contact_law import ContactHistory, Tractions
 from .increment import Increment
@@ -422,7 +422,7 @@ class FaceContact:
         penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
         return Memory(history, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
-    def carry(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
+    def transfer(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
         """Return the history variables of a face of another mesh, transferred to this face.
 
@@ -437,11 +437,11 @@ class FaceContact:
         """
         if memory is None:
             return None
-        carrier, history = Carrier(self.comm, mapping(source.points), self.points), memory.history
-        distance, arrived, penalty = (carrier.all(values)[carrier.nearest] for values in
+        interpolation, history = MovingLeastSquares(self.comm, mapping(source.points), self.points), memory.history
+        distance, arrived, penalty = (interpolation.all(values)[interpolation.nearest] for values in
                                       (history.distance, memory.arrived, memory.penalty))
         touched, position, theta = distance > -source.law.theta, self.positions(x, control), self.law.theta
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
-        slip = np.where(touched, carrier.fitted(history.slip), 0.0)
+        slip = np.where(touched, interpolation.fitted(history.slip), 0.0)
         distance = np.where(touched, distance * theta / source.law.theta, free)
         return Memory(ContactHistory(position, distance, slip, position), arrived, penalty)

@@ -11,7 +11,7 @@ import ufl
 from ..mesh.triangles import shape_quality
 from ..physics.kinematics import BLOCK
 from ..ranks import gathered
-from .carry import in_own_cells
+from .transfer import in_own_cells
 
 _OUTLINE = [0, 5, 1, 3, 2, 4]          # nodes of a P2 triangle around its edge, DOLFINx order
 

@@ -30,7 +30,7 @@ class History(Protocol):
     - `advance` alone accepts a state.
     - `get` and `put` go to another accepted state and return.
     - `save` and `load` write to and read from a file, on any number of ranks.
-    - `carry` transfers the variables to a problem of the same body on another mesh.
+    - `transfer` transfers the variables to a problem of the same body on another mesh.
 
     The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any
     ranks.
@@ -85,7 +85,7 @@ class History(Protocol):
             InputError: the data do not match this scene.
         """
 
-    def carry(self, source: Any, memory: Any, x: np.ndarray, control: float,
+    def transfer(self, source: Any, memory: Any, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
         """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 

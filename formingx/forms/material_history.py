@@ -12,8 +12,8 @@ import ufl
 from .. import _compat
 from ..errors import InputError
 from ..ranks import gathered
-from .carry import Carrier, fitted_shapes, shapes_of
 from .history import Start
+from .transfer import MovingLeastSquares, fitted_tensors, isochoric_gradients
 
 
 class InternalVariables(NamedTuple):
@@ -140,7 +140,7 @@ class MaterialHistory:
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
         return InternalVariables(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
-    def carry(self, source: MaterialHistory, memory: InternalVariables, x: np.ndarray, control: float,
+    def transfer(self, source: MaterialHistory, memory: InternalVariables, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables of the same material on another mesh; collective.
 
@@ -154,14 +154,15 @@ class MaterialHistory:
         Returns:
             Values that `put` accepts.
         """
-        carrier = Carrier(self._forms.comm, mapping(source.points), self.points)
+        interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         shapes = self._terms.material.shapes
-        F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)] if shapes else []
+        F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places)
+             for entry in (source, self)] if shapes else []
 
         def carried(name: str, values: np.ndarray) -> np.ndarray:
             if name not in shapes:
-                return carrier.fitted(values)
-            return fitted_shapes(carrier, values, *(F if shapes[name] > 0 else [
+                return interpolation.fitted(values)
+            return fitted_tensors(interpolation, values, *(F if shapes[name] > 0 else [
                 np.linalg.inv(f).swapaxes(1, 2) for f in F]))
         return _unchangeable(InternalVariables(memory.time, {
             name: carried(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])

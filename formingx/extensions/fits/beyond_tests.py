@@ -12,7 +12,7 @@ import ufl
 from ... import _compat
 from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
-from ...forms.carry import shapes_of
+from ...forms.transfer import isochoric_gradients
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from ...ranks import gathered
@@ -110,7 +110,7 @@ def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.n
         reference volumes of the points, shape (n,).
     """
     forms, cells = problem.forms, terms.own_cells
-    F = shapes_of(forms, cells, terms.places)
+    F = isochoric_gradients(forms, cells, terms.places)
     squares = np.linalg.eigvalsh(F.transpose(0, 2, 1) @ F)[:, ::-1]
     rule = basix.make_quadrature(forms.domain.basix_cell(), forms.scene.quadrature_degree)[1]
     size = len(forms.X)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...errors import ConvergenceError, InputError
 from ...findings import Finding
-from ...forms.carry import Carrier
 from ...forms.history import Start
+from ...forms.transfer import MovingLeastSquares
 from ...ranks import gathered
 from ...values.temperature import ABSOLUTE_ZERO
 from . import stepping
@@ -265,7 +265,7 @@ class CoolingHistory:
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
-    def carry(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
+    def transfer(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
         """Interpolate a state of the heat equation on another mesh to this one, after the material histories.
 
@@ -280,9 +280,10 @@ class CoolingHistory:
             A state for `put`.
         """
         comm, before = self._problem.comm, memory.before
-        to_body = Carrier(comm, mapping(source._body.points), self._body.points).fitted
-        touched = zip(source._body.tool_contacts, memory.lines, strict=True) if self._body.tool_contacts else ()
-        lines = [Carrier(comm, mapping(other.points), touch.points).fitted(kept)  # a released body has no tools
+        to_body = MovingLeastSquares(comm, mapping(source._body.points), self._body.points).fitted
+        touched = (zip(source._body.tool_contacts, memory.lines, strict=True)
+                   if self._body.tool_contacts else ())     # a released body has no tools
+        lines = [MovingLeastSquares(comm, mapping(other.points), touch.points).fitted(kept)
                  for touch, (other, kept) in zip(self._body.tool_contacts, touched, strict=True)]
         power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
         return HeatState(memory.time, to_body(memory.temperature), lines, memory.step, power,

@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 from ... import _compat
 from ...errors import InputError
-from ...forms.carry import Carrier, fitted_shapes, shapes_of
 from ...forms.history import Start
+from ...forms.transfer import MovingLeastSquares, fitted_tensors, isochoric_gradients
 from ...materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from ...ranks import gathered
 
@@ -150,7 +150,7 @@ class PastStates:
         self.put(StoredStates(time, tuple(states[k] for k in chosen),
                               None if smallest_h is None else smallest_h[chosen]))
 
-    def carry(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
+    def transfer(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
               mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Interpolate the past states of a run on another mesh to this mesh; collective.
 
@@ -165,13 +165,13 @@ class PastStates:
         Returns:
             The history variables on this mesh.
         """
-        carrier = Carrier(self._forms.comm, mapping(source.points), self.points)
-        F = [shapes_of(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
+        interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
+        F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 
         def fitted(values: np.ndarray) -> np.ndarray:
-            return carrier.fitted(values.T).T
+            return interpolation.fitted(values.T).T
         states = tuple(Past(fitted(s.reduced_time) if self._aT else s.reduced_time,
-                            fitted_shapes(carrier, s.C.T, *F).T) for s in memory.states)
+                            fitted_tensors(interpolation, s.C.T, *F).T) for s in memory.states)
         return StoredStates(memory.time, states, None if memory.smallest_h is None else fitted(memory.smallest_h))
 
     @cached_property

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import ConvergenceError, InputError, finite, positive
-from ...forms.carry import carry, take_fields
 from ...forms.schedule import StepData
+from ...forms.transfer import take_fields, transfer_histories
 from ...mesh.mesh import Mesh
 from ...physics.supports import Constrained, PinnedNode, Support, Symmetry
 from ...problem.problem import Problem
@@ -283,5 +283,5 @@ def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
     take_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
-    carry(source, state, problem, x, 0.0)
+    transfer_histories(source, state, problem, x, 0.0)
     return x

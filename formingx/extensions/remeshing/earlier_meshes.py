@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ...forms.carry import Carrier
 from ...forms.outline import FINE_PIECES, Outline, along
 from ...forms.probes import Probe
+from ...forms.transfer import MovingLeastSquares
 from ...mesh.nodes import of_mesh, of_space
 
 _NEAR = 0.02
@@ -58,7 +58,7 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
     old, state = preformed.before
     nodes = of_mesh(old.forms.domain)
     first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
-    found = Carrier(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
+    found = MovingLeastSquares(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
     return np.clip(found, first.min(0), first.max(0))
 
 
@@ -80,7 +80,7 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
     nodes, T = of_space(field.function_space), field.x.array
     moved = nodes + Probe(old, nodes).displacement_in(state)
     return old.scene.with_mesh(mesh, preformed, lambda R, Z: np.clip(
-        Carrier(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))
+        MovingLeastSquares(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:

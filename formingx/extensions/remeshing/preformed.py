@@ -18,7 +18,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from ...forms.carry import in_own_cells
+from ...forms.transfer import in_own_cells
 from .earlier_meshes import FollowedProbe, first_places, followed
 from .files import save
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import ConvergenceError, InputError, pair, positive
-from ...forms.carry import carry
 from ...forms.outline import Outline
+from ...forms.transfer import transfer_histories
 from ...materials.constants import OfMesh
 from ...measures.targets import Amplitude, Target
 from ...physics.contact import Contact
@@ -311,7 +311,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     problem.enter(setting, x, control)
     if not setting.rate[-1]:
         problem.clock = state.time
-    carry(old, state, problem, x, control, moved=True)
+    transfer_histories(old, state, problem, x, control, moved=True)
     for new, (_, before, _) in zip(problem.contacts, contacts, strict=True):
         transfer_contact(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1

@@ -1,4 +1,4 @@
-"""Transfer of values from points of a body to points of another mesh of the same body."""
+"""Transfer of fields and history variables from one mesh of a body to another mesh of the same body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NEIGHBOURS = 12
 """Number of points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
 
 
-class Carrier:
+class MovingLeastSquares:
     r"""Interpolating moving least squares between scattered points.
 
     A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
@@ -54,13 +54,13 @@ class Carrier:
         self._share = np.linalg.pinv(weight[..., None] * basis, rcond=1e-9)[:, 0] * weight
 
     def fitted(self, values: np.ndarray) -> np.ndarray:
-        """Return the fit at the target points; collective.
+        """Interpolate values from the source points to the target points; collective.
 
         Args:
             values: values at the locally owned source points, shape (m, ...).
 
         Returns:
-            Fitted values at the locally owned target points, shape (n, ...).
+            Values at the locally owned target points, shape (n, ...).
         """
         return np.einsum("nk,nk...->n...", self._share, self.all(values)[self._rows])
 
@@ -141,14 +141,15 @@ def _shapes(barycentric: np.ndarray) -> np.ndarray:
 
 
 def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
-    """Return the corner positions of a cell as a set that identifies it, independent of their order."""
+    """Return the positions of the three corners of a cell, shape (3, 2), as a set that identifies the cell."""
     return frozenset((float(r), float(z)) for r, z in corners)
 
 
-def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, moved: bool = False) -> None:
+def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, control: float,
+                       moved: bool = False) -> None:
     """Set the history variables of a problem from a state on another mesh of the body; collective.
 
-    Contact histories are left out if the problems have different numbers of histories, or if `moved` is True.
+    History variables of contact are left out if the problems have different numbers of histories, or `moved` is True.
 
     Args:
         source: problem on the other mesh.
@@ -161,27 +162,28 @@ def carry(source: Any, state: Any, problem: Any, x: np.ndarray, control: float, 
     problem.set_fields_and_control(x, control)
     with source.state_context(state):
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
-            """Return points of the mesh of `source` as points of the mesh of `problem`."""
+            """Map reference points of the mesh of `source`, shape (n, 2), to the mesh of `problem`."""
             return points + Probe(source, points).displacement_in(state) if moved else points
         same = len(problem.histories) == len(source.histories) and not moved
         n = len(problem.histories) if same else len(problem.forms.histories)
         for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.memory[-n:],
                                      strict=True) if n else ():
-            mine.put(mine.carry(other, kept, x[: problem.n_owned], control, on_this_mesh))
+            mine.put(mine.transfer(other, kept, x[: problem.n_owned], control, on_this_mesh))
 
 
-def fitted_shapes(carrier: Carrier, values: np.ndarray, source_F: np.ndarray, target_F: np.ndarray) -> np.ndarray:
-    r"""Return a fit of symmetric positive definite tensors at the target points; collective.
+def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source_F: np.ndarray,
+                   target_F: np.ndarray) -> np.ndarray:
+    r"""Interpolate symmetric positive definite tensors C of the reference configuration to other points; collective.
 
-    The logarithm of the tensor relative to the present configuration is fitted:
+    The interpolated quantity is the logarithm of the tensor relative to the present configuration:
 
     .. math::
         \ln(F^{-T} C F^{-1})
 
-    Stresses are therefore continuous under the transfer, independently of a fit of F.
+    Stresses are therefore continuous under the transfer, independently of the difference of F on the two meshes.
 
     Args:
-        carrier: transfer between the points.
+        interpolation: interpolation from the source to the target points.
         values: entries 11, 22, 12, 33 of C at the source points, shape (m, 4).
         source_F: deformation gradients at the source points, shape (m, 3, 3).
         target_F: deformation gradients at the target points, shape (n, 3, 3).
@@ -191,20 +193,20 @@ def fitted_shapes(carrier: Carrier, values: np.ndarray, source_F: np.ndarray, ta
     """
     seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
     w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
-    w, v = np.linalg.eigh(carrier.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))
+    w, v = np.linalg.eigh(interpolation.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))
     C = np.einsum("nji,njl,nl,nml,nmk->nik", target_F, v, np.exp(w), v, target_F, optimize=True)
     return np.stack([C[:, 0, 0], C[:, 1, 1], C[:, 0, 1], C[:, 2, 2]], axis=1)
 
 
 def _matrices(entries: np.ndarray) -> np.ndarray:
-    """Return the matrices of tensors with the entries 11, 22, 12, 33, shape (n, 3, 3)."""
+    """Return symmetric tensors as matrices, shape (n, 3, 3), from their entries 11, 22, 12, 33, shape (n, 4)."""
     found = np.zeros((len(entries), 3, 3))
     found[:, 0, 0], found[:, 1, 1], found[:, 0, 1], found[:, 2, 2] = entries.T
     found[:, 1, 0] = found[:, 0, 1]
     return found
 
 
-def shapes_of(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
+def isochoric_gradients(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Evaluate the isochoric elastic deformation gradient in some cells; collective.
 
     Args:
