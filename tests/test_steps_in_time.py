@@ -152,7 +152,7 @@ def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
 
 def test_between_states_of_a_flow_there_is_none_to_find():
     path = run(block(), Stage("flow", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
-    with pytest.raises(fx.InputError, match="that follows or holds a measure"):
+    with pytest.raises(fx.InputError, match="in a stage that controls an output quantity"):
         path.at(fx.travel(0.987654))
 
 

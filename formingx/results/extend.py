@@ -22,7 +22,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def method_of(owner: type) -> Callable[[Function], Function]:
-    """Return a decorator that makes a function a method of a class, under the function's name.
+    """Return a decorator that adds a function to a class as a method, under the name of the function.
 
     Args:
         owner: the class, such as `formingx.Path`.

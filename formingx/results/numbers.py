@@ -10,20 +10,20 @@ from ..units import Units
 
 
 def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
-    """Return the coordinates of a point without round-off.
+    """Return the coordinates of a point, with 0 in place of round-off.
 
     Args:
         point: the coordinates, length.
-        points: all points of the body, shape (n, coordinates), length.
+        points: coordinates of points of the body, any shape, length.
 
     Returns:
-        The coordinates. Values below 1e-12 times the extent of `points` are set to 0.
+        The coordinates. Values below 1e-12 times the range of the numbers in `points` are set to 0.
     """
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 class KeyNumbers:
-    """Base class of key numbers that print one row per number.
+    """Base class of sets of numbers that print as a table, one row per number.
 
     Attributes:
         units: units of the printed values.
@@ -52,7 +52,7 @@ class KeyNumbers:
 
 
 class PartNumbers(KeyNumbers):
-    """Numbers that a section and a sheet in three dimensions have in common.
+    """Base class of the key numbers of a part, for sections and for sheets in three dimensions.
 
     Attributes:
         volume: volume of the part, length^3.
@@ -61,10 +61,11 @@ class PartNumbers(KeyNumbers):
         mean_wall: volume over area, length.
         min_wall: minimum wall, length.
         uniformity: minimum wall over mean wall.
-        variation: coefficient of variation of the wall.
+        variation: coefficient of variation of the wall over the middle surface: standard deviation over mean value.
         weight: weight in grams, or None without a density.
-        scrap: volume beyond the trim over the volume of the whole sheet.
-        basis: the basis of volume, area and weight as text, such as a unit of depth; "" for the whole part.
+        scrap: fraction of the volume of the whole sheet that lies beyond the trim.
+        basis: reference of volume, area and weight as text, such as "the part, per mm of depth"; "" for a part that is
+            modelled whole.
     """
 
     volume: float
@@ -80,15 +81,15 @@ class PartNumbers(KeyNumbers):
 
     @property
     def weight_label(self) -> str:
-        """Label of the weight in `rows`."""
+        """Label of the weight in the printed table; it says if lengths without a unit were taken for cm."""
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return the rows common to all parts.
+        """Return the rows of the printed table, as pairs (name, value with its unit).
 
         Args:
             where: place of the minimum wall, as text.
-            further: further rows of this kind of part.
+            further: rows that only this kind of part has, before the last one.
         """
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:

@@ -1,4 +1,4 @@
-"""Path of a run: its states, and their evaluation, pictures and files."""
+"""Path of a run: its states, with methods that evaluate, draw and write them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Path(States):
 
         "serious": do not use the results as they are.
         "warning": the scene may differ from the intended one, or a result is less accurate than usual.
-        "note": neither of these.
+        "note": the accuracy is as usual.
 
         >>> path.findings()
         []
@@ -59,16 +59,16 @@ class Path(States):
         return worst_first([*self.record.findings, *(found_at("end", self) if self.states else [])])
 
     def profile(self, state: State | None = None) -> Profile:
-        """Return the deformed outline and the thickness of a sheet in a state (default: the last).
+        """Return the deformed outline and the thickness of a sheet in a state (default: the last); collective.
 
         Raises:
-            InputError: the body is not a sheet.
+            InputError: the mesh has no two faces of a sheet, or the sheet is in three dimensions.
         """
         state = state or self.last
         return self._view(self.segment(state)).profiles.of(state)
 
     def stress(self, state: State | None = None) -> StressField:
-        """Return the stresses and stretches in a state (default: the last), layer by layer.
+        """Return the stresses and stretches in a state (default: the last), layer by layer; collective.
 
         Raises:
             InputError: the body is a sheet in three dimensions.
@@ -85,12 +85,16 @@ class Path(States):
         Args:
             file: its name ends in .csv.
             units: units for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]".
+
+        Raises:
+            InputError: the name has another ending.
+            OSError: the file cannot be written.
         """
         from . import files
         files.write_path(self, file, units or NONE)
 
     def save(self, folder: Any) -> None:
-        """Write every state to a checkpoint folder, for `formingx.load`.
+        """Write every state to a checkpoint folder, from which `formingx.load` reads the path; collective.
 
         Args:
             folder: a new folder, or one that holds the first states of this run.
@@ -107,15 +111,17 @@ class Path(States):
     def to_vtk(self, file: Any, states: Any = None) -> None:
         """Write the fields of states for ParaView, one time step per state.
 
-        The fields are listed in `formingx.results.files.fields`. State 3 is written to run-3.vtu, beside run.pvd, which
-        lists the time steps. The time is the number of the state. States of a remeshed run have their own meshes.
+        The fields are listed in `formingx.results.files.fields`. State 3 of the path is written to run-3.vtu, beside
+        run.pvd, which lists the time steps. The time is the number of the state. States of a remeshed run have their
+        own meshes.
 
         Args:
             file: its name ends in .pvd.
-            states: a state, several in order, or "all"; default the last.
+            states: a state, several in order, or "all"; default the last. States that were solved for by `Path.at` are
+                numbered in the given order.
 
         Raises:
-            InputError: the name has another ending, or a state is not of the path.
+            InputError: the name has another ending, or `states` has an entry that is not a `State`.
             OSError: a file cannot be written.
         """
         from .files import fields
@@ -124,8 +130,8 @@ class Path(States):
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
         """Draw an animation of the forming: the section of the sheet and the loading curve (rank 0 writes).
 
-        The frames are evenly spaced over the process (`formingx.results.show.record.progress`). Between states the body
-        follows the cubic path through them. The last frame is shown for one second more.
+        The frames are evenly spaced over the process time, or else over the motion of the controls and the sheet.
+        Between states the body follows the cubic path through them. The last frame is shown for one second more.
 
         Args:
             file: its name ends in .gif or .mp4.
@@ -138,7 +144,7 @@ class Path(States):
 
         Raises:
             InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. A number is not
-                allowed, or the mesh is not a sheet.
+                allowed, the body is not a sheet, or the path has one state only.
         """
         from .show import animation
         animation.animate(self, file, frames, seconds, units or NONE)
@@ -153,20 +159,21 @@ class Path(States):
             title: heading of the page.
             failure: the `ConvergenceError` that ended the run, if one did.
             units: units for the labels.
-            density: see `Path.part`.
-            trim: see `Path.part`.
+            density: density of the material for the weight of the part, g/cm3 (`Path.part`).
+            trim: place at which the part is cut off (`Path.part`).
 
         Returns:
             The path of the file.
 
         Raises:
-            InputError: plotly is not installed.
+            InputError: plotly is not installed, the name has another ending, or a density or trim is given for a body
+                that is not a sheet.
             OSError: the file cannot be written.
         """
         return self._reader.report(file, title, failure, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Axes | None = None, **style: Any) -> Any:
-        """Draw column `y` over column `x`.
+        """Draw column `y` over column `x` along the path, with a dot at each state.
 
         Args:
             y: name of a column.
@@ -181,7 +188,10 @@ class Path(States):
         return plots.curve(self, y, x, axes, **style)
 
     def plot_convergence(self, axes: Axes | None = None) -> Any:
-        """Draw the correction of every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
+        """Draw the correction |dx|/|x| of every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
+
+        Args:
+            axes: matplotlib axes; default new ones.
 
         Returns:
             The matplotlib axes.
@@ -201,16 +211,22 @@ class Path(States):
 
         Returns:
             The picture, which a notebook shows.
+
+        Raises:
+            InputError: the name has another ending, the body is not a sheet, or there is neither a screen nor Xvfb.
         """
         self._reader.view(file, state or self.last, grid)
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
-        """Return the wall thickness of the part in a state (default: the last) as a table.
+        """Return the wall thickness of the part in a state (default: the last) as a table; collective.
 
         Returns:
             A `Wall`, from the axis to the rim. In three dimensions a `WallInSpace`, triangle by triangle. Both have
             `to_csv` and `to_excel`.
+
+        Raises:
+            InputError: the body is not a sheet, or its layers do not lie above each other.
         """
         return self._reader.wall(state or self.last)
 
@@ -225,8 +241,9 @@ class Path(States):
             density: density of the material, g/cm3, for the weight in grams. It refers to the reference configuration,
                 under `ThermalExpansion` to the temperature of zero thermal strain. Give `units`, too: lengths without a
                 unit count as cm.
-            trim: radius at which the part is cut off, or ("height", h), length. The cut lies at the last place from the
-                axis where the middle line passes it. In three dimensions a z coordinate beyond which the part lies.
+            trim: radius at which the part is cut off, or ("height", h), length. The cut lies where the middle line
+                passes this radius or height for the last time on its way from the axis to the rim. In three dimensions
+                a z coordinate beyond which the part lies.
             heights: heights at which the wall is given, too (`Wall.height`), length.
             units: units of the script.
 
@@ -245,7 +262,7 @@ class Path(States):
             tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one.
 
         Returns:
-            A `Filling`, which also gives the pressure at which a corner is filled.
+            A `Filling`; its `pressure_at` gives the pressure at which a gap is reached.
 
         Raises:
             InputError: there is no such tool, or it has no corner that the body must fill.
@@ -285,7 +302,7 @@ class Path(States):
             InputError: the scene has no temperature, or a point lies outside the body.
         """
         if self.problem.temperature is None:
-            raise InputError("temperature: the scene has none: give Scene a temperature=...")
+            raise InputError("temperature: the scene has no temperature: give Scene temperature=...")
         state = state or self.last
         with self.segment(state).problem.state_context(state) as problem:
             return problem.temperature.at_points(problem.followed(as_points("Path.temperature: points", points)))
@@ -312,26 +329,38 @@ class Path(States):
         "change": work of forces left unbalanced at the beginning of a stage, which fade over the stage. "new_meshes":
         energy added by remeshing. "heat": energy added by changes of temperature.
 
-        "strain_energy" above its first value, "dissipated_energy" in materials, "friction", "jumps" (lost in
-        snap-through), and "bonds" to adhesive tools, above their first value.
+        Stored: "strain_energy" minus its first value. Lost: "dissipated_energy" and "damage_energy" of materials,
+        "friction", "jumps" (in snap-through), and "bonds" to adhesive tools.
 
-        "unbalanced": error of the integrals and of the run. Above 0.5 % of the largest entry a warning is logged and
-        added to the `findings`.
+        "unbalanced": work minus stored and lost energy, an error of the integrals and of the run. Above 0.5 % of the
+        largest entry a warning is logged and added to the `findings`.
 
         Returns:
             {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
+
+        Raises:
+            InputError: the body is a sheet in three dimensions, or its material is of K-BKZ type.
         """
         self.section_only("work")
         from .evaluate.work import work
         return work(self)
 
     def to_stl(self, file: Any, state: State | None = None) -> None:
-        """Write the part in a state (default: the last) as a solid of triangles in STL (rank 0 writes)."""
+        """Write the part in a state as the triangles of its surface, in binary STL (rank 0 writes).
+
+        Args:
+            file: its name ends in .stl.
+            state: default the last.
+
+        Raises:
+            InputError: the name has another ending, or the body is not a sheet.
+            OSError: the file cannot be written.
+        """
         from .files.solid import to_stl
         to_stl(self._reader.solid(state or self.last), file, self.problem.comm)
 
     def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
-        """Write the part as shell elements with the wall as thickness, for CalculiX (rank 0 writes).
+        """Write the part as shell elements with the wall as thickness, for CalculiX or Abaqus (rank 0 writes).
 
         The elements are S8R, at the axis S6, on the middle surface. The sets are ALL, WALL and RIM. The file contains
         no material.
@@ -357,6 +386,10 @@ class Path(States):
             file: its name ends in .glb.
             state: default the last.
             units: units of the script; glTF is in metres, and lengths without a unit count as metres.
+
+        Raises:
+            InputError: the name has another ending, or the body is not a sheet.
+            OSError: the file cannot be written.
         """
         from .files.solid import to_gltf
         to_gltf(self._reader.solid(state or self.last), file, self.problem.comm, units or NONE)
@@ -376,5 +409,5 @@ class Path(States):
 
     @cached_property
     def _reader(self) -> Reader:
-        """The evaluation of states for the kinematics of the scene."""
+        """Object that evaluates walls, parts, pictures and reports for the kinematics of the scene."""
         return (self.scene.kinematics.reader or SectionReader)(self)

@@ -1,6 +1,7 @@
-"""Results that depend on the kinematics: the wall, the part, pictures and reports.
+"""Results whose evaluation depends on the kinematics: the wall, the part, pictures and reports.
 
-This module evaluates sections. An extension provides the reader of other bodies as `Kinematics.reader`.
+This module evaluates axisymmetric and plane-strain sections. An extension provides the reader of sheets in three
+dimensions as `Kinematics.reader`.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ class Reader(Protocol):
     """Interface of the class that evaluates the states of one path."""
 
     def wall(self, state: State) -> Sheet:
-        """Return the wall thickness of the part, one row per place."""
+        """Return the wall thickness of the part in a state as a table, one row per point or triangle."""
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
-        """Return the key numbers of the part; for the arguments see `Path.part`."""
+        """Return the key numbers of the part in a state; for the arguments see `Path.part`."""
 
     def filling(self, contact: FaceContact) -> Sheet:
-        """Return the gap between the body and a tool in every state."""
+        """Return the remaining gaps between the body and the tool of a contact in every state, as a table."""
 
     def view(self, file: object, state: State, grid: float | None) -> None:
         """Draw the body in a state as a PNG file; for the arguments see `Path.view3d`."""
 
     def solid(self, state: State) -> tuple:
-        """Return the part as a closed surface of triangles.
+        """Return the part in a state as a closed surface of triangles.
 
         Returns:
-            Points, shape (n, 3), length; corners of the triangles, shape (m, 3); wall over original thickness at the
-            points, shape (n,).
+            Points, shape (n, 3), length; for each triangle the rows of its corners in the points, shape (m, 3); wall
+            over original thickness at the points, shape (n,).
         """
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
@@ -70,25 +71,25 @@ class SectionReader:
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
 
     def filling(self, contact: FaceContact) -> Filling:
-        """Return the `Filling` of a tool.
+        """Return the remaining gaps in the corners of the tool of a contact (`Path.filling`).
 
         Raises:
             InputError: the run has several meshes, or the tool has no corner that the body must fill.
         """
         if len(self._path.segments) > 1:
-            raise InputError("filling: is not available for a remeshed run as a whole: take that of one mesh,"
-                             " path.alone(state).filling()")
+            raise InputError("filling: is not available for a remeshed run as a whole: evaluate the states of one"
+                             " mesh, path.alone(state).filling()")
         from .evaluate.filling import filling
         return filling(self._path, contact)
 
     def view(self, file: Any, state: State, grid: float | None) -> None:
-        """Draw the revolved or extruded section in a state; `grid` is not used."""
+        """Draw the revolved or extruded section in a state as a PNG file; `grid` is not used."""
         from .show import views
         draw = views.revolved if self._axisymmetric else views.extruded
         draw(self._path.profile(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return points, triangles and wall ratios of the revolved or extruded section (`Reader.solid`)."""
+        """Return the closed surface of the revolved or extruded section in a state (`Reader.solid`)."""
         from .files.solid import coloured
         return coloured(self._path.profile(state), self._axisymmetric)
 

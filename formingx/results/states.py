@@ -1,4 +1,4 @@
-"""The accepted states of a run in order: their columns, and states between them."""
+"""Accepted states of a run in order, their output quantities, and states between them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
 from ..measures.quantities import Bound
 from ..measures.targets import Target, is_met, process_time
-from ..solve import predictor
 from ..solve.branches import branch_points
 from ..solve.newton import Failure
 from ..solve.path_following import Run
@@ -22,15 +21,23 @@ from ..solve.record import Counts, Record, Segment
 from ..solve.state import State
 from ..solve.stepping import StepControl
 from .evaluate.admissibility import AdmissibilityCheck
+from .evaluate.dissipation import dissipated_energy
 from .evaluate.profile import Profiles
 from .evaluate.stress import Stresses
 
 _WRITTEN = 5e-6
-"""Largest relative error of a number written with six digits."""
+"""Largest relative error of a number that is rounded to six digits."""
 
 
 class _View:
-    """Evaluation objects of one problem, created once and shared by its states."""
+    """Objects that evaluate the states of one problem; for the arguments see `States`.
+
+    Attributes:
+        columns: {name of a column: its quantity}.
+        profiles: evaluates the `Profile` of a state.
+        stresses: evaluates the `StressField` of a state.
+        admissibility: checks whether a state is admissible.
+    """
 
     def __init__(self, problem: Any, timed: bool, columns: Mapping[str, Any]):
         self.columns = standard_columns.standard(problem, timed)
@@ -45,8 +52,8 @@ class States:
     Args:
         record: the solver's record of the run (`formingx.solve.record.Record`).
         timed: True if the process time is a column.
-        columns: further columns that the user asked for.
-        views: evaluation objects of problems, shared with another path.
+        columns: {name: quantity} of further columns that the user asked for (`formingx.trace(record=)`).
+        views: {id of a problem: objects that evaluate its states}, shared with another path.
 
     Attributes:
         record: the solver's record of the run.
@@ -62,7 +69,7 @@ class States:
 
     @property
     def segments(self) -> list[Segment]:
-        """Segments (problem, states) of the run; more than one if the run was remeshed."""
+        """Segments of the run, each with the problem on one mesh and its states; one unless the run was remeshed."""
         return self.record.segments
 
     @property
@@ -72,30 +79,37 @@ class States:
 
     @property
     def counts(self) -> Counts:
-        """Cost of the run: steps, iterations, factorisations."""
+        """Cost of the run: steps, iterations, factorisations (`formingx.solve.record.Counts`)."""
         return self.record.counts
 
     @property
     def scene(self) -> Any:
-        """Scene as given to the run, on the first mesh."""
+        """The `Scene` as it was given to the run, on its first mesh."""
         return self.problem.scene.first
 
     @property
     def problem(self) -> Any:
-        """Discretised problem of the last segment; evaluate it within `problem.state_context(state)`."""
+        """The discretised `Problem` on the last mesh; evaluate it within `problem.state_context(state)`."""
         return self.record.problem
 
     def __len__(self) -> int:
         return len(self.states)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return an output quantity in all states, shape (len(path),), in the units of the script."""
+        """Return an output quantity in all states, shape (len(path),), in the units of the script.
+
+        Args:
+            name: name of a column (`columns`).
+
+        Raises:
+            InputError: there is no such column.
+        """
         self._check(name)
         return np.array([state.measures[name] for state in self.states])
 
     @property
     def columns(self) -> list[str]:
-        """Names of the output quantities that every state has.
+        """Names of the output quantities (columns) that every state has.
 
         A run that was continued from a checkpoint may add columns, which earlier states lack.
         """
@@ -108,17 +122,17 @@ class States:
 
     @property
     def branch_points(self) -> list[tuple[State, State]]:
-        """Pairs of successive states between which a bifurcation lies.
+        """Pairs of successive states between which the path has a branch point (bifurcation).
 
-        There the determinant of the tangent changes its sign without a limit point. This finds only axisymmetric modes
-        (n = 0) and only an odd number of them; `Path.stability` finds all. The list is empty for materials with
-        history.
+        There the determinant of the tangent changes its sign without a limit point. So only axisymmetric modes (n = 0)
+        and only an odd number of them are found; `Path.stability` finds all. The list is empty for materials with
+        history variables.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
     @property
     def jumps(self) -> list[State]:
-        """States reached by snap-through; see `State.jump`."""
+        """States that the body reached by snap-through; see `State.jump`."""
         return [state for state in self.states if state.kind == "jump"]
 
     @property
@@ -132,15 +146,22 @@ class States:
         return self.record.last
 
     def met(self, target: Target) -> State | None:
-        """Return the state that met a target of the run, or None."""
+        """Return the state in which the run met a target, or None if no state met it.
+
+        Args:
+            target: a target of the run (`until` or `intermediate`).
+        """
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
     def value(self, measure: str | Bound, state: State) -> float:
-        """Return an output quantity in a state.
+        """Return an output quantity in a state, in the units of the script.
 
         Args:
-            measure: name of a column, or a quantity bound to the state's problem (`Target.bind`).
-            state: a state of this path.
+            measure: name of a column, or a quantity bound to the problem of the state (`Target.bind`).
+            state: a state of this path, or one that was solved for by `Path.at`.
+
+        Raises:
+            InputError: there is no such column.
         """
         segment = self.segment(state)
         if isinstance(measure, str):
@@ -150,15 +171,16 @@ class States:
             return measure.value(problem.x, state.control)
 
     def state(self, stage: str | None = None, time: float | None = None) -> State:
-        """Return a state by its stage and its process time.
+        """Return the state of a stage or of a process time; the last state of the run without arguments.
 
         Args:
             stage: name of a stage; default any.
-            time: process time; default the last state. A state is solved for if none lies at this time.
+            time: process time; default the end of the stage, or of the run. A state is solved for if none lies at this
+                time.
 
         Raises:
             InputError: there is no such stage, or it does not reach that time.
-            ConvergenceError: see `at`.
+            ConvergenceError: the state at that time could not be solved for (`Path.at`).
         """
         if stage is not None:
             stages = list(dict.fromkeys(state.stage for state in self.states))
@@ -180,15 +202,15 @@ class States:
     def at(self, target: Target, after: State | None = None) -> State:
         """Return the first state of the path that meets a target.
 
-        The state is solved for, not interpolated. The path does not change. A target slightly beyond the last state,
-        such as a value rounded to six digits, is accepted.
+        The state is solved for between two states of the path, not interpolated; it is not added to the path. A target
+        beyond the last state by less than 5e-6 of its value, such as a rounded value, is accepted.
 
         Args:
-            target: for example `pressure(0.4)`.
-            after: search only beyond this state of the path, for example beyond a limit point.
+            target: the target, for example `pressure(0.4)`.
+            after: a state of the path; only the path beyond it is searched, for example beyond a limit point.
 
         Raises:
-            InputError: the path does not pass through that value there.
+            InputError: the path does not pass through that value, or `after` is not a state of the path.
             ConvergenceError: two states enclose the value, but the solver did not converge between them.
         """
         if after is not None and after not in self.states:
@@ -229,7 +251,19 @@ class States:
             f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """Return the state between two successive ones that meets a target, starting from the first."""
+        """Return the state that meets a target between two successive states.
+
+        Args:
+            segment: the segment of both states.
+            left: the first state.
+            right: the second state.
+            target: the target.
+            bound: the quantity of the target, bound to the problem.
+
+        Raises:
+            InputError: the stage controls an output quantity, so it cannot be restarted between states.
+            ConvergenceError: the solver did not converge.
+        """
         if segment.problem.has_history:                      # states between them depend on the history
             found = self._run_to(segment, left, right, target, bound)
         else:
@@ -240,16 +274,18 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
-        """Return the state that a run from `left` reaches at the target, with its history variables.
+        """Return the state that a run from the first state reaches at the target, with its history variables.
+
+        The arguments are those of `_between`.
 
         Raises:
             InputError: the stage controls an output quantity, so it cannot be restarted between states.
             ConvergenceError: the run does not reach the target.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
-            raise InputError(f"the path passes {target} between two of its states, in a stage that follows or holds a"
-                             f" measure: none can be solved for there afterwards; run with intermediate=[...]"
-                             f" to have one")
+            raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
+                             f" quantity: no state can be solved for there afterwards; run with intermediate=[...] to"
+                             f" have one")
         record = Record(segment.problem, segment.curve)
         record.segments[-1].states.append(replace(left, met=None))
         record.stage = left.stage
@@ -269,12 +305,12 @@ class States:
     def between(self, a: State, b: State, fraction: float) -> State:
         """Return a state interpolated on the cubic path between two successive states, for drawing.
 
-        It is not in equilibrium.
+        It is not in equilibrium. Between two stages, the second state is returned.
 
         Args:
-            a: a state.
+            a: a state of the path.
             b: the next state.
-            fraction: position between them, 0 to 1.
+            fraction: position between them, 0 at `a`, 1 at `b`.
         """
         if a.setting != b.setting:                           # a stage begins
             return b
@@ -282,21 +318,31 @@ class States:
         return replace(b, x=x, control=control)
 
     def distance(self, a: State, b: State) -> float:
-        """Return the arc length from a state to the next, along the tangent (dimensionless)."""
+        """Return the arc length from a state to the next one, measured along the tangent of the path, dimensionless.
+
+        It is 0 between two stages.
+
+        Args:
+            a: a state of the path.
+            b: the next state.
+        """
         return self.segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
-        """Return columns along a smooth path through the states, for drawing.
+        """Return the values of columns at points along a smooth curve through the states, for drawing.
 
         Quantities that depend on displacements and control alone follow the cubic path between two states. Other
         columns, such as forces and energies, follow a monotone cubic in arc length through their values.
 
         Args:
             columns: names of columns.
-            points: number of points from one state to the next.
+            points: number of intervals from one state to the next.
 
         Returns:
-            Values of each column, shape (m,).
+            A list with the values of each column, shape (m,).
+
+        Raises:
+            InputError: there is no such column.
         """
         self._check(*columns)
         rows = []
@@ -307,7 +353,10 @@ class States:
         return list(np.array(rows).T)
 
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
-        """Return rows of columns of one stage, after its first state to its last."""
+        """Return the values of columns along successive states of one stage, one row per point (`curve`).
+
+        The point of the first state is left out.
+        """
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns
         arc_lengths = np.concatenate([[0.0], np.cumsum([max(segment.curve.distance(a, b), 1e-300)
@@ -327,11 +376,11 @@ class States:
         return rows
 
     def describe(self, state: State) -> str:
-        """Return the main numbers of a state in one line."""
+        """Return the main numbers of a state as one line of text, for messages."""
         return self.record.describe(state)
 
     def _check(self, *names: str) -> None:
-        """Check that names are columns.
+        """Check that columns of these names exist.
 
         Raises:
             InputError: a name is not a column.
@@ -341,63 +390,33 @@ class States:
                 raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     def _measure(self, state: State) -> None:
-        """Compute the output quantities of a newly accepted state."""
+        """Compute the output quantities of a newly accepted state; the run calls this function."""
         segment = self.segments[-1]
         self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
-        """Compute the output quantities of the last of the given states."""
+        """Compute `State.measures` of the last of successive states of a segment."""
         state = states[-1]
         state.measures = self._measures(segment, state)
         if "dissipated_power" in state.measures:
             state.measures["dissipated_energy"] = 0.0 if len(states) == 1 else (
-                states[-2].measures["dissipated_energy"] + self._dissipated(segment, states))
-
-    def _dissipated(self, segment: Segment, states: list[State]) -> float:
-        """Return the energy dissipated by materials between the last two states, by Simpson's rule.
-
-        In the middle of the step the body lies on the predicted curve, and its history variables are advanced to that
-        time.
-        """
-        before, state = states[-2:]
-        if not before.time < state.time:                     # as after remeshing
-            return 0.0
-        column, time = self._view(segment).columns["dissipated_power"], (before.time + state.time) / 2
-        if state.setting["rate"][-1]:
-            x, control = segment.curve.interpolate(before, state, 0.5)
-        else:                                                # a flow: its tangents hold at a fixed time
-            past = [*predictor.recent_states(states[:-1], time, predictor.CUBIC - 1), state]
-            weights = predictor.weights(past, time)
-            x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
-        with segment.problem.state_context(before) as problem:
-            if not state.setting["rate"][-1]:
-                problem.clock = time
-            time = problem.forms.time_at(control)
-            problem.x.array_w[:] = x
-            problem.set_fields_and_control(x, control)
-            for history in problem.materials:
-                history.advance(x, control)
-            half = column.value(problem.x, control)
-        a, b = (s.measures["dissipated_power"] for s in (before, state))
-        # the parabola through the three powers, at times that need not be even
-        share = (time - before.time) / (state.time - before.time)
-        return (state.time - before.time) * (
-            a * (3 - 1 / share) + half / (share * (1 - share)) + b * (3 - 1 / (1 - share))) / 6
+                states[-2].measures["dissipated_energy"]
+                + dissipated_energy(segment, states, self._view(segment).columns["dissipated_power"]))
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
-        """Return {column: value} of a state."""
+        """Return {column: value} of a state, without the dissipated energy."""
         columns = self._view(segment).columns
         with segment.problem.state_context(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def segment(self, state: State | None = None) -> Segment:
-        """Return the segment that contains a state (default: the last)."""
+        """Return the segment of the run on whose mesh a state lies; default the segment of the last state."""
         mesh = (state or self.last).setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
     def alone(self, state: State) -> Any:
-        """Return the part of the path on the mesh of a state; the whole path unless the run was remeshed."""
+        """Return a path of the states on the mesh of a given state; the path itself if the run has one mesh."""
         if len(self.segments) == 1:
             return self
         segment = self.segment(state)
@@ -407,11 +426,11 @@ class States:
 
     @property
     def admissibility(self) -> AdmissibilityCheck:
-        """Admissibility check of the states of the last segment."""
+        """Check of the states on the last mesh for admissibility."""
         return self._view(self.segments[-1]).admissibility
 
     def _view(self, segment: Segment) -> _View:
-        """Return the evaluation objects of a segment's problem."""
+        """Return the objects that evaluate the states of a segment."""
         key = id(segment.problem)
         if key not in self._views:
             self._views[key] = _View(segment.problem, self._timed, self._columns)
@@ -419,5 +438,5 @@ class States:
 
 
 def _pieces(states: list[State]) -> list[list[State]]:
-    """Return the states in groups of successive ones with equal stage data."""
+    """Return the states in groups of successive states with equal step data."""
     return [list(group) for _, group in itertools.groupby(states, key=lambda state: state.setting)]

@@ -1,4 +1,4 @@
-"""Plain data that contains arrays: JSON, and one binary file for the arrays."""
+"""Data with arrays in files: JSON for everything else, and one binary file for the arrays."""
 
 from typing import Any
 
@@ -8,14 +8,14 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 
 
 def pack(data: Any) -> tuple[Any, bytes]:
-    """Split plain data into JSON data and the bytes of its arrays.
+    """Split data into JSON data and the bytes of its arrays; `unpack` is the inverse.
 
     Args:
-        data: numbers, strings, lists, dictionaries and arrays.
+        data: numbers, strings, lists, dictionaries and arrays, nested in any way.
 
     Returns:
-        The data with {"array": [first byte, type, shape]} in place of each array, and the bytes of all arrays in order,
-        little-endian.
+        The data with {"array": [position of its first byte, type, shape]} in place of each array, and the bytes of all
+        arrays in order, little-endian.
     """
     found: list[bytes] = []
     end = 0
@@ -36,14 +36,14 @@ def pack(data: Any) -> tuple[Any, bytes]:
 
 
 def unpack(data: Any, content: bytes) -> Any:
-    """Return the argument of `pack`; its arrays are read-only.
+    """Return the data that `pack` split; its arrays are read-only.
 
     Args:
         data: JSON data from `pack`.
-        content: bytes of the arrays.
+        content: bytes of all arrays from `pack`.
 
     Raises:
-        ValueError: the two do not belong together.
+        ValueError: `data` and `content` do not belong together.
     """
     if isinstance(data, list):
         return [unpack(value, content) for value in data]

@@ -1,9 +1,9 @@
-"""Checkpoints: a folder with every accepted state of a run, from which it can continue on any number of ranks.
+"""Checkpoints: a folder with every accepted state of a run, from which the run can continue on any number of ranks.
 
-    run/scene.json        description of the scene, and versions.
-    run/0000/state.json   numbers of the state, and checksums.
-    run/0000/arrays.bin   its arrays (`arrays.pack`): unknowns and tangent of the path, history variables.
-    run/end.json          how the run ended, and its findings; missing while it runs, or if it was killed.
+    run/scene.json        description of the scene, and versions of programs.
+    run/0000/state.json   numbers of state 0, and checksums.
+    run/0000/arrays.bin   arrays of state 0 (`arrays.pack`): unknowns, tangent of the path, history variables.
+    run/end.json          error message and findings at the end of the run; missing while it runs, or if it was killed.
 
 A state is written under a temporary name and then renamed. So a state with its final name is complete, even if the run
 is killed. Fields and history variables are stored in the order of the cells in the script's mesh. This order does not
@@ -53,13 +53,16 @@ from .progress import progress
 
 
 class Checkpoint:
-    """Writer of the checkpoint folder of one run.
+    """Writer of the checkpoint folder of one run. Creating it is collective.
 
     Args:
-        folder: created if it does not exist; otherwise its content is checked.
+        folder: name of the folder; it is created if it does not exist, otherwise its content is checked.
         path: the `Path` of the run; it must begin with the states in the folder.
 
-    Raises (collective):
+    Attributes:
+        folder: the folder (`pathlib.Path`).
+
+    Raises:
         InputError: the folder holds another run, or other files.
         OSError: the folder cannot be written.
     """
@@ -82,11 +85,14 @@ class Checkpoint:
                 done((self._n_written - first) / (len(path) - first))
 
     def end(self, failure: str, findings: Sequence[Finding]) -> None:
-        """Write how the run ended.
+        """Write error message and findings at the end of the run to end.json; collective.
 
         Args:
             failure: the error message, or "".
             findings: the findings (`Path.findings`).
+
+        Raises:
+            OSError: the file cannot be written.
         """
         about = {"failure": failure, "findings": findings}
         files.on_root(self._comm, lambda: named_os_errors(
@@ -94,7 +100,17 @@ class Checkpoint:
             self.folder, f"{END} could not be written; its states are kept"))
 
     def _begin(self) -> int:
-        """Return the number of states in the folder, after creating it or checking its content."""
+        """Create the folder, or check that its states belong to this run; collective.
+
+        Incomplete steps at the end of the folder are removed.
+
+        Returns:
+            The number of states in the folder.
+
+        Raises:
+            InputError: the folder holds another run, or other files.
+            OSError: the folder cannot be written.
+        """
         problem, folder, path = self._path.segments[0].problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
@@ -122,7 +138,15 @@ class Checkpoint:
         return files.on_root(problem.comm, lambda: named_os_errors(begin, folder, "cannot be begun"))
 
     def _write_state(self, number: int, state: State) -> None:
-        """Write one state; collective."""
+        """Write a state of the path; collective.
+
+        Args:
+            number: number of the state in the path.
+            state: the state.
+
+        Raises:
+            OSError: the state cannot be written, or is there already.
+        """
         segment = self._path.segment(state)
         problem = segment.problem
         final = self.folder / state_name(number)
@@ -164,10 +188,10 @@ class Checkpoint:
 
 
 def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
-    """Return the record of the run in a checkpoint (`formingx.load`).
+    """Return the record of the run in a checkpoint (`formingx.load`); collective.
 
     Args:
-        folder: the checkpoint.
+        folder: folder of the checkpoint.
         scene: the scene of the run.
         state: number of the last state to read; default all states of completed steps.
 
@@ -216,6 +240,11 @@ def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Prob
 def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
     """Return the problem on the next mesh of a remeshed run.
 
+    Args:
+        problem: the problem on the mesh before.
+        last: last state on the mesh before.
+        data: the new mesh and the data transferred to it, from the checkpoint.
+
     Raises:
         InputError: the extension `remeshing` is not installed.
     """
@@ -232,7 +261,12 @@ def holds_states(folder: Any, comm: Any) -> bool:
 
 
 def _read_state(data: dict, problem: Any) -> State:
-    """Return the state from its data on this rank; collective."""
+    """Return the `State` from the data of a state in a checkpoint; collective.
+
+    Args:
+        data: data of the state, with its arrays.
+        problem: the `Problem` on the mesh of the state.
+    """
     data, space = dict(data), problem.forms.space
     last = problem.comm.rank == problem.comm.size - 1
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
@@ -245,10 +279,14 @@ def _read_state(data: dict, problem: Any) -> State:
 
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
-    """Return unknowns in the order of the cells of the script's mesh, on rank 0; collective.
+    """Return the unknowns of each cell on rank 0, in the order of the cells in the script's mesh; collective.
+
+    Args:
+        space: function space of the unknowns.
+        owned: unknowns that this rank owns.
 
     Returns:
-        Shape (cells, unknowns per cell).
+        Shape (cells, unknowns per cell); empty on other ranks.
     """
     topology, w = space.mesh.topology, fem.Function(space)
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
@@ -260,7 +298,12 @@ def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
-    """Return the locally owned unknowns, (n,), from the unknowns of each cell, (cells, unknowns per cell)."""
+    """Return the n unknowns that this rank owns, shape (n,), from the unknowns of each cell.
+
+    Args:
+        space: function space of the unknowns.
+        values: unknowns in the order of the cells in the script's mesh, shape (cells, unknowns per cell).
+    """
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]
@@ -268,12 +311,17 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
 
 
 def _tail(space: Any, owned: np.ndarray) -> list[float]:
-    """Return the unknowns that belong to no cell, such as multipliers; the last rank owns them; collective."""
+    """Return the unknowns that belong to no cell, such as Lagrange multipliers, on all ranks; collective.
+
+    Args:
+        space: function space of the other unknowns.
+        owned: unknowns that this rank owns; the last rank owns those that belong to no cell, at the end.
+    """
     return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 
 
 def _plain_state(state: State) -> dict[str, Any]:
-    """Return the data of a state that JSON can hold without conversion."""
+    """Return the attributes of a state as JSON data, without its unknowns and history variables."""
     excluded = (*FIELDS, "memory", "met", "history")
     data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in excluded}
     return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
@@ -281,7 +329,11 @@ def _plain_state(state: State) -> dict[str, Any]:
 
 
 def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
-    """Return the history variables from their stored data.
+    """Return the history variables of a state from its data in a checkpoint.
+
+    Args:
+        problem: the `Problem` on the mesh of the state.
+        memory: data of each set of history variables.
 
     Raises:
         InputError: their number differs from the scene.
@@ -293,7 +345,7 @@ def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
-    """Return outline and thickness of a sheet, for a report without the scene; None if the body is not a sheet."""
+    """Return {attribute of `Profile`: its value} in a state, for a report without the scene; None without a sheet."""
     try:
         profile = path.profile(state)
     except InputError:

@@ -1,4 +1,4 @@
-"""Files of a checkpoint folder as plain data, read and checked without a scene (layout: `checkpoint`)."""
+"""Reading of the files of a checkpoint folder without a scene; the module `checkpoint` describes the files."""
 
 import json
 import time
@@ -17,16 +17,17 @@ from .arrays import unpack
 from .description import differences
 from .progress import progress
 
-FORMAT = 7  # format of the files
+FORMAT = 7  # number of the format of the files, in scene.json
 FIELDS = ("x", "direction")
 ARRAYS = "arrays.bin"
 END = "end.json"
 
 
 def begun(folder: Any) -> bool:
-    """Return True if a checkpoint holds a state.
+    """Return True if a checkpoint holds a state; False if its folder is missing, empty, or holds no complete state yet.
 
-    It is False while a run may still begin to write: the folder is missing, empty, or without a state.
+    Args:
+        folder: folder of the checkpoint.
 
     Raises:
         InputError: the folder holds other files.
@@ -39,10 +40,10 @@ def begun(folder: Any) -> bool:
 
 
 def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
-    """Return the last states of a checkpoint; a run may be writing to it.
+    """Return the data of the last states of a checkpoint, to which a run may still be writing.
 
     Args:
-        folder: the checkpoint.
+        folder: folder of the checkpoint.
         count: number of states to read.
 
     Returns:
@@ -62,7 +63,10 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
 
 
 def ended(folder: Any) -> dict[str, Any] | None:
-    """Return how a run ended, from its checkpoint.
+    """Return the error message and the findings at the end of a run from its checkpoint.
+
+    Args:
+        folder: folder of the checkpoint.
 
     Returns:
         {"failure": error message or "", "findings": [Finding]}. None if the run has not ended, or if the file is
@@ -83,10 +87,13 @@ def ended(folder: Any) -> dict[str, Any] | None:
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the data of a checkpoint without its scene.
+    """Return all data of a checkpoint, for a report without the scene.
+
+    Args:
+        folder: folder of the checkpoint.
 
     Returns:
-        The data of scene.json with the end of the run ("ended"), and the data of each state.
+        The data of scene.json with the result of `ended` as entry "ended", and the data of each state.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -101,7 +108,13 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
-    """Return the data of the first `count` states; shows a progress bar on rank 0 of `comm`; not collective."""
+    """Return the data of the first states of a checkpoint; not collective.
+
+    Args:
+        folder: folder of the checkpoint.
+        count: number of states.
+        comm: MPI communicator; on its rank 0 a progress bar is shown.
+    """
     found = []
     with progress(comm, f"{folder}: {count} states") as done:
         for k in range(count):
@@ -112,6 +125,10 @@ def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
 
 def _check_format(folder: FilePath, about: dict) -> None:
     """Check the format of a checkpoint.
+
+    Args:
+        folder: folder of the checkpoint, for the message.
+        about: data of its file scene.json.
 
     Raises:
         InputError: this version cannot read the format.
@@ -125,8 +142,8 @@ def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
     """Check that a checkpoint belongs to a scene.
 
     Args:
-        folder: the checkpoint.
-        about: data of its scene.json.
+        folder: folder of the checkpoint.
+        about: data of its file scene.json.
         scene: description of the scene (`description.describe`).
 
     Raises:
@@ -134,7 +151,7 @@ def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
     """
     _check_format(folder, about)
     if not isinstance(about.get("scene"), dict):
-        raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json does not say what the scene is")
+        raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json has no description of the scene")
     found = list(differences(about["scene"], json.loads(json.dumps(scene))))
     if found:
         shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
@@ -148,7 +165,7 @@ def state_name(number: int) -> str:
 
 
 def complete_states(folder: FilePath) -> list[FilePath]:
-    """Return the folders of the complete states, in order.
+    """Return the folders of the complete states of a checkpoint, in order.
 
     Raises:
         InputError: a state is missing.
@@ -162,10 +179,10 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 
 
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
-    """Return the data of a state, with its arrays.
+    """Return the data of a state of a checkpoint, with its arrays.
 
     Args:
-        folder: the checkpoint.
+        folder: folder of the checkpoint.
         number: number of the state.
         checksums: False to skip the check of the checksums.
 
@@ -204,12 +221,12 @@ def read_json(file: FilePath) -> Any:
     except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: {error}") from None
     if not isinstance(found, dict):
-        raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: it holds no table")
+        raise InputError(f"checkpoint: {str(file)!r} is damaged or cannot be read: it holds no dictionary")
     return found
 
 
 def _instead(file: FilePath) -> str:
-    """Return a text on the files found in place of a missing one."""
+    """Return a message that a file of a checkpoint is missing, with the files that are there instead."""
     folder = file.parent
     if file.name != "scene.json":
         return f"{str(file)!r} is not there"
@@ -226,23 +243,26 @@ def _instead(file: FilePath) -> str:
 
 
 def crc_sums(data: dict, content: bytes) -> dict[str, int]:
-    """Return {file: CRC-32} of the files of a state.
+    """Return {name of the file: CRC-32 checksum} of the two files of a state.
 
     Args:
-        data: the data of state.json.
-        content: the bytes of the arrays.
+        data: data of the file state.json.
+        content: bytes of the file with the arrays.
     """
     summed = {key: value for key, value in data.items() if key != "checksums"}
     return {"state.json": zlib.crc32(json.dumps(summed, sort_keys=True).encode()), ARRAYS: zlib.crc32(content)}
 
 
 def named_os_errors(action: Callable[[], Any], folder: FilePath, what: str) -> Any:
-    """Return the result of an action, and complete the message of its OSError.
+    """Call a function; if it raises an OSError, add the checkpoint and the failed task to the message.
 
     Args:
         action: function without arguments.
-        folder: the checkpoint, for the message.
-        what: failed task, for the message.
+        folder: folder of the checkpoint, for the message.
+        what: the failed task, such as "state 3 could not be written".
+
+    Returns:
+        The result of the function.
 
     Raises:
         OSError: the error of the action, with the folder and the task in its message.

@@ -1,4 +1,4 @@
-"""Description of a scene as plain data, to compare scenes and to be read by people."""
+"""Description of a scene as JSON data, by which scenes are compared, and which people can read."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,11 +16,14 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 
 
 def describe(problem: Any) -> dict[str, Any]:
-    """Return the description of a problem as plain data for JSON; collective.
+    """Return the description of the scene of a problem as JSON data; collective.
 
     The entry "mesh" holds counts, and sums over the cells that change with any coordinate, tag or order of the cells.
-    "unknowns" is their number. The other entries are the public attributes of the parts of the scene. The description
-    is the same on any number of ranks.
+    "unknowns" is the number of unknowns. The other entries hold the public attributes of materials, supports, loads,
+    contacts, model and kinematics. The description is the same on any number of ranks.
+
+    Args:
+        problem: the `Problem`.
     """
     scene = problem.scene
     known = set(_PARTS) | {"mesh", "temperature", "preformed"}
@@ -42,11 +45,14 @@ def describe(problem: Any) -> dict[str, Any]:
 
 
 def plain(value: Any, depth: int = 8) -> Any:
-    """Return numbers, strings, lists and dictionaries in place of objects.
+    """Return an object as JSON data: numbers, strings, lists and dictionaries.
+
+    An object becomes {"kind": name of its class, name of a public attribute: its value}. Functions and objects that are
+    nested too deeply become text.
 
     Args:
         value: any object.
-        depth: levels of nested objects.
+        depth: largest number of nested levels.
     """
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -65,9 +71,14 @@ def plain(value: Any, depth: int = 8) -> Any:
 
 
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield (place, value in a, value in b) for each difference between two plain values.
+    """Yield the differences between two values of JSON data as (place, value in a, value in b).
 
-    A value that exists on one side only is None on the other.
+    A value that exists in one of them only is None in the other. Floats that agree to nine digits are equal.
+
+    Args:
+        a: JSON data.
+        b: JSON data.
+        where: place of the values in the whole data, such as "loads[0].on".
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
@@ -83,7 +94,18 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return {name: sum over a layer} of functions of a `Sample`, weighted so that a change at any point changes it."""
+    """Return weighted sums of fields over the sampled points of a layer; a change at any point changes the sum.
+
+    Collective.
+
+    Args:
+        scene: the scene.
+        layer: name of the layer.
+        fields: {name: function that returns the values at the points of a `Sample`}.
+
+    Returns:
+        {name: sum}.
+    """
     sample = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[sample.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(sample.places)))).ravel()
@@ -92,7 +114,10 @@ def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
 
 
 def _mesh(problem: Any) -> dict[str, Any]:
-    """Return numbers by which a checkpoint recognises its mesh: counts, extent and weighted sums of coordinates."""
+    """Return numbers by which a checkpoint recognises the mesh of a problem; collective.
+
+    They are counts of cells and facets, the extent, and weighted sums of the coordinates of the cells.
+    """
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
     x = of_cells(domain, owned)[..., :COORDINATES] / problem.forms.length

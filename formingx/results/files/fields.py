@@ -6,15 +6,16 @@ Every triangle has six nodes of its own, so nothing is averaged over an interfac
     stretches               larger and smaller stretch in the section, hoop stretch (`Stress.principal_stretches`).
     principal_stresses      principal Cauchy stresses in descending order, stress.
     cauchy_rr, _zz, _rz, _hoop  components of the Cauchy stress, stress.
-    hydrostatic_pressure    minus a third of its trace, stress.
-    stress_error            estimated error, constant in each triangle (`StressError.mean`), stress.
+    hydrostatic_pressure    minus a third of the trace of the Cauchy stress, stress.
+    stress_error            estimated error of the stress, constant in each triangle (`StressError.mean`), stress.
     elastic_stretch_1, _2   larger principal stretch of the elastic part of F in each relaxing branch, see below.
     contact_pressure        normal traction per deformed area of all tools, stress.
-    thickness, thickness_ratio  thickness of a sheet at this place, length, and over its original thickness.
+    thickness, thickness_ratio  thickness of the sheet at each point, length, and its ratio to the original thickness.
 
-The square of the elastic stretch is the larger eigenvalue of F Cv^-1 F^T in the section, without volume change. For a
-`TransientNetwork` it is the larger eigenvalue of F A F^T. The elastic stretch is 1 if the branch has relaxed, and the
-largest stretch if it has not relaxed at all. It is linear in each triangle, and nan in layers without such a branch.
+F is the deformation gradient, Cv or A the internal variable of a branch (`Viscoelastic`, `TransientNetwork`). The
+square of the elastic stretch is the larger eigenvalue of F Cv^-1 F^T or F A F^T in the section, without volume change.
+The elastic stretch is 1 if the branch has relaxed, and the largest stretch if it has not relaxed at all. It is linear
+in each triangle, and nan in layers without such a branch.
 
 The contact pressure is less accurate at the two nodes nearest the axis, which share their areas. A membrane has
 displacement and thickness only.
@@ -36,17 +37,18 @@ from .. import files
 from ..evaluate.contact_face import ContactFace
 
 _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]])}
-"""Places of the nodes in the reference cell, in the order of VTK, by dimension."""
+"""{dimension of the elements: positions of the nodes in the reference cell, in the order of VTK}."""
 
 
 class Fields:
-    """Computes fields of the states of a path at the nodes of all cells.
+    """Computes fields of the states of a path at the nodes of the cells that this rank owns.
 
     Args:
-        path: the computed `Path`.
+        path: the computed `Path`, with the states of one mesh.
 
     Attributes:
-        points: reference positions of the nodes of this rank's cells, shape (cells, nodes, components), length.
+        points: reference positions of the nodes of each cell, shape (cells, nodes, components), length.
+        dimension: dimension of the elements: 1 for an axisymmetric membrane, else 2.
     """
 
     def __init__(self, path: Any):
@@ -69,7 +71,7 @@ class Fields:
         """Return the fields of a state; collective.
 
         Returns:
-            {name: values, shape (cells, nodes, components)}.
+            {name of the field: values at the nodes of each cell, shape (cells, nodes, components)}.
         """
         problem, shape = self._problem, self.points.shape[:2]
         with problem.state_context(state):
@@ -105,13 +107,16 @@ class Fields:
         return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
 
     def _eval(self, expression: Any) -> np.ndarray:
-        """Return the values of a compiled expression at the nodes of this rank's cells, shape (cells, nodes, c)."""
+        """Return the values of a compiled vector at the nodes of each cell, shape (cells, nodes, components)."""
         if not len(self._cells):
             return np.zeros((0, len(_NODES[self.dimension]), self._components))
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
-        """Return the contact pressure at the nodes of the cells, zero away from tools, shape (cells, nodes)."""
+        """Return the contact pressure at the nodes of each cell in a state, shape (cells, nodes), stress.
+
+        It is 0 away from tools. Collective.
+        """
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
@@ -132,7 +137,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
         states: a state, several in order, or "all"; default the last.
 
     Raises:
-        InputError: the name has another ending, or a state is not of the path.
+        InputError: the name has another ending, or `states` has an entry that is not a `State`.
         OSError: a file cannot be written.
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
@@ -158,7 +163,12 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
-    """Return a VTU file as text: points and {name: values}, shape (cells, nodes, components)."""
+    """Return the content of a VTU file.
+
+    Args:
+        points: positions of the nodes of each cell, shape (cells, nodes, components).
+        values: {name of a field: values at the nodes, shape (cells, nodes, components)}.
+    """
     pyvista = figures.pyvista()
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
     cells, nodes = points.shape[:2]
@@ -175,16 +185,29 @@ def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
 
 
 def _three(array: np.ndarray) -> np.ndarray:
-    """Return vectors of three components, with zeros in place of the missing ones."""
+    """Return the vectors of an array, shape (..., c), as rows of three components, shape (n, 3).
+
+    Missing components are 0.
+    """
     rows = array.reshape(-1, array.shape[-1])
     return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1])))
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
-    """Return [(number, state)] for the argument `states`; a state of `Path.at` gets the number after the last.
+    """Return the states to be written, with the numbers that are their times.
+
+    A state of the path has its number there. A state that was solved for by `Path.at` has its position in `states`. If
+    these numbers do not increase, the states are numbered from 0.
+
+    Args:
+        path: the computed `Path`.
+        states: argument `states` of `to_vtk`.
+
+    Returns:
+        Pairs (number, state).
 
     Raises:
-        InputError: a state is not of the path, or none is given.
+        InputError: `states` has an entry that is not a `State`, or none.
     """
     if isinstance(states, str):
         if states != "all":
@@ -201,16 +224,22 @@ def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
 
 
 def _gather(values: np.ndarray, comm: Any) -> Any:
-    """Return values of all ranks on rank 0."""
+    """Return the arrays of all ranks joined along their first axis on rank 0, and None on other ranks; collective."""
     parts = comm.gather(values, root=0)
     return np.concatenate(parts) if parts else None
 
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where m points, shape (m, 2), lie between the n lines from the bottom to the top of a sheet.
+    """Return the positions of m points between the n lines from bottom to top points of a sheet.
+
+    Args:
+        points: the points, shape (m, 2), length.
+        bottom: bottom points, shape (n, 2), length.
+        top: top points opposite them, shape (n, 2), length.
 
     Returns:
-        Number k of the last line before each point, and its position between lines k and k + 1, 0 to 1; shape (m,).
+        Number k of the last line before each point, shape (m,), and the position of the point between the lines k and
+        k + 1, 0 to 1, shape (m,).
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     across = top - bottom

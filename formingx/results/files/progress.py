@@ -7,7 +7,7 @@ from typing import Any
 
 @contextlib.contextmanager
 def progress(comm: Any, words: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on rank 0, if the block takes longer than two seconds.
+    """Show a progress bar on rank 0 while a block runs, if it takes longer than two seconds.
 
     Args:
         comm: MPI communicator.

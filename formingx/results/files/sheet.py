@@ -1,4 +1,4 @@
-"""Tables that are written as CSV or Excel files."""
+"""Base class of tables that print, and that are written as CSV or Excel files."""
 
 import math
 from typing import Any
@@ -9,8 +9,8 @@ from ...errors import InputError
 from ...units import NONE, Units
 from . import tabular
 
-_SHOWN = 10        # rows that are printed: the first and the last
-_LONGEST = 32_767  # characters of a cell in Excel
+_SHOWN = 10        # number of printed rows, half of them at the beginning and half at the end
+_LONGEST = 32_767  # largest number of characters in a cell of Excel
 
 
 class Sheet:
@@ -24,11 +24,11 @@ class Sheet:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Columns of the files: {name: values, shape (n,)}."""
+        """Columns of the table: {name: values, shape (n,)}."""
         raise NotImplementedError
 
     def to_csv(self, file: Any, units: Units = NONE) -> None:
-        """Write the table as a CSV file.
+        """Write the table as a CSV file (rank 0 writes).
 
         Args:
             file: its name ends in .csv.
@@ -41,7 +41,7 @@ class Sheet:
         tabular.write_rows(file, self._header(units), self._rows(), self.comm)
 
     def to_excel(self, file: Any, units: Units = NONE) -> None:
-        """Write the table as an Excel file.
+        """Write the table as an Excel file (rank 0 writes).
 
         Args:
             file: its name ends in .xlsx.
@@ -56,14 +56,15 @@ class Sheet:
             from openpyxl import Workbook
             from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
         except ImportError:
-            raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs nothing") from None
+            raise InputError("to_excel: needs openpyxl, which is not installed; to_csv needs no library") from None
         book = Workbook()
         sheet: Any = book.active
         for n, row in enumerate((self._header(units), *self._rows())):
             for name, cell in zip(self.columns, row):
                 if isinstance(cell, str) and (len(cell) > _LONGEST or ILLEGAL_CHARACTERS_RE.search(cell)):
                     raise InputError(f"to_excel: column {name!r}, row {n}: {len(cell)} characters, {cell[:40]!r}...: an"
-                                     f" Excel cell holds {_LONGEST}, and none that cannot be printed; to_csv writes it")
+                                     f" Excel cell holds at most {_LONGEST} characters, all of them printable; to_csv"
+                                     f" writes it")
             sheet.append([v.item() if isinstance(v, np.generic) else v for v in row])
         sheet.freeze_panes = "A2"
         tabular.on_root(self.comm, lambda: tabular.replace(file, book.save, "wb"))
@@ -81,16 +82,16 @@ class Sheet:
         return str(self)
 
     def _header(self, units: Units) -> list[str]:
-        """Return the names of the columns with their units."""
+        """Return the names of the columns with their units, such as "wall [mm]"."""
         return [units.heading(name) for name in self.columns]
 
     def _rows(self) -> list[tuple]:
-        """Return the rows of the table."""
+        """Return the rows of the table, each with one value per column."""
         return list(zip(*self.columns.values(), strict=True))
 
 
 def _words(column: Any) -> list[str]:
-    """Return a column as text: numbers to the fifth digit of the largest."""
+    """Return the cells of a column as text; all numbers are rounded to the fifth digit of the largest number."""
     values = np.asarray(column)
     if values.dtype.kind != "f":
         return [str(v) for v in values]

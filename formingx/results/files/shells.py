@@ -12,18 +12,18 @@ from . import tabular
 
 
 def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return quadratic shell elements on the middle surface of a body of revolution.
+    """Return quadratic shell elements on the middle surface of an axisymmetric sheet.
 
-    The nodes lie half-way between opposite nodes of the two faces. Along the section there is one element per edge of a
-    face.
+    The nodes lie half-way between opposite points of the two faces. Along the section there is one element for each
+    edge of a face.
 
     Args:
-        profile: the `Profile` of the section.
+        profile: the `Profile` of the sheet.
         parts: number of elements round the axis.
 
     Returns:
-        Nodes, shape (n, 3), length; walls, shape (n,), length; node numbers from 0 of the S6 elements, shape (m, 6),
-        and of the S8R elements, shape (k, 8).
+        Nodes (x, y, z), shape (n, 3), length. Wall thickness at the nodes, shape (n,), length. Node numbers from 0 of
+        the triangles (S6), shape (m, 6), and of the quadrilaterals (S8R), shape (k, 8).
     """
     wall = (distance_to_line(profile.bottom, fine(profile.top))
             + distance_to_line(profile.top, fine(profile.bottom))) / 2
@@ -48,13 +48,19 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
-    """Write nodes, elements, walls, and the set of nodes at the rim (rank 0 writes).
+    """Write an axisymmetric sheet as shell elements for CalculiX or Abaqus (`Path.to_inp`; rank 0 writes).
+
+    The file holds nodes, elements, wall thickness, and the set of nodes at the rim.
 
     Args:
-        profile: the `Profile` of the section.
+        profile: the `Profile` of the sheet.
         parts: number of elements round the axis.
         file: its name ends in .inp.
         comm: MPI communicator.
+
+    Raises:
+        InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)

@@ -13,11 +13,13 @@ from ...units import LENGTHS, NONE, Units
 from ..evaluate.profile import fine
 from . import tabular
 
-_PARTS = 4  # straight pieces for an element's edge
+_PARTS = 4  # number of straight pieces that replace the curved edge of an element
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
-    """Return the closed surface of a sheet, revolved about the axis or, in plane strain, extruded by its width.
+    """Return the closed surface of a sheet as triangles.
+
+    An axisymmetric section is revolved about the axis. In plane strain it is extruded by its width.
 
     Args:
         profile: the `Profile` of the section.
@@ -25,7 +27,8 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         parts: number of strips round the axis.
 
     Returns:
-        Points, shape (n, 3), length, and triangles, shape (m, 3), counter-clockwise seen from outside.
+        Points (x, y, z), shape (n, 3), length. For each triangle the rows of its corners in the points, shape (m, 3),
+        counter-clockwise seen from outside.
     """
     line = np.vstack([fine(profile.bottom, _PARTS), fine(profile.top, _PARTS)[::-1]])      # its edges are curved
     n = len(line)
@@ -53,7 +56,15 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
 
 
 def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points and triangles as `solid`, and wall over original thickness at the points, shape (n,)."""
+    """Return the closed surface of a sheet with the wall over original thickness at its points.
+
+    Args:
+        profile: the `Profile` of the section.
+        axisymmetric: False in plane strain.
+
+    Returns:
+        Points, shape (n, 3), and triangles, shape (m, 3), as `solid` returns them, and the ratios, shape (n,).
+    """
     points, triangles = solid(profile, axisymmetric)
     n = len(profile.bottom)
     ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
@@ -65,7 +76,7 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
     """Write a surface from `coloured` as a binary STL file (rank 0 writes).
 
     Args:
-        surface: points, triangles and wall ratios.
+        surface: points, triangles and wall ratios; the ratios are not used.
         file: its name ends in .stl.
         comm: MPI communicator.
     """
@@ -114,7 +125,11 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
 
 
 def _ends(number: np.ndarray) -> list[np.ndarray]:
-    """Return the triangles of the two cut faces of an extruded sheet."""
+    """Return the triangles of the two end faces of an extruded sheet, shape (k, 3) each.
+
+    Args:
+        number: numbers of the points around the section at both ends, shape (2, n).
+    """
     found = []
     for row, sense in ((number[0], 1), (number[1], -1)):
         half = len(row) // 2

@@ -12,10 +12,11 @@ from ...findings import Finding, alarming
 from . import checkpoint_data
 
 _RECENT = 20
-"""Number of last steps that define the pace."""
+"""Number of last steps from which the remaining time is estimated."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
+"""Columns that show that the body moves."""
 _STILL = 1e-3
-"""Relative change of the quantities `_MOVES` over the last steps below which the body counts as not moving."""
+"""Relative change of the columns `_MOVES` over the last steps below which the body counts as not moving."""
 _MET = 1e-9
 """Relative distance from a target at which it counts as met."""
 
@@ -26,18 +27,18 @@ class Status:
 
     Attributes:
         states: number of states in the checkpoint.
-        stage: name of the stage, or "".
+        stage: name of the present stage, or "".
         verdict: reason why the last state is inadmissible, or "" (`State.verdict`).
-        target: (quantity, its value at the end of the stage, its value now), or None.
+        target: target of the stage: (column, its value at the target, its present value); None if no column holds it.
         spent: computing time so far, s.
-        left: estimated time to the end of the stage at the pace of the last steps, s. None if they came no nearer to
-            the target.
-        limits: {reason for shorter steps: count}, over the whole run.
+        left: computing time to the end of the stage, estimated from the last steps, s; 0 if the target is met. None if
+            the last steps came no nearer to the target.
+        limits: {reason for a shorter or failed step: count}, over the whole run.
         age: time since the last state was written, s.
         ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or was
             killed.
-        begun: True if the stage has no completed step yet.
-        moved: (quantity, value before, value after) for the quantity that changed most over the last steps, or None. It
+        begun: True if the stage has only one completed step.
+        moved: (column, value before, value after) of the column that changed most over the last steps, or None. It
             shows progress while the target does not come nearer, such as the pole height after a pressure maximum.
     """
 
@@ -55,7 +56,7 @@ class Status:
 
     @property
     def findings(self) -> list[Finding]:
-        """Warnings and serious findings on the last state and, after the end, on the run."""
+        """Warnings and serious findings on the last state and, if the run has ended, on the run."""
         ended = [] if self.ended is None else alarming(self.ended["findings"])
         state = [Finding("serious", "state", self.verdict)] if self.verdict else []
         return state + [finding for finding in ended if not (state and finding.about == "state")]
@@ -80,20 +81,23 @@ class Status:
         return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
 
     def _without_pace(self) -> str:
-        """Return the reason why the remaining time is unknown."""
+        """Return the reason why the remaining time is unknown, as text."""
         if self.target is None:
-            return "the time left is not known, as no column holds what the stage aims at"
+            return "the remaining time is not known, as no column holds the target of the stage"
         if self.begun:
             return "the stage has just begun"
         if self.moved is None:
-            return "no nearer to the target in the last steps"
+            return "the last steps came no nearer to the target"
         name, before, now = self.moved
-        return (f"the body goes on, {name.replace('_', ' ')} {before:.5g} to {now:.5g} in the last steps; its time left"
-                f" is not known, as the target came no nearer")
+        return (f"the body moves, {name.replace('_', ' ')} {before:.5g} to {now:.5g} in the last steps; the remaining"
+                f" time is not known, as the target came no nearer")
 
 
 def of_folder(folder: Any) -> Status:
-    """Return the status of the run that writes to a checkpoint.
+    """Return the status of a run from its checkpoint.
+
+    Args:
+        folder: folder of the checkpoint.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -120,16 +124,16 @@ def of_folder(folder: Any) -> Status:
 
 
 def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
-    """Return the target of a step, as a column and its value.
+    """Return the target of the stage that a step belongs to, as a column and its value.
 
-    The target of a pressure refers to the column of the controlled load.
+    A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure".
 
     Args:
-        stepping: data of the step control, from a checkpoint.
+        stepping: data on the step (`State.stepping`).
         measures: names of the columns.
 
     Returns:
-        (column, value), or None without a target.
+        (name of the column, value), or None without a target.
     """
     if "until" not in stepping:
         return None
@@ -139,7 +143,7 @@ def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, floa
 
 
 def _words(seconds: float) -> str:
-    """Return a duration in a suitable unit with two digits."""
+    """Return a duration, s, as text with two digits in days, h, min or s."""
     size, unit = next(((s, u) for s, u in ((86400, "days"), (3600, "h"), (60, "min")) if seconds >= 2 * s), (1, "s"))
     return f"{seconds / size:.2g} {unit}"
 
@@ -150,9 +154,9 @@ def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[
     A folder that does not exist yet, is empty, or holds no state is waited for (`checkpoint_data.begun`).
 
     Args:
-        folder: the checkpoint.
-        every: time between two readings, s.
-        patience: time without a new state after which to stop, s.
+        folder: folder of the checkpoint.
+        every: time between two readings of the folder, s.
+        patience: time without a new state after which watching ends, s.
 
     Raises:
         InputError: the folder holds other files, is damaged, or holds no state in time.

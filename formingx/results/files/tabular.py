@@ -1,4 +1,4 @@
-"""Tables of paths and profiles as CSV, summaries as JSON. Rank 0 writes; a file is written whole or not at all."""
+"""Paths and profiles as CSV tables, and summaries as JSON. Rank 0 writes; a file is written whole or not at all."""
 
 import csv
 import json
@@ -14,12 +14,14 @@ from ...units import NONE, Units
 
 
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
-    """Write one row per state: stage (of a process), kind, iterations, then every column of the path.
+    """Write a CSV file with one row per state (`Path.to_csv`; rank 0 writes).
+
+    The columns are the stage (in a process), the kind of the state, the iterations, and every column of the path.
 
     Args:
         path: the computed `Path`.
         file: its name ends in .csv.
-        units: units for the header; in plane strain per unit depth.
+        units: units for the header, such as "tool_force [N]"; in plane strain forces are per unit depth.
     """
     units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
@@ -30,7 +32,16 @@ def write_path(path: Any, file: Any, units: Units = NONE) -> None:
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
-    """Write one row per node of the bottom face: reference position, arc length, deformed faces, thickness, ratio."""
+    """Write a CSV file with one row per bottom point of a sheet (rank 0 writes).
+
+    The columns are reference radius and arc length, deformed arc length, deformed positions of bottom and top point,
+    thickness, and thickness ratio.
+
+    Args:
+        profile: the `Profile`.
+        file: its name ends in .csv.
+        comm: MPI communicator.
+    """
     columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
                "thickness", "thickness_ratio"]
     table = np.column_stack([profile.reference_radius, profile.reference_length, profile.arc_length, profile.bottom,
@@ -39,12 +50,12 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """Write a CSV file with a header and all digits.
+    """Write a CSV file with a header, and numbers with all their digits (rank 0 writes).
 
     Args:
         file: its name ends in .csv.
         header: names of the columns.
-        rows: rows of the table.
+        rows: rows of the table, each with one value per column.
         comm: MPI communicator.
 
     Raises:
@@ -66,8 +77,8 @@ def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
     """Write key numbers as a JSON file.
 
     Args:
-        file: the file.
-        summary: the numbers.
+        file: name of the file.
+        summary: {name: number, text, list or dictionary}.
         comm: MPI communicator; rank 0 writes.
 
     Raises:
@@ -78,7 +89,7 @@ def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
 
 
 def versions() -> dict[str, str]:
-    """Return {program: version} of the programs that a result depends on."""
+    """Return {name of the program: version} of the programs that results depend on."""
     import dolfinx
     import petsc4py
     from petsc4py import PETSc
@@ -87,9 +98,13 @@ def versions() -> dict[str, str]:
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
-    """Return the result of a function that rank 0 alone calls, on all ranks; collective.
+    """Call a function on rank 0 alone, and return its result on all ranks; collective.
 
-    An exception of the function is raised on all ranks.
+    An OSError, ValueError or ImportError of the function is raised on all ranks.
+
+    Args:
+        comm: MPI communicator.
+        action: function without arguments.
     """
     result, error = None, None
     if comm.rank == 0:
@@ -105,12 +120,12 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
 
 
 def named(caller: str, file: Any, *endings: str) -> Any:
-    """Return the name of a file as a path.
+    """Check the name of a file, and return it as a `pathlib.Path`.
 
     Args:
         caller: name of the calling method, for the message.
-        file: the name.
-        endings: allowed endings.
+        file: name of the file.
+        endings: allowed endings, such as ".csv".
 
     Raises:
         InputError: the name has another ending.

@@ -1,0 +1,45 @@
+"""Energy that materials dissipate in a step."""
+
+from ...measures.quantities import Bound
+from ...solve import predictor
+from ...solve.record import Segment
+from ...solve.state import State
+
+
+def dissipated_energy(segment: Segment, states: list[State], power: Bound) -> float:
+    """Return the energy that materials dissipate between the last two of given states, by Simpson's rule; collective.
+
+    In the middle of the step the body lies on the predicted curve, and its history variables are advanced to that time.
+
+    Args:
+        segment: the segment of the states.
+        states: successive states with the column "dissipated_power".
+        power: the dissipated power of the whole part, bound to the problem of the segment.
+
+    Returns:
+        The energy of the whole part, stress length^3; in plane strain stress length^2.
+    """
+    before, state = states[-2:]
+    if not before.time < state.time:                         # as after remeshing
+        return 0.0
+    time = (before.time + state.time) / 2
+    if state.setting["rate"][-1]:
+        x, control = segment.curve.interpolate(before, state, 0.5)
+    else:                                                    # time passes, independent of the control: no tangents
+        past = [*predictor.recent_states(states[:-1], time, predictor.CUBIC - 1), state]
+        weights = predictor.weights(past, time)
+        x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
+    with segment.problem.state_context(before) as problem:
+        if not state.setting["rate"][-1]:
+            problem.clock = time
+        time = problem.forms.time_at(control)
+        problem.x.array_w[:] = x
+        problem.set_fields_and_control(x, control)
+        for history in problem.materials:
+            history.advance(x, control)
+        half = power.value(problem.x, control)
+    a, b = (s.measures["dissipated_power"] for s in (before, state))
+    # the parabola through the three powers, at times that need not be even
+    share = (time - before.time) / (state.time - before.time)
+    return (state.time - before.time) * (
+        a * (3 - 1 / share) + half / (share * (1 - share)) + b * (3 - 1 / (1 - share))) / 6
