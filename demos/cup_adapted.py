@@ -86,7 +86,7 @@ def draw(runs, walls, truth, last):
              title=f"wall beside the corner, {last} psi",
              xscale="log")
     right.set(xlabel="reference radius R, cm", title="finest meshes", yscale="log",
-              ylabel="length of a column in the reference configuration, cm")
+              ylabel="reference length of a column, cm")
     plain_ticks(left.xaxis, (*UNIFORM, REFERENCE))
     plain_ticks(right.yaxis, (0.05, 0.1, 0.2, 0.5))
     for axes in (left, right):

@@ -119,7 +119,7 @@ def draw(ran):
     left.set(xlabel="travel, cm", ylabel="force on the plug, N", title="force (dashed: membrane)", xlim=(0, None),
              ylim=(0, None))
     right.set(xlabel="reference radius R, cm", title="meshes", yscale="log",
-              ylabel="length of a column in the reference configuration, cm")
+              ylabel="reference length of a column, cm")
     right.axvline(PLUG, color="0.7", linewidth=1)
     for axes in (left, right):
         axes.grid(alpha=0.3)

@@ -22,7 +22,7 @@ PANELS = {
     "even_disc": (0, 0, 0.5, 1), "even_pot": (0, 0, 0.5, 1), "even_trough": (0, 0, 0.5, 1),
     "fit_treloar": (0, 0.04, 0.325, 0.79), "heated_disc": (1 / 3, 0, 0.655, 1), "heating": (2 / 3, 0.485, 1, 1),
     "kbkz": (2 / 3, 0, 1, 1), "material_constants_plates": (0, 0, 0.58, 1), "measured_biaxial": (0.5, 0, 1, 1),
-    "measured_ellipse": (0, 0, 0.352, 1), "measured_ldpe": (1 / 3, 0, 2 / 3, 1), "measured_treloar": (0, 0, 0.5, 1),
+    "measured_ellipse": (0, 0, 0.361, 1), "measured_ldpe": (1 / 3, 0, 2 / 3, 1), "measured_treloar": (0, 0, 0.5, 1),
     "oven": (0, 0, 0.49, 1), "plug_adapted": (0, 0, 0.5, 1), "plug_friction": (0, 0, 0.5, 1),
     "plug_stress_held": (0, 0.04, 0.33, 0.515), "pot_study": (0, 0, 1 / 3, 1), "relaxation": (0, 0, 0.32, 1),
     "relaxing_pot": (0.5, 0, 1, 1), "setting_pot": (0, 0, 0.49, 1),
