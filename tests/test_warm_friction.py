@@ -90,7 +90,7 @@ def test_it_is_told_in_files_and_reports():
 @pytest.mark.parametrize("friction, temperature, words", [
     (RISING, None, "friction depends on the temperature: give Scene a temperature"),
     (RISING, 160.0, r"friction: .*temperature = 160: must be from 20 to 150"),
-    (fx.table({20.0: -0.1, 150.0: 0.4}), 150.0, "least value = -0.1: must not be negative"),
+    (fx.table({20.0: -0.1, 150.0: 0.4}), 150.0, "smallest value = -0.1: must not be negative"),
     (fx.of_temperature(lambda T: T - 151), 150.0, "friction = -1 at a temperature of 150: must be at least 0"),
     (fx.of_temperature(lambda T: np.where(T > 0, np.nan, T)), 150.0, "nan, not a finite number, at temperature = 150"),
     (lambda R, Z: R, 150.0, "a number or, by temperature"),
