@@ -10,7 +10,7 @@ The temperature w satisfies
 .. math:: C \frac{\partial w}{\partial t} = k \frac{\partial^2 w}{\partial y^2}, \qquad
           -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = w_{back} \text{ at the back}
 
-In an implicit stage M w' = known + c rate the line responds linearly to q: its face has w = w_free - z q, with one z
+In an implicit stage M w' = known + c rate the line responds linearly to q. Its face has w = w_free - z q, with one z
 for all lines. The line is therefore condensed:
 
 .. math:: q = g (w_{free} - T), \qquad g = \frac{h}{1 + z h}

@@ -183,7 +183,7 @@ class PastStates:
         return found.reshape(-1, X.ufl_shape[0])
 
     def _needed(self, states: list[Past], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
-        """Return the numbers of the past states to keep, without those that neighbours interpolate well; collective.
+        """Return the numbers of the past states to keep: all that their neighbours do not interpolate; collective.
 
         Args:
             states: K past states, the last of them the present one.

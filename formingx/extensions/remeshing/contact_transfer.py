@@ -62,8 +62,8 @@ class ContactState(NamedTuple):
     def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
         """Return how far points of a new mesh must move out of the tool to be as deep as the old face beside them.
 
-        Between two old points in contact this is their interpolated depth; elsewhere points in the tool move to its
-        surface, or to the depth of an old neighbour in contact.
+        Between two old points in contact the depth is interpolated. Elsewhere points in the tool move to its surface,
+        or to the depth of an old neighbour in contact.
 
         Args:
             x: positions of the new points in the frame of the tool, shape (n, 2), length.

@@ -1,8 +1,8 @@
 """Unstable modes of a state: their number (inertia), their shapes (inverse iteration), and their critical points.
 
-The second variation K of a mixed formulation is a saddle-point matrix with pressures and Lagrange multipliers. Its
-factors K = L D L^T have one negative pivot for each of these, and one more for each unstable mode (Sylvester's law of
-inertia).
+The second variation K of a mixed formulation is a saddle-point matrix with pressures and Lagrange multipliers. By
+Sylvester's law of inertia its factors K = L D L^T have one negative pivot for each of these, and one for each unstable
+mode.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ A mode is
 .. math:: u_r = U \cos n\theta, \quad u_z = W \cos n\theta, \quad u_\theta = V \sin n\theta, \quad
     p = Q \cos n\theta
 
-and in plane strain the same with k x3 for n theta. Modes of different n are not coupled. The change H of F by a mode is
-split by reflection: its entries within the blocks of F (from U, W and the hoop stretch) and across them are not coupled
-at second order, so
+and in plane strain the same with k x3 for n theta. Modes of different n are not coupled. The change H of F by a mode
+has entries within the blocks of F (from U, W and the hoop stretch) and across them. By reflection the two parts are
+not coupled at second order, so
 
 .. math:: \delta^2 E = \delta^2 E(F + H_{within}) + \delta^2 E(F + H_{across})
 
@@ -59,8 +59,8 @@ class _BodyWithMode(LoadedBody):
 class SecondVariation:
     """Second variation of the energy of a solid at the present state of its problem, for one wave number n at a time.
 
-    A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta); in plane strain
-    with k x3 in place of n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A
+    A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta).
+    In plane strain k x3 replaces n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A
     mode antisymmetric about a symmetry plane is possible if the support has `mirror=True`.
 
     Args:
@@ -314,8 +314,8 @@ class SecondVariation:
     def _find_constrained(self, number: float, flipped: str | None) -> np.ndarray:
         """Return the local numbers of the constrained unknowns of modes, with ghosts.
 
-        A boundary or node that is constrained in r and in z is also constrained round the axis: a clamped rim, a fixed
-        node, a face with prescribed displacement.
+        A boundary or node that is constrained in r and in z is also constrained round the axis. Examples are a clamped
+        rim, a fixed node, a face with prescribed displacement.
 
         Args:
             number: circumferential wave number; in plane strain the wave number along the depth.
@@ -349,7 +349,7 @@ class SecondVariation:
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Yield (number of the item in the scene, row, correction) for each constraint of a mean displacement.
 
-        The row for modes of circumferential wave number n is row - m correction, with m = 1 for n = 1 and 0 else; both
+        The row for modes of circumferential wave number n is row - m correction, with m = 1 for n = 1 and 0 else. Both
         have the shape (locally owned unknowns,). A support that constrains both mean components also constrains the
         mean hoop displacement.
         """
