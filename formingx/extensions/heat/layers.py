@@ -1,8 +1,8 @@
 """Mesh for heat: elements below faces that exchange heat are cut into thin layers.
 
 By a time t heat penetrates to a depth sqrt(a t), with the diffusivity a, and elements there must be smaller. The
-thickness of a layer at a depth y is a given part of the larger of two lengths: the penetration depth at the first time
-of interest, and y/3. Later and deeper profiles are therefore resolved too.
+thickness of a layer at a depth y is a given part of a length. This is the penetration depth at the first time of
+interest, or y/3 if that is larger. Later and deeper profiles are therefore resolved too.
 
 An edge between two elements is cut once, for both. Triangles are cut into rows between the cuts of their edges, in the
 shape of the original element.

@@ -25,8 +25,8 @@ from .modes import Kind, Located, Modes
 class CriticalPoint:
     """Point of a path at which one mode becomes unstable, or stable again.
 
-    The mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta).
-    In plane strain k x3 replaces n theta.
+    The mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta). In plane
+    strain k x3 replaces n theta.
 
     Attributes:
         path: the computed `Path`.
