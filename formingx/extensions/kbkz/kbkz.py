@@ -39,9 +39,9 @@ class KBKZ(Relaxing):
 
     .. math:: \tau = \int_{-\infty}^{t} \sum_k \frac{G_k}{\tau_k} e^{-(t - t')/\tau_k} \, h(I_1, I_2) \, B(t, t') \, dt'
 
-    tau is the Kirchhoff stress up to a pressure, B the Finger tensor of the deformation since the time t'. I1 = tr B and
-    I2 = tr B^-1. In small strains the relaxation modulus is G(t) = G_equilibrium + sum G_k exp(-t/tau_k). The state alone
-    does not determine the stored energy of a damped material, so runs with it have no columns of energies.
+    tau is the Kirchhoff stress up to a pressure, B the Finger tensor of the deformation since the time t'. I1 = tr B
+    and I2 = tr B^-1. In small strains the relaxation modulus is G(t) = G_equilibrium + sum G_k exp(-t/tau_k). The state
+    alone does not determine the stored energy of a damped material, so runs with it have no columns of energies.
 
     Args:
         spectrum: [(G, tau), ...], at least one: modulus, stress, and relaxation time, time; each above 0.
