@@ -13,7 +13,7 @@ from formingx.results import files
 
 
 def spiral(t, shift=0.0):
-    """A curve on which both columns turn back: nothing is a function of anything."""
+    """Return a curve on which both columns turn back."""
     return {"pressure": 3.0 + t * np.cos(t) / 5 + shift, "pole_height": 100 * t * np.sin(t)}
 
 
@@ -23,7 +23,7 @@ def write(file, header, columns):
 
 
 def test_same_curve_other_points():
-    """Two samplings of one curve: no difference but that of curves through points."""
+    """Two samplings of one curve differ only by the interpolation."""
     t = np.linspace(0, 12, 700)
     found = fx.compare(spiral(t), spiral(np.linspace(0.2, 11.8, 173)))
     assert found.columns == ["pressure", "pole_height"] and found.beyond == 0
@@ -33,7 +33,7 @@ def test_same_curve_other_points():
 
 
 def test_error_falls_with_the_points():
-    """What is left falls fast with the number of points, and `resolution` is above it."""
+    """The interpolation error decreases fast with the number of points, and is below `resolution`."""
     errors = []
     for n in (40, 80, 160):
         found = fx.compare(spiral(np.linspace(0, 12, n)), spiral(np.linspace(0.2, 11.8, 173)))
@@ -43,7 +43,7 @@ def test_error_falls_with_the_points():
 
 
 def test_known_shift():
-    """A straight line moved along its normal: half of the distance on each scaled axis."""
+    """The differences of a straight line that is moved along its normal are its displacements in both columns."""
     t = np.linspace(0, 1, 21)
     found = fx.compare({"a": 2 * t, "b": 10 * t}, {"a": 2 * t + 0.02, "b": 10 * t - 0.1}, along="arc length")
     for name, value in (("a", 0.02), ("b", -0.1)):
@@ -54,7 +54,7 @@ def test_known_shift():
 
 @pytest.mark.parametrize("factor", [1.03, 0.8])
 def test_walls_are_compared_at_the_same_radius(factor):
-    """Theirs is thicker everywhere by a factor, on other nodes, from the rim in: that is what is reported."""
+    """A wall that is thicker by a factor, at other nodes and in reverse order, differs by this factor."""
     def wall(r):
         return 0.2 + np.exp(-8 * (r - 0.9) ** 2) + 0.3 * np.tanh(20 * (r - 0.5))
     r, s = np.linspace(0, 1, 160), np.linspace(1, 0, 57)
@@ -83,7 +83,7 @@ def test_a_longer_curve_is_cut():
 
 
 def test_limit_points_of_a_table():
-    """Maximum and minimum of a cubic, from 25 points; marked ones are taken as they are."""
+    """The maximum and the minimum of a cubic are found from 25 points."""
     t = np.linspace(-2, 2, 25)
     cubic = {"pressure": t**3 - 3 * t, "travelled": t}
     found = fx.compare(cubic, cubic).limit_points[1]
@@ -92,7 +92,7 @@ def test_limit_points_of_a_table():
 
 
 def test_units(tmp_path):
-    """psi and inches in the header against kg/cm2 and cm; factors; other names; semicolons; comments."""
+    """Units of a header or factors convert their values; the file has semicolons and comments."""
     t = np.linspace(0, 5, 30)
     ours = {"pressure": np.sin(t), "pole_height": t}
     text = ["# from elsewhere", "H (in);p [psi]"] + [f"{h / 2.54!r};{p / 0.070306957964!r}"
@@ -112,7 +112,7 @@ def test_units(tmp_path):
 
 
 def test_run_against_hand_coded_solver(tmp_path):
-    """The other side as it comes: a coarse CSV of a hand-coded program, past the pressure maximum."""
+    """A run agrees with the coarse curve of a hand-coded program past the pressure maximum, and with its nodes."""
     scene = treloar((10, 1), fx.PinnedNode(1.25, 0.041),
                     model=fx.DisplacementPenalty(eps=0.1, stress_free=False))
     path = fx.trace(scene, until=fx.pole_stretch(3.5), progress=False)
@@ -170,7 +170,7 @@ def test_bad_tables(tmp_path, text, message):
 
 
 def test_numbers_near_the_largest():
-    """A range that is no number is refused; points that fall into one beside a far one are taken as one."""
+    """Curves with values near the largest number are compared; ranges that differ by too much are refused."""
     far = {"a": [0.0, 1.0, 2.0, 1e308], "b": [0.0, 1.0, 3.0, 1e308]}
     assert fx.compare(far, far).differences["b"].maximum < 1e-9 * 1e308
     for theirs in ({"a": [-1e308, 1e308], "b": [0.0, 1.0]}, {"a": [0.0, 1e200], "b": [0.0, 1.0]}):
@@ -187,7 +187,7 @@ def test_a_cell_without_end(tmp_path):
 
 @pytest.mark.parametrize("stage", ["#1 blow", "a, b", 'the "plug"', "two\nlines", "a\u2028b"])
 def test_names_of_stages_are_read_back(tmp_path, stage):
-    """Whatever a stage is called: its rows are there when a CSV file is read."""
+    """Rows of a CSV file are read back for any name of a stage."""
     columns = {"stage": [stage, stage, "last"], "a": [0.0, 1.0, 2.5], "b": [3.0, 2.0, 4.0]}
     files.write_rows(tmp_path / "run.csv", list(columns), zip(*columns.values()), MPI.COMM_SELF)
     table = csv_files.read(tmp_path / "run.csv")
@@ -197,14 +197,14 @@ def test_names_of_stages_are_read_back(tmp_path, stage):
 
 @pytest.mark.parametrize("name", ["mould;1_force", "a\tb", "r, mm"])
 def test_names_of_columns_are_read_back(tmp_path, name):
-    """A semicolon or a tab in a name parts no cells."""
+    """A semicolon, a tab or a comma in the name of a column does not divide cells."""
     files.write_rows(tmp_path / "run.csv", ["stage", "x", name], [["blow; hold", 0.0, 1.5], ["b", 1.0, 2.5]],
                      MPI.COMM_SELF)
     assert csv_files.read(tmp_path / "run.csv").columns[name].tolist() == [1.5, 2.5]
 
 
 def test_on_two_ranks(tmp_path):
-    """The same report, and one file, on any number of ranks."""
+    """Report and file are the same on one and on two ranks."""
     write(tmp_path / "theirs.csv", "pressure,pole_height", [[0.0, 0.3, 0.45, 0.49], [0.0, 0.5, 0.9, 1.3]])
     script = f"""import sys; sys.path.insert(0, 'tests')
 import formingx as fx

@@ -9,14 +9,14 @@ CAN = {"supports": [fx.Symmetry("axis"), fx.SimplySupported("rim")], "loads": [f
 
 
 def disc(c=0.0, h=0.05, height=0.6):
-    """An inflated sheet: a constant that varies, a thickness, and the height of its pole."""
+    """Return an inflated sheet with a constant c of a varying stiffness, a thickness h, and a height of the pole."""
     mesh = fx.mesh.disc(radius=1.0, thickness=h, elements=(8, 1))
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + c * R**2)), **CAN), \
         fx.pole_height(height)
 
 
 def programmed(h, model=None):
-    """The same with a wall along the radius."""
+    """Return an inflated sheet whose thickness varies along the radius."""
     mesh = fx.mesh.disc(radius=1.0, thickness=lambda R: np.exp(h(R)) / 50, elements=(10, 1))
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), model=model, **CAN), fx.pole_stretch(1.2)
 
@@ -30,7 +30,7 @@ def highest_pressure(path):
 
 
 def test_derivatives_are_those_of_whole_runs():
-    """Of the material, of the shape and of the target, of the pressure and of the wall."""
+    """Derivatives of pressure, wall and volume by constant, thickness and target agree with central differences."""
     design = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1), "height": (0.6, 0.1, 1.0)})
     run, at = design.run(), {"c": 0.0, "h": 0.05, "height": 0.6}
     for measure, of in (("pressure", lambda run: run.path["pressure"][-1:]), ("wall", lambda run: run.wall)):
@@ -44,7 +44,7 @@ def test_derivatives_are_those_of_whole_runs():
 
 
 def heated(heater):
-    """A sheet that heaters soften before it is blown."""
+    """Return a sheet that heaters soften before it is blown."""
     mesh = fx.mesh.disc(radius=0.15, thickness=2e-3, elements=(4, [1, 1]))
     heat = fx.heat(mesh, fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0), unit="C",
                    start=25.0, times=20.0, tolerance=5.0, boundaries=[
@@ -56,7 +56,7 @@ def heated(heater):
 
 @pytest.mark.slow
 def test_heaters():
-    """A derivative goes through radiation and conduction, which the script's function runs."""
+    """The derivative by a heater temperature includes radiation and conduction, which the user's function computes."""
     design = fx.Design(heated, {"heater": (430.0, 300, 500)})
     above, below = (design.run({"heater": heater}).wall for heater in (431, 429))
     by = design.run().derivative("wall")[1][:, 0]
@@ -64,7 +64,7 @@ def test_heaters():
 
 
 def pushed(b, mu="none"):
-    """A ball pushes a sheet."""
+    """Return a sheet that a ball is pushed into."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -73,7 +73,7 @@ def pushed(b, mu="none"):
 
 
 def blown(b):
-    """A sheet that relaxes as it is inflated."""
+    """Return a sheet that relaxes as it is inflated."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1))
     relaxes = fx.Viscoelastic(fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * R**2)), branches=[(1.0, 1.0)])
     scene = fx.Scene(mesh=mesh, materials=relaxes, supports=CAN["supports"], loads=[fx.Pressure("bottom", name="air")])
@@ -83,7 +83,7 @@ def blown(b):
 @pytest.mark.parametrize("build", (lambda b: disc(c=b), pushed, blown, lambda b: pushed(0.0, 0.3 + b)),
                          ids=("elastic", "contact", "relaxing", "friction"))
 def test_taylor(build):
-    """What the derivative leaves out is of second order, over three decades: in time, in contact, of friction too."""
+    """The error of the linearisation is of second order over two decades: elastic, in contact, in time, of friction."""
     design = fx.Design(build, {"b": (0.0, -1, 1)})
     run = design.run()
     wall, by = run.derivative("wall")
@@ -93,7 +93,7 @@ def test_taylor(build):
 
 
 def test_a_membrane_with_a_programmed_wall():
-    """At its nodes too, where the slopes of elements differ."""
+    """The derivative by the value at a knot agrees with central differences, for a membrane."""
     design = fx.Design(lambda h: programmed(h, fx.Membrane()), {"h": fx.spline(6, start=0.0, smooth=True)})
     by, h = design.run().derivative("wall")[1], 1e-3 * np.eye(6)[4]
     above, below = (design.run({"h": way * h}).wall for way in (1, -1))
@@ -101,7 +101,7 @@ def test_a_membrane_with_a_programmed_wall():
 
 
 def test_an_even_wall():
-    """Its thickness at the pole is the wall over that stretch squared."""
+    """In at most 4 runs the wall is even; the thickness at the pole is then the wall times the stretch squared."""
     answer = fx.Design(programmed, {"h": fx.spline(6, start=0.0, low=-2, high=2, smooth=True)}).fit(even=True,
                                                                                                     good=1e-3)
     assert answer.paths <= 4 and answer.cv[0] > 0.03 and answer.cv[1] < 1e-3
@@ -149,7 +149,7 @@ def test_bad_input_is_told_in_words():
 
 
 def test_what_is_not_reached_is_said():
-    """A wall, a volume and a minimum wall beyond the bounds."""
+    """Results name a wall, a volume and a minimum wall that the bounds make unattainable, and the reason."""
     design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
     answer = design.fit(wall=1.0, volume=None)
     assert "within the bounds, would be 0.9 % better" in answer.reason
@@ -171,7 +171,7 @@ def test_what_is_not_reached_is_said():
 
 
 def cup(b, fillet=0.2):
-    """A sheet that sticks to a cup as it comes to it."""
+    """Return a sheet that sticks to a cup where it touches it."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.03, elements=(12, 1))
     mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=0.03, draft=10.0, fillet=fillet)
     return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=lambda R, Z: 0.5 * (1 + b * (R**2 - 0.5))),
@@ -179,9 +179,9 @@ def cup(b, fillet=0.2):
 
 
 def test_when_a_node_touches_moves_with_the_parameter():
-    """Differences of whole runs of a stuck cup; with the steps held as they were the derivative would be 0.04 off.
+    """Derivatives of a sticking sheet agree with differences of runs; with constant steps they would be 0.04 wrong.
 
-    (Those at an element from the rim, and there, scatter with the steps.)
+    Walls within an element of the rim or the axis scatter with the steps, and do not count.
     """
     design = fx.Design(cup, {"b": (0.0, -1, 1)})
     run = design.run()
@@ -192,7 +192,7 @@ def test_when_a_node_touches_moves_with_the_parameter():
 
 
 def pot(mu, travel, relaxing=False):
-    """A plug with Coulomb's friction, then a little air; a sheet that may relax."""
+    """Return a sheet that a plug with friction forms, then a low air pressure; it may relax."""
     mesh = fx.mesh.disc(radius=3.0, thickness=0.1, elements=(12, 1))
     plug = fx.tools.male(radius=1.5, height=8.0, base=-8.0, draft=3.0, fillet=0.8)
     sheet = fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)]) if relaxing else fx.NeoHookean(c10=1.0)
@@ -205,7 +205,7 @@ def pot(mu, travel, relaxing=False):
 
 @pytest.mark.parametrize("relaxing", (False, pytest.param(True, marks=pytest.mark.slow)))
 def test_stages_friction_and_time(relaxing):
-    """By friction, and by the travel at which the stage before ended; of a sheet that forgets, too."""
+    """Derivatives by friction and by the travel of the first stage agree with differences, also of a relaxing sheet."""
     at = {"mu": 0.3, "travel": 1.8}
     design = fx.Design(lambda **values: pot(**values, relaxing=relaxing), {"mu": (0.3, 0, 1), "travel": (1.8, 1, 2)},
                        step=fx.StepControl(target=8))
@@ -217,7 +217,7 @@ def test_stages_friction_and_time(relaxing):
 
 
 def pressed(c10, nose, travel, force=None):
-    """A ball without friction drawn through a sheet: to a travel, or to a force."""
+    """Return a sheet that a ball without friction is pushed into, to a travel or to a force."""
     mesh = fx.mesh.disc(radius=40.0, thickness=1.2, elements=(10, 1))
     ball = fx.tools.sphere(radius=nose).mirrored()
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=c10), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -226,7 +226,7 @@ def pressed(c10, nose, travel, force=None):
 
 
 def test_forces_of_tools():
-    """Of gaps of which a neighbour keeps few digits: they are linear in the constant, and follow whole runs."""
+    """Derivatives of a tool force are exact for a constant that it is linear in, and agree with differences of runs."""
     at = {"c10": 0.25, "nose": 15.0, "travel": 14.0}
     design = fx.Design(pressed, {"c10": 0.25, "nose": (15.0, 10, 18), "travel": (14.0, 8, 18)})
     force, by = design.run().derivative("plug_force")
@@ -240,7 +240,7 @@ def test_forces_of_tools():
 
 
 def test_contacts_of_a_script_stay_as_they_are():
-    """Runs of designs take one node a step; what the script makes of its contact does not change."""
+    """Runs of designs take one node per step, but the contact of the user's scene does not change."""
     mould = fx.Contact("top", fx.tools.plane(0.3), "stick")
 
     def build(c10):
@@ -251,7 +251,7 @@ def test_contacts_of_a_script_stay_as_they_are():
 
 
 def test_a_stage_that_waits_ends_where_its_target_is_met():
-    """A sheet that creeps under its weight: when it has sagged so far goes with the weight."""
+    """Of a sheet that creeps under its weight, the derivative of the time to a given sag agrees with differences."""
     creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])
 
     def sagging(weight):
@@ -267,7 +267,7 @@ def test_a_stage_that_waits_ends_where_its_target_is_met():
 
 
 def test_where_a_run_has_no_derivative_it_says_so():
-    """A flow with a history, a jump: no number is given."""
+    """A run with a stage that keeps a quantity constant in the presence of friction refuses derivatives."""
     def held(mu):
         scene, stages = pot(mu, 1.0)
         return scene, [*stages[:1], fx.Stage("hold", control="air", constant=fx.pole_height(1.05), duration=1.0)]
@@ -286,8 +286,10 @@ def test_spread_and_table():
 
 
 def test_covariance_of_a_fit():
-    """Of a membrane at a given height the pressure is in proportion to the modulus and to the thickness; correlated
-    constants count with their covariance, and a fit beside a thickness of its own."""
+    """Standard deviations use the covariance of correlated constants of a fit, and add an independent thickness.
+
+    The pressure of a membrane at a given height is proportional to the modulus and to the thickness.
+    """
     def inflated(c10, c01, h):
         return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=h, elements=(8, 1)), loads=[fx.Pressure("bottom")],
                         materials=fx.MooneyRivlin(c10=c10, c01=c01), model=fx.Membrane(),
@@ -322,7 +324,7 @@ def test_report_says_how_sure(tmp_path):
 
 
 def test_minimum_weight():
-    """The wall is nowhere thinner than asked, and somewhere as thin; a thicker one than needed is made thinner."""
+    """The smallest wall equals the required minimum, no wall is much larger, and the volume decreases."""
     design = fx.Design(programmed, {"h": fx.spline(4, start=0.0, low=-1, high=1)})
     answer = design.minimum_weight(min_wall=0.012, runs=10)
     assert answer.best.wall.min() == pytest.approx(0.012, rel=2e-3)
@@ -331,7 +333,7 @@ def test_minimum_weight():
 
 
 def test_report(tmp_path):
-    """One file, of a search and of a run: before and after, what the knots could bring, bounds, effects, pictures."""
+    """Reports of a search and of a run are single files with pictures, bounds and parameters without effect."""
     design = fx.Design(lambda h, idle: programmed(h), {"h": fx.spline(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})
     answer = design.fit(even=True, runs=3)
     assert answer.attainable() <= answer.cv[1] + 1e-6

@@ -16,7 +16,7 @@ def test_gradients_quick(tmp_path):
 
 @pytest.mark.slow
 def test_gradients(tmp_path):
-    """Membrane and solid tell the same, but for the sheet's thickness; whole runs agree."""
+    """Derivatives of membrane and solid agree, and agree with differences of runs."""
     found = summary("gradients", tmp_path)
     for kind in ("C_R2", "C_R4", "h0_R2"):
         for w in ("w_0.8", "w_1"):
@@ -31,7 +31,7 @@ def test_gradients(tmp_path):
 
 
 def test_even_disc_quick(tmp_path):
-    """An even wall at a stretch l of the pole takes l^2 of its thickness there."""
+    """For an even wall at a stretch l of the pole, the initial thickness there is l^2 times the wall."""
     found = summary("even_disc", tmp_path, "--quick")
     for model in ("membrane", "solid"):
         one = found["thickness"][model]["1.25"]

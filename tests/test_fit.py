@@ -11,7 +11,7 @@ from formingx.materials.homogeneous import MODES
 
 
 def measured(material, reach=4.0, modes=tuple(MODES), noise=0.0):
-    """What a tester would measure of this material."""
+    """Return tests of a material, with its exact stresses times a relative noise."""
     rng = np.random.default_rng(5)
     l = {mode: np.linspace(0.7, min(reach, 0.93 * material.largest_stretch(mode)), 25) for mode in modes}
     return {m: (x, material.stress(m, x) * (1 + noise * rng.standard_normal(25))) for m, x in l.items()}
@@ -68,7 +68,7 @@ def test_residuals_are_those_of_the_data():
 
 @pytest.mark.parametrize("model", [fx.MooneyRivlin, fx.Yeoh, fx.Gent, fx.ArrudaBoyce])
 def test_result_is_admissible_where_the_best_is_not(model):
-    """Data that soften: the constants stay within what a material allows."""
+    """Constants fitted to tests that soften are admissible."""
     soft = fx.Hyperelastic(lambda I1, I2, a, b: a * (I1 - 3) - b * (I1 - 3) ** 2, a=1.0, b=0.01)
     found = fx.fit(model, measured(soft, reach=3.0))
     assert found.material.check_stability((0.7, 3.0)).stable
@@ -77,7 +77,7 @@ def test_result_is_admissible_where_the_best_is_not(model):
 
 
 def test_treloar():
-    """Unweighted joint fits, made independently: Gent 0.2745, 84.3, rms 0.138; Yeoh, rms 0.138; neo-Hookean 0.63."""
+    """Absolute fits to all tests of Treloar agree with fits that were made independently."""
     data = fx.treloar1944()
     assert [len(l) for l, _ in data.values()] == [24, 13, 16]
     assert fx.fit(fx.NeoHookean, data, relative=False).rms_total == pytest.approx(0.63, abs=5e-3)
@@ -93,7 +93,7 @@ def test_treloar():
 
 
 def test_ogden_on_treloar():
-    """Three terms do better than the constants of Ogden (1972), and a start from those finds nothing better."""
+    """Three terms fit better than the constants of Ogden (1972); a fit that starts from these finds no better ones."""
     data = fx.treloar1944()
     classic = fx.Ogden(mu=(0.63, 0.0012, -0.01), alpha=(1.3, 5.0, -2.0))
     misfit = np.concatenate([classic.stress(mode, l) - P for mode, (l, P) in data.items()])
@@ -132,7 +132,7 @@ def test_standard_errors_are_the_scatter_of_the_fits(relative):
 
 
 def test_what_the_data_leave_open_is_named():
-    """No limit in the data, a second term that is not needed, a constant of I2 from one test of small strain."""
+    """Undetermined are a limit beyond the tests, an unnecessary second term, and a constant of I2 at small strain."""
     neo_hookean = measured(fx.NeoHookean(c10=0.3), reach=2.0)
     gent = fx.fit(fx.Gent, neo_hookean)
     assert gent.undetermined == ("Jm",) and "do not determine Jm" in str(gent)
@@ -160,7 +160,7 @@ def test_file_and_picture(tmp_path):
     "stretch\tspecimen\tNominal_stress (MPa)\tmode\n{l}\tno. 1\t{P}\tuniaxial\n", "uniaxial,{l},{P}\n",
     "# a remark, 1\ntest;stress;stretch\nuniaxial;{P:,};{l:,}\n", '"uniaxial","{l:,}","{P:,}"\n'])
 def test_columns_go_by_their_names(tmp_path, text):
-    """In any order, with tabs, a byte order mark, decimal commas: the same constant."""
+    """Columns in any order, tabs, a byte order mark and decimal commas give the same constant."""
     l = [1.25, 1.5, 2.0]
     P = [round(2 * 0.5 * (x - x**-2), 6) for x in l]
     head, row = ("\n".join(text.split("\n")[:-2]), text.split("\n")[-2])

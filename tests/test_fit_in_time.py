@@ -27,7 +27,7 @@ P1 = fx.Viscoelastic(fx.NeoHookean(c10=0.05), [(0.3, 0.5), (0.4, 5.0)])
     pytest.param(fx.Viscoelastic, 1e6, 1 / 3600, marks=pytest.mark.slow),
     pytest.param(fx.TransientNetwork, 1e6, 1 / 3600, marks=pytest.mark.slow)])
 def test_constants_are_recovered(law, stress, time):
-    """From relaxation and three rates in two modes, whatever the units; as many branches as there are."""
+    """Relaxation and three rates in two modes determine all constants and the number of branches, in any units."""
     material = law(fx.NeoHookean(c10=0.05 * stress), [(0.3 * stress, 0.5 * time), (0.4 * stress, 5.0 * time)])
     data = [relaxation(material, "uniaxial", 2.0, T * time)]
     data += [rates(material, mode, rate / time) for mode in ("uniaxial", "equibiaxial") for rate in (0.1, 1, 10)]
@@ -51,7 +51,7 @@ def test_other_equilibrium_and_no_equilibrium():
 
 @pytest.mark.slow
 def test_noise():
-    """2 % noise: constants within 5 %, the misfit is the noise, and a third branch is not made up."""
+    """With 2 % noise, constants are within 5 %, the misfit equals the noise, and there is no third branch."""
     data = [relaxation(P1, "uniaxial", 2.0, noise=0.02)] + [rates(P1, "uniaxial", r, 0.02) for r in (0.1, 1, 10)]
     found = fx.fit(fx.Viscoelastic, data)
     assert len(found.material.branches) == 2
@@ -61,7 +61,7 @@ def test_noise():
 
 
 def test_what_the_data_leave_open_is_named():
-    """A fast pull alone knows nothing of the slow branch's time, nor where its modulus ends and the rubber's begins."""
+    """A fast test alone determines neither the time of the slow branch nor the equilibrium modulus."""
     fast = fx.fit(P1, [rates(P1, "uniaxial", 100.0)])
     assert {"tau_2", "c10"} <= set(fast.undetermined) and "do not determine" in str(fast)
     assert fx.fit(P1, [relaxation(P1, "uniaxial", 2.0), rates(P1, "uniaxial", 1.0)]).undetermined == ()
@@ -73,7 +73,7 @@ def test_too_many_branches_are_named():
 
 
 def test_from_a_file_and_drawn(tmp_path):
-    """The same tests from a file; an unmeasured stress is left empty; a new test begins where time falls."""
+    """Tests in time are read from a file, with empty cells for unmeasured stresses, and drawn in two panels."""
     l = np.append(1, L)
     pulled = P1.stress("uniaxial", l, times=np.log(l))
     tests = [relaxation(P1, "uniaxial", 2.0), fx.TimedTest("uniaxial", np.log(l), l, pulled)]
@@ -93,7 +93,7 @@ def test_from_a_file_and_drawn(tmp_path):
 
 @pytest.mark.slow
 def test_result_is_admissible():
-    """Data that soften more than any such material: moduli and times stay above 0."""
+    """For tests that soften more than any such material, moduli and times are positive."""
     data = fx.TimedTest.relaxation("uniaxial", 2.0, T, 1 / (1 + T) - 0.05)
     found = fx.fit(fx.Viscoelastic, [data], terms=3)
     assert all(mu > 0 and tau > 0 for mu, tau in found.material.branches)
@@ -102,7 +102,7 @@ def test_result_is_admissible():
 
 @pytest.mark.parametrize("first", [0.05, 3.0])
 def test_a_stretch_that_is_held_was_put_on_at_time_0(first):
-    """Rows of a relaxation test that begin later: fitted as if the step were there, G(0) was 12 % too low."""
+    """A constant stretch whose rows begin later was applied at time 0: else G(0) would be 12 % too low."""
     exact = fx.Viscoelastic(fx.NeoHookean(c10=0.2), branches=[(0.4, 1.0)])
     times = first * np.geomspace(1, 100, 12)
     stress = exact.relaxation("uniaxial", 1.5, times)
@@ -120,7 +120,7 @@ def moduli(omega, spectrum):
 
 
 def test_a_spectrum_has_the_moduli_and_the_relaxation_of_the_melt():
-    """Its times are not those of the melt, but G', G'' and G(t) are, within what a relative noise of 1 % leaves."""
+    """A fitted spectrum has the moduli, the viscosity and the relaxation of the melt, to the noise of 1 %."""
     melt = [(1e4 * tau**-0.4 * np.exp(-tau / 30), tau) for tau in np.geomspace(1e-3, 100, 23)]
     omega = np.geomspace(1e-3, 1e3, 60)
     storage, loss = (m * (1 + 0.01 * np.random.default_rng(2).standard_normal(60)) for m in moduli(omega, melt))
@@ -147,7 +147,7 @@ def test_a_damping_is_recovered(damping):
 
 
 def test_one_mode_leaves_the_share_of_the_invariants_open():
-    """In shear and in uniaxial extension alone the share alpha is not, or hardly, seen."""
+    """Uniaxial extension alone does not determine the share alpha of the invariants."""
     melt = fx.KBKZ([(1e4, 0.3), (1e3, 8.0)], fx.SoskeyWinter(alpha=0.02, a=0.3, b=1.5))
     l = np.exp(np.linspace(0.2, 2.0, 10))
     test = fx.TimedTest.constant_rate("uniaxial", 0.2, l, melt.constant_rate("uniaxial", 0.2, l))

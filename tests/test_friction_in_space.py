@@ -1,4 +1,4 @@
-"""Sheets in space that slide with friction: exact derivatives, capstans, plugs and cups of axisymmetric solids."""
+"""Sheets in space that slide with friction: exact derivatives, a capstan, and plugs and cups of axisymmetric solids."""
 
 import numpy as np
 import pytest
@@ -21,28 +21,28 @@ TOOLS = {
 
 
 def pushed(mu, size=0.1, ball=BALL, **contact):
-    """A quarter of a disc of radius 1 and a ball that is pushed into it."""
+    """Return the scene of a quarter of a disc of radius 1 and a ball that is pushed into it."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=[
         fx.Contact("top", fx.tools.revolved(ball), mu, direction=(0, 0, -1), name="plug", **contact)])
 
 
 def pushed_solid(mu, ball=BALL):
-    """The same as an axisymmetric solid."""
+    """Return the scene of `pushed` as an axisymmetric solid."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1)), materials=MATERIAL,
                     supports=[fx.SimplySupported("rim"), fx.Symmetry("axis")], contacts=[
                         fx.Contact("top", ball.moved(z=THICKNESS), mu, direction=(0, -1), name="plug")])
 
 
 def strip(mu, size, width):
-    """Half a strip under a roller."""
+    """Return the scene of half a strip under a roller."""
     sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, width), (0, width)], size, names=["y0", "rim", "y1", "x0"])
     return fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[*HELD, fx.Symmetry("y1", "y")],
                     contacts=[fx.Contact("top", fx.tools.extruded(BALL), mu, direction=(0, 0, -1), name="roller")])
 
 
 def formed_in_cup(mu, size):
-    """A quarter of a disc under a pressure in a cup that it slides over, and the same as an axisymmetric solid."""
+    """Return two scenes of a disc that slides in a cup under a pressure: a quarter sheet and an axisymmetric solid."""
     loads, name = [fx.Pressure("top")], {"name": "mould"}
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     solid = fx.mesh.disc(radius=1.0, thickness=THICKNESS, elements=(60, 1))
@@ -54,13 +54,13 @@ def formed_in_cup(mu, size):
 
 @pytest.fixture(scope="module")
 def rough_ball():
-    """Path of a ball of mu = 0.3, pushed to a travel of 0.9."""
+    """Return the path of a ball of mu = 0.3 that is pushed to a travel of 0.9."""
     return fx.trace(pushed(0.3), until=fx.travel(0.9), progress=False)
 
 
 @pytest.mark.parametrize("tool", TOOLS.values(), ids=TOOLS)
 def test_distances_have_their_derivatives(tool):
-    """Beside the planes and edges where they have none; on the axis and on planes of symmetry they have."""
+    """First and second derivatives of distances agree with differences, also on the axis and planes of symmetry."""
     x = np.random.default_rng(1).uniform(-1.3, 1.3, (4000, 3))
     x = np.vstack([x, [(0.1, 0.0, 0.01), (0.2, 0.0, 0.01), (0.0, 0.0, -0.61), (0.0, 0.5, -0.61)]])
     x = x[np.abs(tool.signed_distance(x)) < 0.05]
@@ -73,7 +73,7 @@ def test_distances_have_their_derivatives(tool):
 
 
 def test_tractions_have_their_stiffness():
-    """Stuck and sliding points, pressed and pulled; |T| is at most mu N, N at the last state."""
+    """The stiffness of sticking and sliding points agrees with differences; sliding, |T| is mu N of the last state."""
     law = fx.Contact("top", fx.tools.revolved(BALL), 0.3).law(100.0, 1.0, np.zeros((1, 3)))
     rng = np.random.default_rng(0)
     way = rng.normal(size=(6, 3))
@@ -93,7 +93,7 @@ def test_tractions_have_their_stiffness():
 
 
 def test_pressure_on_tools_has_its_derivatives():
-    """Residual, tangent and derivative by the control of a trough half filled, where points slide on a fillet."""
+    """Tangent and derivative by the control agree with differences where points slide on the fillet of a trough."""
     path = fx.trace(trough(size=0.1, friction="none"), until=fx.pressure(0.4), progress=False)
     state, size = path.last, 1e-7
     with path.problem.state_context(state) as problem:
@@ -119,7 +119,7 @@ def test_pressure_on_tools_has_its_derivatives():
 
 @pytest.mark.parametrize("mu", [0.1, 0.3])
 def test_capstan(mu):
-    """ln T grows by mu an angle of 1 where the strip slides. (The chord at each end of the arc is left out.)"""
+    """The tension T of a sliding strip obeys d ln T / d angle = mu, without the chords at the ends of the arc."""
     path = fx.trace(strip(mu, 0.025, 0.1), until=fx.travel(0.9), progress=False)
     wall = path.wall()
     (x, _, z), stretch = wall.middle.T, 1 / wall.ratio
@@ -132,7 +132,7 @@ def test_capstan(mu):
 
 
 def test_force_of_a_rough_ball(rough_ball):
-    """Within 1.5 % of an axisymmetric solid; two counts of nodes to a step agree within 1 %."""
+    """The force agrees with an axisymmetric solid to 1.5 %, and for 1 and 3 nodes per step to 1 %."""
     exact = fx.trace(pushed_solid(0.3), until=fx.travel(0.9), progress=False).last.measures["tool_force"]
     forces = []
     for path in (rough_ball, fx.trace(pushed(0.3, nodes_per_step=3), until=fx.travel(0.9), progress=False)):
@@ -144,7 +144,7 @@ def test_force_of_a_rough_ball(rough_ball):
 @pytest.mark.slow
 @pytest.mark.parametrize("mu, radius, travel", [(0.2, 0.5, 0.9), (0.45, 0.4, 0.8)])
 def test_force_of_other_rough_balls(mu, radius, travel):
-    """Other frictions and radii: within 1.5 % of an axisymmetric solid."""
+    """For other frictions and radii, the force agrees with an axisymmetric solid to 1.5 %."""
     ball = fx.tools.sphere(radius=radius, z=0.0)
     exact, found = (fx.trace(scene, until=fx.travel(travel), progress=False).last.measures["tool_force"]
                     for scene in (pushed_solid(mu, ball), pushed(mu, ball=ball)))
@@ -162,7 +162,7 @@ def test_more_friction_takes_more_force():
 
 
 def test_work_of_the_plug_is_strain_energy_and_friction(rough_ball):
-    """Friction dissipates mu N times the way that points slide over the ball, in the trapezoidal rule."""
+    """The work of the plug equals the strain energy plus friction, mu N times the sliding distance, to 1 %."""
     path = rough_ball
     travel, force, energy = (path[name] for name in ("travel", "tool_force", "strain_energy"))
     work, lost, before = np.trapezoid(force, travel), 0.0, None
@@ -219,7 +219,7 @@ def test_force_of_a_rough_ball_converges():
 
 @pytest.mark.slow
 def test_walls_of_a_rough_cup():
-    """Rings of the cup have the walls of the axisymmetric one, within 1 %."""
+    """Mean walls of rings of the cup agree with the axisymmetric solid to 1 %."""
     sheet, solid = (fx.trace(scene, until=fx.pressure(0.4), progress=False) for scene in formed_in_cup(0.3, 0.05))
     wall, profile = sheet.wall(), solid.profile()
     R = np.hypot(*wall.rest[wall.triangles].mean(1)[:, :2].T)
@@ -231,7 +231,7 @@ def test_walls_of_a_rough_cup():
 
 
 def test_plug_tray_quick(tmp_path):
-    """Numbers are of the whole tray: as much as the sheet weighs; those of the half are within 0.5 %."""
+    """Results are of the whole tray: its weight equals the sheet's, and half and quarter models agree to 0.5 %."""
     found = summary("plug_tray", tmp_path, "--quick")
     quarter, ratio = found["quarter_16"], found["half_over_quarter"]
     sheet = 1e-3 * 1.05 * 1.5 * (160 * 100 - (4 - np.pi) * 20**2)

@@ -59,7 +59,7 @@ def test_disc_converges_to_the_membrane_of_revolution(tmp_path):
 
 
 def test_layers_and_thickness_add_up():
-    """Two layers of half the thickness are the sheet; a thickness that varies is that of its function."""
+    """Two layers give the same volume as one layer of their total thickness; a negative thickness is refused."""
     half = {"inner": 0.004, "outer": lambda x, y: 0.006 + 0 * x}
     one, two = (fx.solve(scene, to=0.005, increments=2).last.measures for scene in (
         disc(), disc(thickness=half, mesh={"layers": ["inner", "outer"]})))
@@ -69,7 +69,7 @@ def test_layers_and_thickness_add_up():
 
 
 def test_tray_quick(tmp_path):
-    """The values of size 0.1; the trough's law, within the error of that size; the walls from the STL file."""
+    """Walls of the quick run, of the trough against its exact law, and of the same tray read from an STL file."""
     found = summary("tray", tmp_path, "--quick")
     exact, stl, trough = found["size_0.1"], found["stl"]["size_0.1"], found["trough"]["size_0.1"]
     for place, ratio in (("floor", 0.480), ("long_wall", 0.4545), ("bottom_edge", 0.328)):       # of size 0.025
@@ -95,7 +95,7 @@ def test_tray(tmp_path):
 
 
 def trough(size=0.15, **more):
-    """A strip of a trough, coarse."""
+    """Return the scene of a strip that is pressed into a long trough, with coarse triangles."""
     sheet = fx.mesh.sheet([(0, 0), (1, 0), (1, 0.3), (0, 0.3)], size, names=["y0", "rim", "y1", "x0"])
     tool = fx.tools.extruded(fx.Tool([(3.0, 0.0), (1.0, 0.0), (1.0, -1.0), (0.0, -1.0)], [0.0, 0.0, 0.2, 0.0]))
     sides = [fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y"), fx.Symmetry("y1", "y")]
@@ -105,7 +105,7 @@ def trough(size=0.15, **more):
 
 
 def test_a_reflected_mesh_is_symmetric():
-    """The whole has each node and triangle of the quarter four times, joined at the cuts; a new size keeps that."""
+    """A reflected mesh has four images of each triangle of the quarter, joined at the cuts, also at a new size."""
     outline = fx.mesh.rectangle(3.0, 2.0, corner=0.5, part="quarter")
     part = fx.mesh.sheet(outline, size=0.3)
     for size in (0.3, lambda x, y: 0.3 + 0.1 * x):
@@ -125,7 +125,7 @@ def test_a_reflected_mesh_is_symmetric():
 
 
 def test_triangles_as_a_pilot_run_asks_for():
-    """Small in the fillet and where the wall thins fast: as near to the law as triangles that are small all over."""
+    """With triangles that a pilot run refined, walls are as accurate as with small triangles everywhere."""
     path = fx.trace(trough(), until=fx.pressure(1.2), adapt_mesh={"error": 0.1}, progress=False)
     even = fx.trace(trough(size=0.075), until=fx.pressure(1.2), progress=False)
     errors = []
@@ -141,7 +141,7 @@ def test_triangles_as_a_pilot_run_asks_for():
 
 
 def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):
-    """Its tools, from a file or not, are in pages made of it alone; another place of one, or thickness, is refused."""
+    """A checkpoint is read without its scene, with its tools; a scene with another tool or thickness is refused."""
     at, floor = HELD, fx.tools.revolved(fx.tools.plane(-0.2).reversed())
     block_of = solid_of(tmp_path / "block.stl", block((-2, -2, -0.5), (2, 2, -0.2)))
 
@@ -193,7 +193,7 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
 
 
 def test_trim_and_printed_squares_are_exact():
-    """Cut triangles count by the part that is beyond the plane; at rest the squares are where they were printed."""
+    """Trimmed triangles count by their share beyond the plane; undeformed printed lines are where they were printed."""
     d = np.array([(1, -1, -1), (-1, 1, 1), (3, -1, 3), (0, 1, 1), (1, 1, 1), (-1, 0, 0), (-1, -1, -1)], dtype=float)
     np.testing.assert_allclose(_positive_share(d), [1 / 4, 3 / 4, 15 / 16, 1, 1, 0, 0], atol=1e-15)
     path = fx.solve(disc(), to=0.001, increments=1)
@@ -224,7 +224,7 @@ if path.problem.comm.rank == 0:
 
 
 def test_box_distance_is_exact():
-    """Differences of distances along their gradient are those of the points; the STL file of the box agrees."""
+    """Distances to floor, walls, fillets and corners of a box and a plug are exact, also of moved tools."""
     box = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2)
     inside = [(0.9, 0, -0.5), (0.9, 1.4, -0.5), (0, 0, -0.9), (0.95, 0, -0.95), (0.75, 0.2, -0.9), (0.5, 0, -0.3)]
     corner = 0.3 - np.hypot(0.2, 0.2)
@@ -297,7 +297,7 @@ def solid_of(file, *blocks):
     ((1, 0.5, 2), (2, 1.5, 3)), ((1, 0.5, 0.2), (2, 1.5, 0.8)), ((4, 0, 0), (6, 2, 1)), ((4, 2, 0), (5, 3, 1))],
     ids=["corner", "as wide", "bar", "upon", "apart", "within", "beside", "at an edge"])
 def test_bodies_of_a_file_are_one_tool(low, high, tmp_path):
-    """The distance to the union of two blocks, as exact as to one."""
+    """The distance to the union of two blocks is exact, whether they touch, overlap or are apart."""
     ends = np.array([[(0, 0, 0), low], [(4, 2, 1), high]], float)
     tool = solid_of(tmp_path / "two.stl", *(block(*ends[:, k]) for k in (0, 1)))
     x = np.random.default_rng(3).uniform(-1, 5, (4000, 3))
@@ -315,7 +315,7 @@ def test_hollows_and_turned_bodies_of_a_file(tmp_path):
 
 
 def test_axes_of_a_sheet_in_space_are_x_and_y(tmp_path):
-    """What is given over the sheet fails, and is read from a file, by these names."""
+    """Messages about functions of position, and columns of a temperature file, have the names x and y."""
     warm = fx.NeoHookean(c10=fx.of_temperature(lambda T: 1.0 + 0 * T))
     broken = lambda x, y: np.where(x > 0.3, np.nan, 1.0)  # noqa: E731
     for given in ({"material": fx.NeoHookean(c10=broken)}, {"material": warm, "temperature": broken}):
@@ -337,7 +337,7 @@ def plug_above(separates):
 
 @pytest.mark.parametrize("separates", [True, False])
 def test_a_plug_goes_in_and_back_out(separates):
-    """It leaves the sheet as it was, if it separates: flat, at rest; else the sheet hangs on it, pulled up."""
+    """If points may separate, the withdrawn plug leaves the sheet flat and undeformed; else the sheet sticks to it."""
     scene = disc(size=0.15, contacts=[plug_above(separates)], model=fx.Membrane(wrinkles=0.01))
     path = fx.Process(scene).run([fx.Stage("in", control="plug", until=fx.travel(0.8)),
                                   fx.Stage("out", control="plug", until=fx.travel(0.0))], progress=False)
@@ -353,7 +353,7 @@ def test_a_plug_goes_in_and_back_out(separates):
 
 
 def test_a_plug_leaves_a_sheet_that_a_vacuum_holds():
-    """What the vacuum lifts off the plug lies on the mould; the plug comes out without a force, and nothing moves."""
+    """After a vacuum has pressed the sheet onto the mould, the plug is withdrawn without force, and walls stay."""
     mould = fx.Contact("bottom", fx.tools.revolved(fx.Tool([(3.0, 0.0), (1.0, 0.0), (0.9, -0.7), (0.0, -0.7)],
                                                            [0.0, 0.0, 0.15, 0.0])), name="mould")
     scene = disc(size=0.15, loads=[fx.Pressure("top", name="vacuum")], contacts=[plug_above(True), mould],
@@ -368,9 +368,9 @@ def test_a_plug_leaves_a_sheet_that_a_vacuum_holds():
 
 
 def test_trough_without_friction():
-    """A strip that slides has one wall: its width over the length of the profile. Errors are of second order.
+    """A strip that slides has a constant wall, its width over the length of the profile, with second-order errors.
 
-    (Normal to its chords the pressure would add p l^2/(4 R) on the fillet to a tension of p/17: 4 % there.)
+    A pressure normal to the chords would add p l^2/(4 R) to the tension p/17 on the fillet, which is 4 %.
     """
     errors, whole = [], 2 - (2 - np.pi / 2) * 0.2
     for size in (0.1, 0.05):
@@ -385,9 +385,9 @@ def test_trough_without_friction():
 
 
 def test_states_between_of_a_sliding_sheet_depend_on_steps():
-    """`Path.at` gives the state of a run that stops there; other steps move walls by at most 3 %, and not at the end.
+    """`Path.at` returns the state of a run that stops there. Other steps change walls by at most 3 %, at the end by 0.
 
-    (Where points have just touched, the pressure along the tool's normal follows from the last state.)
+    Where gaps have just closed, the pressure along the normal of the tool depends on the last accepted state.
     """
     end, target, column = fx.pressure(1.2), fx.pressure(0.5), "mould_force"
     path, stopped, fine = (fx.trace(trough(0.1, friction="none"), until=end, progress=False, intermediate=[
@@ -399,7 +399,7 @@ def test_states_between_of_a_sliding_sheet_depend_on_steps():
 
 
 def test_an_adapted_trough_without_friction():
-    """Its wall in the fillet is within 1 %, with fewer triangles than a mesh of size 0.05, where it is 1.3 % off."""
+    """The wall in the fillet is exact to 1 %, with fewer triangles than an even mesh whose error is 1.3 %."""
     path = fx.trace(trough(0.1, friction="none", nodes_per_step=3), until=fx.pressure(1.2), adapt_mesh=True,
                     progress=False)
     wall, (x, _, z) = path.wall(), path.wall().middle.T
@@ -411,7 +411,7 @@ def test_an_adapted_trough_without_friction():
 
 
 def test_sliding_tractions_have_their_stiffness():
-    """On floor, wall, fillet and corner of a box, outside and inside it by a little: difference quotients."""
+    """Tractions near floor, wall, fillet and corner of a box agree with k d n, their stiffness with differences."""
     law = fx.Contact("bottom", fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2), "none").law(
         100.0, 0.02, np.zeros((1, 3)))
     turn, off = np.radians(40.0), np.array([-1e-3, 2e-3, 1e-3, -2e-3])[:, None]
@@ -430,7 +430,7 @@ def test_sliding_tractions_have_their_stiffness():
 
 
 def test_tray_without_friction():
-    """Filled below 500 iterations; of the order and the number of points that touch in a step nothing is left."""
+    """The tray is filled in less than 500 iterations, and walls do not depend on the number of nodes per step."""
     walls = []
     for nodes in (2, 6):
         sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 3.0, corner=0.3, part="quarter"), size=0.1)
@@ -456,7 +456,7 @@ def _undercut():
 
 @pytest.mark.parametrize("make", [_drafted, _undercut])
 def test_moulds_from_files_fill(make, tmp_path):
-    """With draft, and wider below its mouth than there; walls, corners too, as of the exact tool (ribs: below)."""
+    """Walls in moulds from STL files, with draft or an undercut, agree with those of the exact tools to 0.5 %."""
     tool, outline, places = make()
     tool.to_stl(tmp_path / "mould.stl", wall=0.3)
     solid = fx.tools.solid(tmp_path / "mould.stl")
@@ -516,7 +516,7 @@ def test_what_is_not_proven_is_refused(make, words):
 
 
 def test_a_path_in_space_gives_what_it_has(tmp_path):
-    """And refuses the rest in words; a scene and a run are looked over; fields are those of the wall."""
+    """A path of a sheet refuses results of sections in words; its fields of thickness agree with `Path.wall`."""
     path = fx.trace(trough(), until=fx.pressure(0.2), progress=False)
     for name in ("stability", "work", "profile", "stress", "deformed_mesh", "springback", "contact"):
         with pytest.raises(fx.InputError, match="in space|in three dimensions"):
@@ -537,7 +537,7 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
 
 @pytest.mark.parametrize("wrinkles", [None, 0.01])
 def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tmp_path, monkeypatch, wrinkles):
-    """Without a screen it says that it has no pictures, too."""
+    """The report warns of compression only without relaxed energy; without a screen it says that pictures lack."""
     path = fx.solve(disc(model=fx.Membrane(wrinkles=wrinkles)), to=0.001, increments=1)
     wall = path.wall()
     monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, now=0.9 * wall.rest))
@@ -549,7 +549,7 @@ def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tm
 
 
 def test_views_are_written(tmp_path):
-    """In space, and of two sections, by one plotter: pictures that are not of one colour."""
+    """The picture of a sheet has more than 100 colours, and its report has two pictures."""
     path = fx.solve(disc(), to=0.001, increments=1)
     path.view3d(tmp_path / "sheet.png", grid=0.25)
     path.report(tmp_path / "report.html")
@@ -568,7 +568,7 @@ def test_a_run_that_ends_early_says_why():
 
 
 def test_relaxed_energy_gives_way_in_compression():
-    """A strip pulled along x, free to narrow, at a width below that of simple tension: 1 % of the stiffness is left."""
+    """Below the width of simple tension, the energy grows with 1 % of the material's energy (wrinkles=0.01)."""
     forms = Problem(disc(model=fx.Membrane(wrinkles=0.01))).forms
 
     def energy(a, b):
