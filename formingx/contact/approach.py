@@ -69,7 +69,7 @@ LIMITS = StepLimits()
 class Approach:
     """Contact of one face during a step: prediction of gap closures before the solve, checks after it.
 
-    `StepLimit` calls `reach`, `along` and `prepare` before the solve of a step, and the other methods after it.
+    `StepLimit` calls `reach`, `closures` and `prepare` before the solve of a step, and the other methods after it.
 
     Args:
         face: the contact.
@@ -134,9 +134,9 @@ class Approach:
         allowed = self.at_once if touching > 1 else 1
         return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
 
-    def along(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+    def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
               length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gap closures along a tangent.
+        """Return the gap closures of the points if they move along a tangent.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).

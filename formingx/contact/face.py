@@ -423,7 +423,7 @@ class FaceContact:
         return Memory(history, np.array(data["arrived"], dtype=bool)[rows], penalty)
 
     def transfer(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
         """Return the history variables of a face of another mesh, transferred to this face.
 
         A point is in contact if the nearest point of the source is; elastic slips are fitted to slips of the source.

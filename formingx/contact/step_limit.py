@@ -230,7 +230,7 @@ class StepLimit:
         for k, approach in enumerate(self.present):
             if approach.face.contact.lagged and not (ends and approach.lags):
                 continue                                    # such a contact uses no predicted gap closures
-            times, places, guessed = found[k] if found else (*approach.along(
+            times, places, guessed = found[k] if found else (*approach.closures(
                 trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length), None)
             approach.prepare(times, places, guessed, trial.length, ends)
         return trial.events.bend(trial.length) if trial.events and found else None

@@ -37,13 +37,15 @@ class BodyModel(ABC):
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of `mesh` that represent points of the body.
+        """Return the points of the mesh of the fields that represent points of the body.
+
+        For a solid they are the points themselves, for a membrane the points of the mid-surface at the same R.
 
         Args:
-            points: reference positions, shape (n, 2), length.
+            points: reference positions in the body, shape (n, 2), length.
 
         Returns:
-            Reference positions on `mesh`, shape (n, 2), length.
+            Reference positions on the mesh of the fields, shape (n, 2), length.
         """
 
     @abstractmethod
@@ -61,12 +63,14 @@ class BodyModel(ABC):
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the heights of points of a layer that points of `mesh` represent.
+        """Return the heights in a layer of points that are given on the mesh of the fields.
+
+        For a solid they are Z, for a membrane the heights halfway between the faces of the layer.
 
         Args:
             layer: name of the layer.
             R: radii of the points, shape (n,), length.
-            Z: heights of the points on `mesh`, shape (n,), length.
+            Z: heights of the points on the mesh of the fields, shape (n,), length.
 
         Returns:
             Z in the layer, shape (n,), length.
@@ -86,12 +90,15 @@ class BodyModel(ABC):
 
     @abstractmethod
     def _weight(self) -> Any:
-        """Return `weight`."""
+        """Return the reference volume per measure `dx` of the mesh (UFL scalar), such as 2 pi R."""
 
     @abstractmethod
     def _deformation_gradient(self) -> Any:
-        """Return `F`."""
+        """Return the deformation gradient (UFL, shape (3, 3))."""
 
     @abstractmethod
     def _energy(self, density: Any) -> Any:
-        """Return `potential` or `energy`; density(terms, F) is the energy density (stress) of a `MaterialTerms`."""
+        """Return the integral of an energy density over the body, over stress times volume (UFL form).
+
+        density: function of (`MaterialTerms`, deformation gradient) that returns the density of a material (stress).
+        """

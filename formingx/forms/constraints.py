@@ -121,7 +121,13 @@ class Constraints:
         return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)
 
     def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
-        """Return the local numbers of the unknowns that a support constrains, shape (n,)."""
+        """Return the local numbers of the unknowns that a constraint of a support concerns, shape (n,).
+
+        sub: subspace of the displacement component. item: the constraint, on a boundary or at a node.
+
+        Raises:
+            InputError: the mesh has no node at the given point.
+        """
         forms = self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(sub, forms.mesh.facets.dim, forms.mesh.facets_of(item.on))

@@ -1,4 +1,4 @@
-"""Histories of a problem: the arguments of the residual F besides x, control and time."""
+"""History variables of a problem: the arguments of the residual F besides x, control and time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
-    """Histories of a problem, in the order contact, materials, heat; see `formingx.solve.equations`.
+    """Part of `Problem` that updates its history variables; see `formingx.solve.equations`.
 
     Attributes:
         forms: the `Formulation`.
-        histories: all histories of the problem.
+        histories: history variables of the contacts, then of the materials, then of the temperature.
     """
 
     forms: Any
@@ -46,12 +46,12 @@ class Histories:
 
     @property
     def materials(self) -> list[ConstitutiveHistory]:
-        """Histories of the materials."""
+        """History variables of the materials, one entry for each material that has them."""
         return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
 
     @property
     def body_has_history(self) -> bool:
-        """True if materials or the temperature have a history."""
+        """True if materials or the temperature have history variables."""
         return bool(self.forms.histories)
 
     @property
@@ -99,9 +99,10 @@ class Histories:
         self._predicted = None, []
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Compute the history variables of the forms at a state, and keep them for `advance`.
+        """Compute the history variables of materials and temperature at the end of a step, and store them.
 
-        The histories are left in the new state: the caller restores the old one.
+        If `advance` then accepts the same x, it uses the stored values. Afterwards the history variables are those at
+        the end of the step: the caller must restore the earlier ones.
 
         Args:
             start: state at the beginning of the step.
@@ -109,7 +110,7 @@ class Histories:
             control: control at its end.
 
         Returns:
-            History variables of the forms at the end of the step.
+            History variables of materials and temperature at the end of the step.
         """
         self.set_fields_and_control(x, control)
         for history in self.forms.histories:

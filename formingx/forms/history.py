@@ -86,7 +86,7 @@ class History(Protocol):
         """
 
     def transfer(self, source: Any, memory: Any, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
         """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 
         Args:
@@ -112,5 +112,7 @@ class ConstitutiveHistory(History, Protocol):
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Reset the variables of motion (`Material.of_motion`), so the last step does not affect the next prediction.
+        """Reset the variables that store the motion in the last step (`Material.of_motion`).
+
+        The next step is then integrated without this motion.
         """

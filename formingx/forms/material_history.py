@@ -64,7 +64,10 @@ class MaterialHistory:
         self._terms.start.value = self._forms.time_at(control)
 
     def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """Return {name: values at the end of the step in some cells, shape (cells, points, components)}."""
+        """Return the internal variables at the end of the step in some cells.
+
+        The result is {name: values, shape (cells, points, components)}.
+        """
         shape = len(cells), len(self._terms.places), sum(self._sizes.values())
         values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
@@ -141,7 +144,7 @@ class MaterialHistory:
         return InternalVariables(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
     def transfer(self, source: MaterialHistory, memory: InternalVariables, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables of the same material on another mesh; collective.
 
         Args:
@@ -159,13 +162,13 @@ class MaterialHistory:
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places)
              for entry in (source, self)] if shapes else []
 
-        def carried(name: str, values: np.ndarray) -> np.ndarray:
+        def transferred(name: str, values: np.ndarray) -> np.ndarray:
             if name not in shapes:
                 return interpolation.fitted(values)
             return fitted_tensors(interpolation, values, *(F if shapes[name] > 0 else [
                 np.linalg.inv(f).swapaxes(1, 2) for f in F]))
         return _unchangeable(InternalVariables(memory.time, {
-            name: carried(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])
+            name: transferred(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])
             for name, v in memory.values.items()}))
 
     @cached_property
@@ -191,7 +194,7 @@ class MaterialHistory:
 
 
 def _unchangeable(memory: InternalVariables) -> InternalVariables:
-    """Make the arrays of history variables read-only."""
+    """Make the arrays of internal variables read-only, and return these variables."""
     for array in memory.values.values():
         array.setflags(write=False)
     return memory

@@ -18,7 +18,7 @@ from .temperature_coefficient import TemperatureCoefficient
 
 
 class MaterialTerms:
-    """One material of some layers in the forms.
+    """Coefficients, internal variables and energies of one material in the forms of a problem.
 
     Args:
         forms: the `Formulation`.
@@ -58,7 +58,7 @@ class MaterialTerms:
         self.past_integrals = {name: self.quadrature_function(np.shape(value)) for name, value in coefficients.items()}
 
     def _constant(self, name: str, value: Any) -> Any:
-        """Return the coefficient of a material constant."""
+        """Return the coefficient (UFL scalar) of a material constant with a name and a value."""
         self._in_middle = name in self.material.of_flow
         return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
 

@@ -98,7 +98,10 @@ class ExtendedMatrix:
         return A
 
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return row pointers and global columns of all locally owned rows."""
+        """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
+
+        rows: rows of C, locally owned entries, shape (n,) each. m: their number.
+        """
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()

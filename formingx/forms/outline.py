@@ -21,7 +21,9 @@ _PARTS = 8
 
 
 class Outline:
-    """The m boundary edges, each a parabola through its ends and its midpoint; the body lies to the left.
+    """Boundary of a deformed solid: m edges, each a parabola through its ends and its midpoint.
+
+    The body lies to the left of each edge.
 
     Args:
         forms: the `Solid`; its `w` is the examined field.
@@ -44,8 +46,8 @@ class Outline:
             at = fem.locate_dofs_topological(vectors, 1, np.array([facet], dtype=np.int32), remote=False)
             a, b, middle = ends_first(at, X)
             cell = vectors.dofmap.cell_dofs(topology.connectivity(1, 2).links(facet)[0])
-            (along, inwards) = X[b] - X[a], X[cell].mean(0) - X[middle]
-            left = along[0] * inwards[1] > along[1] * inwards[0]
+            (tangent, inwards) = X[b] - X[a], X[cell].mean(0) - X[middle]
+            left = tangent[0] * inwards[1] > tangent[1] * inwards[0]
             nodes[k] = (a, b, middle) if left else (b, a, middle)
         self._dofs, self._own = numbers[nodes], X[nodes]
         names = vectors.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 3)
@@ -62,7 +64,7 @@ class Outline:
         return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
     def mask(self, boundary: str) -> np.ndarray:
-        """Return the mask of the edges of a boundary; collective.
+        """Return a mask of the edges that belong to a named boundary; collective.
 
         Args:
             boundary: name of the boundary.
@@ -96,7 +98,7 @@ class Outline:
         """Divide curved edges into straight pieces.
 
         Args:
-            edges: result of `edges`, shape (m, 3, 2), length.
+            edges: start, end and midpoint of each edge, shape (m, 3, 2), length.
             parts: number of pieces of an edge.
 
         Returns:
@@ -105,12 +107,12 @@ class Outline:
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]
-        points[corners:] = along(edges, parts)[:, 1:-1].reshape(-1, edges.shape[-1])
+        points[corners:] = edge_points(edges, parts)[:, 1:-1].reshape(-1, edges.shape[-1])
         inner = corners + np.arange(m * (parts - 1)).reshape(m, parts - 1)
         chain = np.column_stack([self.ends[:, 0], inner, self.ends[:, 1]])
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
-    def fold(self, edges: np.ndarray) -> np.ndarray | None:
+    def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
         """Find a self-intersection of the deformed boundary.
 
         Edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
@@ -130,7 +132,7 @@ class Outline:
         return None
 
     def _near(self, i: int, j: int) -> bool:
-        """Return True if two edges are identical, neighbours, or have a common neighbour."""
+        """Return True if two edges, given by their numbers, are identical, neighbours, or have a common neighbour."""
         around = np.isin(self.ends, self.ends[i]).any(1)
         return bool(np.isin(self.ends[around], self.ends[j]).any())
 
@@ -139,8 +141,8 @@ class Outline:
         return values if comm.size == 1 else gathered(comm, values)
 
 
-def along(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
-    """Return equidistant parameter points on parabolic edges.
+def edge_points(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
+    """Return points on parabolic edges, at equal intervals of the parameter from start to end.
 
     Args:
         edges: start, end and midpoint of each edge, shape (m, 3, 2), length.

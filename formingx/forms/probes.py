@@ -24,7 +24,7 @@ class Probe:
 
     Attributes:
         points: the reference positions, shape (n, 2), length.
-        so_far: displacement of the points before this mesh was made, shape (n, components), length.
+        earlier_displacement: displacement of the points before this mesh was made, shape (n, components), length.
 
     Raises:
         InputError: a point outside the mesh.
@@ -37,7 +37,7 @@ class Probe:
         self._components = forms.scene.kinematics.components
         self._subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
         self._problem, self.points = problem, points
-        self.so_far = np.zeros((len(points), self._components))
+        self.earlier_displacement = np.zeros((len(points), self._components))
         self._mine, self._cells, self._reference = place
         self._dofs = self._dofs_of(place.cells)
         self._weights = _basis(forms.displacement_element, 0, self._reference)
@@ -83,7 +83,7 @@ class Probe:
         values[self._mine] = self._problem.forms.length * self._local(w[self._dofs])
         return self._problem.comm.allreduce(values, MPI.SUM)
 
-    def across(self) -> tuple[np.ndarray, float]:
+    def stretch_row(self) -> tuple[np.ndarray, float]:
         r"""Return the row that measures the in-plane stretch between two points on the axis, lower first.
 
         .. math::
@@ -99,22 +99,30 @@ class Probe:
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row of a weighted sum of displacements.
+        """Return the row that measures a weighted sum of the displacements of the points.
 
         Args:
             factors: weights, shape (n, components).
 
         Returns:
-            Row with row . x = sum of weights times displacements over length, locally owned entries.
+            Row with row . x = sum of weights times displacements over `forms.length`, locally owned entries, shape
+            (m,).
         """
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
-        """Return u over length at this rank's points, shape (m, 2), from unknowns of their cells, shape (m, 2, dim)."""
+        """Return the dimensionless displacement of this rank's points, shape (m, 2).
+
+        values: unknowns of the cells of the points, shape (m, 2, dim).
+        """
         return np.einsum("kj,kij->ki", self._weights, values)
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
-        """Return the row of weighted unknowns, owned entries; factors: (n, components), point_weights: (m, dim)."""
+        """Return the row of a weighted sum of unknowns, locally owned entries.
+
+        factors: weights of the points, shape (n, components). point_weights: weights of the unknowns of the cell of
+        each point that this rank evaluates, shape (m, dim).
+        """
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
         triples: list[list] = [[], []]
@@ -180,10 +188,13 @@ class MidSurfaceProbe(Probe):
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
 
-    def across(self) -> tuple[np.ndarray, float]:
-        """Return the row that measures the stretch 1 + du_r/dR at the pole.
+    def stretch_row(self) -> tuple[np.ndarray, float]:
+        r"""Return the row that measures the in-plane stretch at the pole of a membrane.
 
-        At the pole a membrane is normal to the axis.
+        There the membrane is normal to the axis, and the stretch is
+
+        .. math::
+            1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
 
         Returns:
             Row, locally owned entries, shape (n,); power, 1.
@@ -192,7 +203,7 @@ class MidSurfaceProbe(Probe):
         return row, 1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row of a weighted sum of displacements of points on the mid-surface.
+        """Return the row that measures a weighted sum of the displacements of points on the mid-surface.
 
         Args:
             factors: weights, shape (n, components).

@@ -215,7 +215,8 @@ def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
 
 
 def _colour(scene: Any) -> dict[str, int]:
-    """Return {layer: number of its pressure field}; adjacent bodies of different materials get different fields."""
+    """Return {layer: number of its pressure field}, so that adjacent bodies of different materials get different ones.
+    """
     mesh = scene.mesh
     if not scene.model.pressure.continuous:
         return dict.fromkeys(mesh.layers, 0)

@@ -28,7 +28,7 @@ its pole, with 4 less than 0.5 % (tests/test_kbkz_scenes.py).
 
 
 class StepError:
-    """Time integration error of the steps of a problem.
+    """Estimator of the time integration error of the steps of a problem.
 
     Args:
         problem: the `Problem`.
@@ -49,7 +49,7 @@ class StepError:
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Estimate the time integration error of a step by step doubling.
 
-        Errors are root mean squares over the body, relative to the stress.
+        Errors are root mean squares over the body, relative to the largest stress at the start, at the end or relaxed.
 
         Args:
             past: k accepted states; the step begins at the last of them.
@@ -96,27 +96,30 @@ class StepError:
         self._forms.clock += time - self._problem.time
 
     def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of the materials at the end of a step from the present history variables to x at a time.
+        """Return the stresses of the materials after a step from the present history variables to x at a time.
+
+        x: unknowns, locally owned entries, shape (n,). The stresses have the shape (points, 4) for each material.
         """
         self._at_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
 
     def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return `_at` without the motion of the last step: the body relaxes at a constant deformation."""
+        """Return the stresses of the materials (`_at`) if the body relaxes at the constant deformation x until a time.
+        """
         for history in self._materials:
             history.forget_motion()
         return self._at(x, time)
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
-        """Update the history variables of the materials to x at a time."""
+        """Update the history variables of the materials to the unknowns x at a time."""
         self._problem.set_fields(x)
         self._at_time(time)
         for history in self._materials:
             history.advance(x, control)
 
     def _norm(self, values: list[np.ndarray]) -> float:
-        """Return the root mean square over all points of all ranks."""
+        """Return the root mean square of stresses over all points of all ranks; values: shape (points, 4) each."""
         comm = self._problem.comm
         total, number = (comm.allreduce(v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))

@@ -323,8 +323,8 @@ def bind_pole_stretch(problem: Any) -> Bound:
     """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
-    row, power = pole.across()
-    so_far = 1 + float(pole.so_far[1, -1] - pole.so_far[0, -1]) / (high - low)
+    row, power = pole.stretch_row()
+    so_far = 1 + float(pole.earlier_displacement[1, -1] - pole.earlier_displacement[0, -1]) / (high - low)
     return Linear(problem, row, so_far, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
 
 
@@ -401,7 +401,7 @@ def _displacement(problem, points, factors):
     """
     found = probe(problem, points)
     return Linear(problem, found.row(np.asarray(factors)) * problem.forms.length,
-                   float(np.sum(factors * found.so_far)))
+                   float(np.sum(factors * found.earlier_displacement)))
 
 
 def _pole(problem):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import positive
-from ...forms.outline import FINE_PIECES, Outline, along
+from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...results.extend import method_of
 from ...results.path import Path
 
@@ -88,7 +88,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
         with problem.state_context(state):
             edges = outline.edges()
         found = np.minimum(found, share / np.maximum(_turns(edges, sides), 1e-300))
-        points = along(edges, FINE_PIECES)
+        points = edge_points(edges, FINE_PIECES)
         length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
         with problem.state_context(state):
             for contact, face in zip(problem.contacts, faces):

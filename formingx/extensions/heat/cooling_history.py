@@ -266,7 +266,7 @@ class CoolingHistory:
         return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
     def transfer(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
         """Interpolate a state of the heat equation on another mesh to this one, after the material histories.
 
         Args:

@@ -151,7 +151,7 @@ class PastStates:
                               None if smallest_h is None else smallest_h[chosen]))
 
     def transfer(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
-              mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Interpolate the past states of a run on another mesh to this mesh; collective.
 
         Args:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...forms.outline import FINE_PIECES, Outline, along
+from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...forms.probes import Probe
 from ...forms.transfer import MovingLeastSquares
 from ...mesh.nodes import of_mesh, of_space
@@ -30,17 +30,17 @@ class FollowedProbe(Probe):
 
     Attributes:
         points: positions (R, Z) of the points on the first mesh, shape (n, 2), length.
-        so_far: displacement of the points from the first to the present mesh, shape (n, 2), length.
+        earlier_displacement: displacement of the points from the first to the present mesh, shape (n, 2), length.
     """
 
     def __init__(self, problem: Any, points: Any):
         first = np.atleast_2d(np.asarray(points, dtype=float))
         super().__init__(problem, followed(problem, first))
-        self.points, self.so_far = first, self.points - first
+        self.points, self.earlier_displacement = first, self.points - first
 
     def _read(self) -> np.ndarray:
         """Return the displacement of the points since the start of the run for the present fields, shape (n, 2)."""
-        return super()._read() + self.so_far
+        return super()._read() + self.earlier_displacement
 
 
 def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
@@ -115,7 +115,7 @@ class _Onto:
     def _tree(self) -> Any:
         """Search tree of points along the edges of the outline."""
         from scipy.spatial import cKDTree
-        return cKDTree(along(self._edges, FINE_PIECES).reshape(-1, self._edges.shape[-1]))
+        return cKDTree(edge_points(self._edges, FINE_PIECES).reshape(-1, self._edges.shape[-1]))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Return positions x, shape (n, 2), length, with points outside or near the outline projected onto it."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...contact import resultants
 from ...findings import Finding
-from ...forms.outline import Outline, along
+from ...forms.outline import Outline, edge_points
 from ...ranks import gathered
 from ...scene.tool_width import CUT
 from ...solve.state import State
@@ -165,7 +165,7 @@ class AdmissibilityCheck:
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {contact.contact.label!r}, which has no friction and cannot"
                            f" hold it: it is behind the tool")
-        place = self._outline.fold(edges)
+        place = self._outline.self_intersection(edges)
         if place is not None:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
@@ -177,7 +177,7 @@ class AdmissibilityCheck:
             state: the state.
             own: True to examine the face of the contact alone, with the limit of a warning.
         """
-        points, length = along(edges), _lengths(edges)
+        points, length = edge_points(edges), _lengths(edges)
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present:
                 continue
@@ -301,4 +301,4 @@ def _pulled(contact: Any, state: State) -> bool:
 
 def _lengths(edges: np.ndarray) -> np.ndarray:
     """Return the lengths of curved edges, shape (m,), from (first end, last end, middle), shape (m, 3, 2)."""
-    return np.linalg.norm(np.diff(along(edges, 4), axis=1), axis=-1).sum(1)
+    return np.linalg.norm(np.diff(edge_points(edges, 4), axis=1), axis=-1).sum(1)
