@@ -446,6 +446,21 @@ def test_a_sheet_that_creeps_under_its_weight(tmp_path):
     assert animation.columns_of_stages(path) == {"sag": ("process_time", "pole_height")}
 
 
+def test_findings_name_the_control_of_their_stage(formed, tmp_path):
+    """A plug moves, then a pressure rises: each state is named by the quantity that its stage controls."""
+    record = report.of_path(formed)
+    n, half = len(formed), len(formed) // 2
+    assert record.control(n - 1) == "pressure"
+    later = np.arange(n) - half
+    record.stages = ["plug"] * half + ["blow"] * (n - half)
+    record.measures = {"air_pressure": np.maximum(later, 0), "plug_travel": np.minimum(np.arange(n), half - 1),
+                       **record.measures, "penetration": np.zeros(n), "mass_error": np.where(np.arange(n) > 1, 0.1, 0)}
+    assert (record.control(1), record.control(n - 1)) == ("plug_travel", "air_pressure")
+    assert "from state 2 on ('plug', plug travel = 2)" in " ".join(record.warnings())
+    report.write(record, tmp_path / "run.html", "", None, MPI.COMM_WORLD, fx.Units("mm", "MPa"))
+    assert "state kind plug travel, mm air pressure, MPa iterations" in page(tmp_path / "run.html")
+
+
 def test_largest_vacuum(tmp_path):
     """A pressure below 0 is largest where its magnitude is."""
     path = fx.trace(treloar((10, 1)), until=fx.pressure(-0.3), progress=False)
@@ -515,7 +530,7 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     assert "must be LENGTH,STRESS" in capsys.readouterr().err
     for name in ("one", "two"):
         text, data = page(tmp_path / f"{name}.html"), drawn(tmp_path / f"{name}.html")
-        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "heat_capacity=", "contact arriving (",
+        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "heat_capacity=", "gap closure (",
                      "go down"):
             assert said in text
         assert "lambda" not in text and ("volume of the part" in text) == (name == "one")
@@ -533,7 +548,7 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     said, again = capsys.readouterr().out.split(f"{len(path)} states, stage 'hold': ")[1:]
     assert said == again and "process time 1.5 of 1.5" in said and "the target is met" in said
     assert "warning: temperature: The error" in said
-    assert f"contact arriving ({limits['contact arriving']} times)" in said
+    assert f"gap closure ({limits['gap closure']} times)" in said
     (tmp_path / "run" / "end.json").unlink()
     for k in range(len(path) - 2, len(path)):               # as it was two states earlier
         shutil.rmtree(tmp_path / "run" / f"{k:04d}")

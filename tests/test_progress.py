@@ -29,7 +29,7 @@ def test_a_long_run_says_where_it_stands(shown, level, monkeypatch, caplog):
     assert lines and all(r.levelno == level for r in lines)
     parts = [float(re.search(r"to travel = 15: (\S+) % of the way", r.getMessage())[1]) for r in lines]
     assert parts == sorted(parts) and 0 <= parts[0] < parts[-1] <= 100
-    assert any("limited by contact arriving" in r.getMessage() and " left" in r.getMessage() for r in lines)
+    assert any("limited by gap closure" in r.getMessage() and " left" in r.getMessage() for r in lines)
 
 
 def test_a_short_run_says_nothing(caplog):

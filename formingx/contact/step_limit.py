@@ -262,7 +262,7 @@ class StepLimit:
             part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
                         for c in contacts], default=1.0)
             if part < 1:
-                return Cut("contact arriving", part)
+                return Cut("gap closure", part)
         return None
 
     @property

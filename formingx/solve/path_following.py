@@ -225,7 +225,7 @@ class Run:
             length = limit.length(self._trial._replace(length=length)) if limit else length
             target, bound, reach = self.aim.within_reach(old, length)
             if length < self.step.length:
-                self._limited("contact arriving", length)
+                self._limited("gap closure", length)
             try:
                 return self._take(old, length, target, bound, reach, end)
             except Cutback as cut:

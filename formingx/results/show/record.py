@@ -30,6 +30,9 @@ MASS = 1e-3
 FRAMES = 100
 """Approximate number of drawn states."""
 
+_CONTROLS = "pressure", "travel", "displacement"
+"""Endings of the columns of controlled quantities."""
+
 
 @dataclass
 class Record:
@@ -94,10 +97,19 @@ class Record:
         """True in plane strain: forces, energies, volumes and areas are per unit depth."""
         return not (self.axisymmetric or self.space)
 
-    @property
-    def control(self) -> str:
-        """Column of the controlled quantity."""
-        return next(iter(self.measures))
+    def control(self, state: int) -> str:
+        """Return the name of the column that is controlled in the stage of a state.
+
+        It is the first pressure, travel or displacement that changes in the stage. A run in process time, and a stage
+        without a control, give the first column.
+
+        Args:
+            state: number of the state.
+        """
+        first, end = next(ends for ends in self.stage_ranges if state < ends[1])
+        changes = [c for c, v in self.measures.items()
+                   if c.endswith(_CONTROLS) and np.ptp(v[first:end]) > 1e-9 * np.ptp(v)]
+        return changes[0] if changes and not self.timed else next(iter(self.measures))
 
     @property
     def progress(self) -> np.ndarray:
@@ -187,7 +199,12 @@ class Record:
         """
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
-        return f", from state {k} on ({stage}{words(self.control)} = {self.measures[self.control][k]:.5g})"
+        return f", from state {k} on ({stage}{self._control_of(k)})"
+
+    def _control_of(self, state: int) -> str:
+        """Return name and value of the controlled quantity in a state, as text."""
+        column = self.control(state)
+        return f"{words(column)} = {self.measures[column][state]:.5g}"
 
     def _of_volume(self) -> list[Finding]:
         """Return the findings on elements that do not keep their volumes, in a list."""
@@ -195,7 +212,7 @@ class Record:
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > volume.BOUND))
         begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
-        where = f"state {k}, {words(self.control)} = {self.measures[self.control][k]:.5g}{begins}"
+        where = f"state {k}, {self._control_of(k)}{begins}"
         clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
         return clamped or volume.findings(errors[k], where)
 
@@ -341,7 +358,7 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
-    driven = [c for c in measures if c.endswith(("pressure", "travel", "displacement"))]
+    driven = [c for c in measures if c.endswith(_CONTROLS)]
     columns = ["process_time"] if np.ptp(clock) > 0 else driven
     for column in columns:
         values = measures[column]

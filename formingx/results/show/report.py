@@ -368,14 +368,14 @@ def _convergence(record: Record) -> str:
 
 
 def _iterations(record: Record, units: Units) -> str:
-    """Return a table of the Newton iterations of each drawn state: corrections and last residual."""
-    rows = []
+    """Return a table of the Newton iterations of each drawn state: control, corrections and last residual."""
+    rows, controls = [], list(dict.fromkeys(map(record.control, record.frames)))
     for k in record.frames:
-        kind, history = record.kinds[k], record.histories[k]
+        kind, history, control = record.kinds[k], record.histories[k], record.control(k)
         corrections = ", ".join(f"{row[1]:.1e}" for row in history[:-1])
-        rows.append([str(k), kind, page.number(record.measures[record.control][k]), str(max(len(history) - 1, 0)),
-                     corrections, f"{history[-1][0]:.1e}" if history else ""])
-    head = ["state", "kind", units.label(record.control), "iterations", "corrections", "last residual"]
+        rows.append([str(k), kind, *(page.number(record.measures[c][k]) if c == control else "" for c in controls),
+                     str(max(len(history) - 1, 0)), corrections, f"{history[-1][0]:.1e}" if history else ""])
+    head = ["state", "kind", *map(units.label, controls), "iterations", "corrections", "last residual"]
     return page.table(head, rows)
 
 
