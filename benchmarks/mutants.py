@@ -159,7 +159,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("results/evaluate/step_polynomials.py", "f.at(s) * y.slope(s)", "f.at(1) * y.slope(s)", "energy_balance"),
     ("results/evaluate/work.py", "+ _friction_of(c, b, problem)) / 2 * slid", "+ 0) / 2 * slid", "energy_balance"),
     ("results/evaluate/work.py", "temperature._replace(before=None)", "temperature", "energy_balance"),
-    ("results/states.py", "history.advance(x, control)", "pass", "energy_balance"),
+    ("results/evaluate/dissipation.py", "history.advance(x, control)", "pass", "energy_balance"),
     ("results/evaluate/tension.py", "- F[1, 1] * P[1, 1])", "+ F[1, 1] * P[1, 1])", "membrane"),
     ("results/evaluate/part.py", "(r * r + r * s + s * s) * (w - z)", "(r * r + s * s) * 1.5 * (w - z)", "details"),
     ("results/evaluate/contact_face.py", "(traction / ratio).T", "traction.T", "evaluation"),
