@@ -193,7 +193,7 @@ class Clock:
 
     def __init__(self):
         self.seconds, self._on, self._last = Counter(), [], 0.0
-        self.calls = {}                                     # seconds of each call, by name
+        self.calls = {}                                     # seconds of each call, by (part, name)
 
     def _switch(self):
         now = time.process_time()
@@ -208,7 +208,7 @@ class Clock:
                 setattr(owner, name, self._watched(getattr(owner, name), part, within, name))
 
     def _watched(self, function, part, within, name):
-        calls = self.calls.setdefault(name, [])
+        calls = self.calls.setdefault((part, name), [])
 
         @functools.wraps(function)
         def timed(*given, **more):
@@ -250,8 +250,9 @@ def measured(name, finest):
     inside = R[-1] - profile.original_thickness[0] > R
     return {"states": counts.steps, "failures": counts.failures, "iterations": counts.iterations,
             "jumps": len(path.jumps), "seconds": sum(clock.seconds.values()),
-            "limit": counts.iterations * (np.mean(clock.calls["tangent"]) + np.mean(clock.calls["factorise"])
-                                          + np.median(clock.calls["solve_all"])),
+            "limit": counts.iterations * (np.mean(clock.calls["tangents", "tangent"])
+                                          + np.mean(clock.calls["LU", "factorise"])
+                                          + np.median(clock.calls["solves", "solve_all"])),
             "parts": {part: clock.seconds[part] for part in PARTS}, "limits": getattr(counts, "limits", []),
             "ended": ended, "length": R[inside].tolist(), "wall": t[inside].tolist()}
 

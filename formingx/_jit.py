@@ -33,6 +33,11 @@ from ffcx import naming
 from ffcx.codegeneration import get_include_path
 from ffcx.codegeneration import jit as ffcx_jit
 
+_FFI = cffi.FFI()
+_DOUBLES, _LONGS = _FFI.typeof("double[]"), _FFI.typeof("long[]")
+NULL = _FFI.NULL
+"""Address of no array, for an optional argument of a function in C."""
+
 
 def supported(jit_options: dict[str, Any]) -> bool:
     """Return True if this module can compile forms; otherwise DOLFINx does.
@@ -184,6 +189,33 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
         finally:
             made.unlink(missing_ok=True)
     return file
+
+
+@functools.cache
+def functions(name: str, header: str, code: str) -> Any:
+    """Return functions in C as attributes of an object, compiled at the first call.
+
+    Args:
+        name: name of the library in the cache.
+        header: their declarations.
+        code: their definitions.
+
+    Raises:
+        RuntimeError: the C compiler failed. It could not compile forms, either.
+    """
+    ffi = cffi.FFI()
+    ffi.cdef(header)
+    return ffi.dlopen(str(library(name, code, ("-O3", "-ffp-contract=off"))))
+
+
+def address(values: Any) -> Any:
+    """Return the address of an array of floats for a function in C; a copy is passed if it is not contiguous."""
+    return _FFI.from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
+
+
+def address_of_integers(values: Any) -> Any:
+    """Return the address of an array of integers (long in C), as `address` does of floats."""
+    return _FFI.from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
 
 
 def compile_c(command: list[str], code: str) -> None:

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .._jit import NULL, address
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
-from .contact_law import ContactHistory, Motion, NormalLaw, Tractions, outer
+from .compiled_penalty import compiled
+from .contact_law import ContactHistory, Motion, NormalLaw, Tractions
 
 STICKS = 100.0
 """Coefficient of friction from which on a point counts as sticking."""
@@ -38,7 +40,7 @@ class Law(NormalLaw):
                  elastic_slip: float, shift: np.ndarray | float = 0.0, pulls: bool = False,
                  shear_limit: Callable | None = None):
         super().__init__(tool, k, theta, shift)
-        self.shear_limit = shear_limit or (lambda pressure, mu: (mu * pressure, mu))
+        self.shear_limit = shear_limit
         self.elastic_slip, self.pulls = elastic_slip, pulls
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
@@ -61,6 +63,16 @@ class Law(NormalLaw):
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.has_history = self.has_friction or self.pulls
+        self._constants: tuple | None = None
+
+    def _given(self) -> tuple:
+        """Return the constants of the law as arguments of the functions in C, stored for repeated calls."""
+        if self._constants is None:
+            flags = (self.pulls, self.has_history, self.has_friction, self._slides)
+            each = [(np.array(value, dtype=float, ndmin=1), np.ndim(value)) for value in (self.k, self.mu)]
+            self._constants = (address(np.array([self.theta, self.elastic_slip, *flags, STICKS])),
+                               *(argument for value, stride in each for argument in (address(value), stride)))
+        return self._constants
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         """Return the mask of the points in contact with the tool, including bonded points.
@@ -90,11 +102,10 @@ class Law(NormalLaw):
         Returns:
             F, shape (n,), length; dF/dd, shape (n,).
         """
-        if self.pulls:
-            slope = np.where(bonded | (d > -self.theta), 1.0, 0.0)
-            return slope * (d + self.theta), slope
-        slope = np.minimum(np.maximum((d + self.theta) / (2 * self.theta), 0.0), 1.0)      # np.clip is slow
-        return np.where(d < self.theta, self.theta * slope**2, d), slope
+        F, slope = np.empty(len(d)), np.empty(len(d))
+        held = NULL if bonded is False else address(bonded)
+        compiled().ramp(len(d), self.theta, self.pulls, address(d), held, address(F), address(slope))
+        return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
         """Return the signed distance from the tool at which the normal traction has a given value.
@@ -116,9 +127,10 @@ class Law(NormalLaw):
     @property
     def friction(self) -> np.ndarray:
         """Ratio T/N at which a point slides under a vanishing pressure, shape () or (n,); infinite with stick."""
-        sticks = np.asarray(self.sticks)
-        grows = self.shear_limit(np.zeros(np.shape(self.mu)), np.where(sticks, 0.0, self.mu))[1]
-        return np.where(sticks, np.inf, grows)
+        sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
+        if self.shear_limit is not None:
+            mu = self.shear_limit(np.zeros(mu.shape), np.where(sticks, 0.0, mu))[1]
+        return np.where(sticks, np.inf, mu)
 
     def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
         """Return the energy of the normal traction, the integral of N over the distance.
@@ -167,67 +179,31 @@ class Law(NormalLaw):
         Returns:
             Tractions, with their stiffness and the new history variables.
         """
-        near, k = self.nearest(x), self.k
-        d, n, t, bend = near.distance, near.normal, near.tangent, near.curvature
-        centre = d if expected is None else expected.distance
-        bonded = self._bonded(old)
-        zero: np.ndarray = np.zeros(len(x))
-        if centre.max(initial=-np.inf) <= -self.theta and not np.any(bonded):         # no point touches
-            return Tractions(np.zeros(x.shape), zero, zero, zero, lambda: np.zeros((*x.shape, x.shape[1])),
-                             lambda: _history(x, d, zero))
-        F, slope = self.ramp(centre, bonded)
-        pressed, ahead = k * F, d - centre
-        N = pressed + k * slope * ahead
-        force = N[:, None] * n
-        kept_at = np.where(bonded, np.maximum(d, 0.0), d) if self.has_history else d            # stays in contact
-        if not self.has_friction:
-            return Tractions(force, N, zero, zero, lambda: outer(n, (k * slope)[:, None] * n)
-                             + outer(t, (pressed * bend)[:, None] * t), lambda: _history(x, kept_at, zero))
-        assert old is not None
-        g, dg = self._slip(x, near, t, old)
-        predicted = g if expected is None else expected.slip
-        s, rising = self._resistance(centre, pressed, slope)
-        T, sliding = s * g + rising * ahead * predicted, np.zeros(len(x), dtype=bool)
-        sense_now, bent, grows = zero, T, 0.0
-        if self._slides:
-            trial = s * predicted
-            turned = False if sense is None else np.sign(trial) * sense < 0
-            limit, grows = self.shear_limit(pressed, self.mu)
-            sliding = (np.abs(trial) > limit) & ~np.asarray(turned)
-            sense_now = np.where(sliding, np.sign(trial), 0.0)
-            T, bent = np.where(sliding, sense_now * (limit + grows * (N - pressed)), T), np.clip(T, -limit, limit)
-        force = force + T[:, None] * t
+        n, out = len(x), self._evaluate(x, old, sense, expected)
+        N, T, slides = out[2 * n:3 * n], out[3 * n:4 * n], out[4 * n:5 * n]
+        return Tractions(out[:2 * n].reshape(n, 2), N, T, slides, lambda: out[5 * n:9 * n].reshape(n, 2, 2),
+                         lambda: _history(x, out[9 * n:10 * n], out[10 * n:11 * n]))
 
-        def stiffness() -> np.ndarray:
-            stuck = s[:, None] * dg + (rising * predicted)[:, None] * n
-            dT = np.where(sliding[:, None], (sense_now * grows * k * slope)[:, None] * n, stuck)
-            return (outer(n, (k * slope)[:, None] * n - (bent * bend)[:, None] * t)
-                    + outer(t, (pressed * bend)[:, None] * t + dT))
-
-        def history() -> ContactHistory:
-            kept = np.divide(T, s, out=zero.copy(), where=s > 0)
-            kept *= 1 + 1e-9 * np.abs(sense_now)             # sliding points go on sliding, in spite of round-off
-            return _history(x, kept_at, kept)
-        return Tractions(force, N, T, sense_now, stiffness, history)
-
-    def _resistance(self, d: np.ndarray, pressed: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tangential stiffness T/g of elastic slip, and its derivative by the distance, shape (n,) each.
-
-        Args:
-            d: signed distances, shape (n,), length.
-            pressed: normal tractions at d, shape (n,), stress.
-            slope: derivatives of the ramp at d, shape (n,).
-        """
-        sticks, k = self.sticks, self.k
-        if np.ndim(sticks) == 0 and not sticks:
-            limit, grows = self.shear_limit(pressed, self.mu)
-            return limit / self.elastic_slip, grows / self.elastic_slip * k * slope
-        rising = (np.abs(d) < self.theta) * (k / (2 * self.theta) * (not self.pulls))
-        if np.ndim(sticks) == 0:
-            return k * slope, rising
-        limit, grows = self.shear_limit(pressed, np.where(sticks, 0.0, self.mu))
-        return (np.where(sticks, k * slope, limit / self.elastic_slip),
-                np.where(sticks, rising, grows / self.elastic_slip * k * slope))
+    def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
+                  expected: Motion | None = None) -> np.ndarray:
+        """Return all values that the function `tractions` in C computes, flat, shape (12 n,)."""
+        near, out = self.nearest(x), np.empty(12 * len(x))
+        before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
+        if old is not None:
+            before = address(old.distance)
+        if self.has_friction:
+            assert old is not None
+            g, dg = (address(a) for a in self._slip(x, near, old))
+            if self.shear_limit is not None:
+                centre = near.distance if expected is None else expected.distance
+                mu = self.mu if self._slides else np.where(self.sticks, 0.0, self.mu)
+                found = self.shear_limit(self.k * self.ramp(centre, self._bonded(old))[0], mu)
+                limit, grows = (address(np.broadcast_to(a, len(x))) for a in found)
+        ahead = (NULL, NULL) if expected is None else (address(expected.distance), address(expected.slip))
+        compiled().tractions(len(x), *self._given(), address(near.distance), address(near.normal),
+                             address(near.curvature), before, g, dg, *ahead, NULL if sense is None else address(sense),
+                             limit, grows, address(out))
+        return out
 
     def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         r"""Return the derivative of the circumferential traction with respect to the circumferential motion.
@@ -244,11 +220,11 @@ class Law(NormalLaw):
         Returns:
             Stiffness, shape (n,), stress/length.
         """
-        turned, near, found = super().stiffness_round(x, old, radius), self.nearest(x), self.tractions(x, old)
+        turned = super().stiffness_round(x, old, radius)
         if not self.has_friction:
             return turned
-        F, slope = self.ramp(near.distance, self._bonded(old))
-        return turned + np.where(found.sense == 0, self._resistance(near.distance, self.k * F, slope)[0], 0.0)
+        n, out = len(x), self._evaluate(x, old)
+        return turned + np.where(out[4 * n:5 * n] == 0, out[11 * n:], 0.0)           # where points do not slide
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips of points, with their gradients.
@@ -261,7 +237,7 @@ class Law(NormalLaw):
             Distances, normals, slips and gradients of the slip at x.
         """
         near = self.nearest(x)
-        g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, near.tangent, old)
+        g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
@@ -289,23 +265,17 @@ class Law(NormalLaw):
         pressed = self.tractions(x + press[:, None] * near.normal, old)
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
-    def _slip(self, x: np.ndarray, near: Nearest, tangent: np.ndarray,
-              old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
+    def _slip(self, x: np.ndarray, near: Nearest, old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
         """Return the elastic slip g that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
 
         The result is stored for repeated calls with the same arguments.
         """
-        if self._slid is not None and self._slid[0] is near and self._slid[1] is old:
-            return self._slid[2]
-        touched = old.distance > -self.theta
-        motion = x - np.where(touched[:, None], old.position, old.arrival)
-        slips = ~np.isnan(motion[:, 0])
-        motion = np.where(slips[:, None], motion, 0.0)
-        along = np.einsum("ni,ni->n", tangent, motion)
-        across = np.einsum("ni,ni->n", near.normal, motion)
-        found = old.slip + along, tangent * (slips * (1 - near.curvature * across))[:, None]
-        self._slid = near, old, found
-        return found
+        if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
+            g, dg = np.empty(len(x)), np.empty((len(x), 2))
+            compiled().elastic_slips(len(x), self.theta, address(x), address(near.normal), address(near.curvature),
+                                     *map(address, old), address(g), address(dg))
+            self._slid = near, old, (g, dg)
+        return self._slid[2]
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:

@@ -7,6 +7,7 @@ from petsc4py import PETSc
 
 from .equations import Array
 
+_WIDTHS = 8                             # of right-hand sides whose dense matrices are stored
 _SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: automatic choice; the scaling of the last factorisation
 
 
@@ -36,7 +37,7 @@ class DirectSolver:
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, determinant: bool = False, inertia: bool = False):
         self._matrix, self._symmetric, self._determinant, self._inertia = matrix, symmetric, determinant, inertia
-        self._columns: list[PETSc.Mat] = []                 # dense matrices for `solve_all`
+        self._columns: dict[int, list[PETSc.Mat]] = {}      # dense matrices for `solve_all`, by their width
         self._scaled = False                                # factors exist, with a scaling
         self.count = 0                                      # number of factorisations
         self._keeps = matrix.comm.size == 1                 # MUMPS can keep a scaling
@@ -123,24 +124,27 @@ class DirectSolver:
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
 
-        The matrices of the last call are used again if they have m columns.
+        The matrices of the last few widths are used again.
         """
-        if not self._columns or self._columns[0].getSize()[1] != m:
-            self._forget()
-            for _ in range(2):
-                matrix = PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
-                matrix.assemble()
-                self._columns.append(matrix)
-        return self._columns
+        found = self._columns.pop(m, [])
+        while len(found) < 2:
+            matrix = PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
+            matrix.assemble()
+            found.append(matrix)
+        self._columns[m] = found                             # the last used width is the last key
+        if len(self._columns) > _WIDTHS:
+            self._forget(next(iter(self._columns)))
+        return found
 
-    def _forget(self) -> None:
-        """Destroy the dense matrices."""
-        while self._columns:
-            self._columns.pop().destroy()
+    def _forget(self, m: int) -> None:
+        """Destroy the dense matrices with m columns."""
+        for matrix in self._columns.pop(m):
+            matrix.destroy()
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
-        self._forget()
+        for m in list(self._columns):
+            self._forget(m)
         self._ksp.destroy()
 
 

@@ -6,13 +6,9 @@ the arithmetic. The function is compiled once, into the cache folder of compiled
 
 from __future__ import annotations
 
-import functools
-from typing import Any
-
-import cffi
 import numpy as np
 
-from .._jit import library
+from .._jit import address, functions
 
 _HEADER = "void nearest(long, const double *, long, long, const double *, double *, double *, double *);"
 
@@ -75,23 +71,9 @@ def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, n
         Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
         1/length.
     """
-    ffi, doubles, function = _compiled()
     n = len(x)
-    x, found = np.ascontiguousarray(x), np.empty(4 * n)
-    out = ffi.from_buffer(doubles, found)
-    function(n, ffi.from_buffer(doubles, x), len(table), lines, ffi.from_buffer(doubles, table), out, out + n,
-             out + 3 * n)
+    found = np.empty(4 * n)
+    out = address(found)
+    functions("nearest", _HEADER, _SOURCE).nearest(n, address(x), len(table), lines, address(table), out, out + n,
+                                                   out + 3 * n)
     return found[:n], found[n:3 * n].reshape(n, 2), found[3 * n:]
-
-
-@functools.cache
-def _compiled() -> tuple[Any, Any, Any]:
-    """Return the cffi interface, the array type and the C function, compiled at the first call.
-
-    Raises:
-        RuntimeError: the C compiler failed. It could not compile forms, either.
-    """
-    ffi = cffi.FFI()
-    ffi.cdef(_HEADER)
-    functions: Any = ffi.dlopen(str(library("nearest", _SOURCE, ("-O2", "-ffp-contract=off"))))
-    return ffi, ffi.typeof("double[]"), functions.nearest
