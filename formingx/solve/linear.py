@@ -7,7 +7,6 @@ from petsc4py import PETSc
 
 from .equations import Array
 
-_WIDTHS = 8                             # of right-hand sides whose dense matrices are stored
 _SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: automatic choice; the scaling of the last factorisation
 
 
@@ -124,17 +123,16 @@ class DirectSolver:
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
 
-        The matrices of the last few widths are used again.
+        The matrices of a single column, and those of the last other width, are used again.
         """
-        found = self._columns.pop(m, [])
-        while len(found) < 2:
-            matrix = PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
-            matrix.assemble()
-            found.append(matrix)
-        self._columns[m] = found                             # the last used width is the last key
-        if len(self._columns) > _WIDTHS:
-            self._forget(next(iter(self._columns)))
-        return found
+        if m not in self._columns:
+            for other in [width for width in self._columns if width > 1]:
+                self._forget(other)
+            self._columns[m] = [PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
+                                for _ in range(2)]
+            for matrix in self._columns[m]:
+                matrix.assemble()
+        return self._columns[m]
 
     def _forget(self, m: int) -> None:
         """Destroy the dense matrices with m columns."""
