@@ -59,32 +59,33 @@ def _parser() -> argparse.ArgumentParser:
                                 " nothing is solved.")
     check.add_argument("script", metavar="SCRIPT", help="a Python file")
     check.add_argument("arguments", nargs=argparse.REMAINDER, help="its own options")
-    two = commands.add_parser("compare", help="compare two curves",
-                              formatter_class=argparse.RawDescriptionHelpFormatter, description=_COMPARE)
-    two.add_argument("ours", metavar="OURS", help="CSV file of a run (Path.to_csv)")
-    two.add_argument("theirs", metavar="THEIRS", help="CSV file of the other program, rows in order along its path")
-    two.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
-                     help="columns that belong together, at least two (a bare NAME: the same on both sides)")
-    two.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
-                     help="of a column of ours: a factor for theirs, or our unit, if their header states theirs")
-    two.add_argument("--out", type=Path, default=Path("results") / "compare",
-                     help="folder for curves.png and pairs.csv (default: %(default)s)")
-    look = commands.add_parser("open", help="show what is in a checkpoint",
-                               description="Show what is in a checkpoint: the scene, the states, how the run ended.")
-    show = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
-                               " checkpoint: inputs, curves, thickness, convergence.")
-    now = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
-                              " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
+    comparison = commands.add_parser("compare", help="compare two curves",
+                                     formatter_class=argparse.RawDescriptionHelpFormatter, description=_COMPARE)
+    comparison.add_argument("ours", metavar="OURS", help="CSV file of a run (Path.to_csv)")
+    comparison.add_argument("theirs", metavar="THEIRS",
+                            help="CSV file of the other program, rows in order along its path")
+    comparison.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
+                            help="columns that belong together, at least two (a bare NAME: the same on both sides)")
+    comparison.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
+                            help="of a column of ours: a factor for theirs, or our unit, if their header states theirs")
+    comparison.add_argument("--out", type=Path, default=Path("results") / "compare",
+                            help="folder for curves.png and pairs.csv (default: %(default)s)")
+    contents = commands.add_parser("open", help="show what is in a checkpoint",
+                                   description="Show what is in a checkpoint: the scene, the states, how the run ended.")
+    report_ = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
+                                  " checkpoint: inputs, curves, thickness, convergence.")
+    status_ = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
+                                  " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
     watch = commands.add_parser("watch", help="show the status again and again", description="Show the status of a run"
                                 " whenever it has new states, until it ends, has had none for --patience seconds, or"
                                 " Ctrl-C.")
-    for entry in (look, show, now, watch):
+    for entry in (contents, report_, status_, watch):
         entry.add_argument("folder", metavar="FOLDER", help="a checkpoint (trace(..., checkpoint=FOLDER), Path.save)")
-    show.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
-    show.add_argument("--title", default="", help="heading of the report")
-    show.add_argument("--units", metavar="LENGTH,STRESS", help="units of the script, such as mm,MPa")
-    show.add_argument("--density", type=float, help="of the material in g/cm3, for the weight")
-    show.add_argument("--trim", type=float, metavar="R", help="radius at which the part is cut off")
+    report_.add_argument("--out", type=Path, help="the HTML file (default: report.html in the checkpoint)")
+    report_.add_argument("--title", default="", help="heading of the report")
+    report_.add_argument("--units", metavar="LENGTH,STRESS", help="units of the script, such as mm,MPa")
+    report_.add_argument("--density", type=float, help="of the material in g/cm3, for the weight")
+    report_.add_argument("--trim", type=float, metavar="R", help="radius at which the part is cut off")
     watch.add_argument("--every", type=float, default=5.0, metavar="SECONDS",
                        help="time between two looks (default: 5)")
     watch.add_argument("--patience", type=float, default=600.0, metavar="SECONDS",

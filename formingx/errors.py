@@ -286,20 +286,21 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
     return found.reshape(-1, components)
 
 
-def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.ndarray:
+def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the values of a user's function of arrays, as floats of their shape.
 
     Args:
         name: name of the function, for the message.
         function: the function.
-        at: {name: array} of the arguments of the function in order, all of one shape.
+        arrays: {name: array} of the arguments of the function in order, all of one shape.
 
     Raises:
         InputError: the function fails, or a value is not finite. An InputError of the function itself is passed on.
     """
-    arguments = ", ".join(at) if len(at) == 1 else f"({', '.join(at)})"
+    arguments = ", ".join(arrays) if len(arrays) == 1 else f"({', '.join(arrays)})"
     try:
-        found = np.broadcast_to(np.asarray(function(*at.values()), dtype=float), np.shape(next(iter(at.values()))))
+        found = np.broadcast_to(np.asarray(function(*arrays.values()), dtype=float),
+                                np.shape(next(iter(arrays.values()))))
     except InputError:
         raise
     except Exception as error:
@@ -307,9 +308,9 @@ def values(name: str, function: Callable, at: Mapping[str, np.ndarray]) -> np.nd
                          f" {type(error).__name__}: {error}") from error
     wrong = ~np.isfinite(found)
     if np.any(wrong):
-        where = ", ".join(f"{array[wrong].flat[0]:.6g}" for array in at.values())
+        where = ", ".join(f"{array[wrong].flat[0]:.6g}" for array in arrays.values())
         raise InputError(f"{name}: is {found[wrong].flat[0]}, not a finite number, at"
-                         f" {arguments} = {where if len(at) == 1 else f'({where})'}")
+                         f" {arguments} = {where if len(arrays) == 1 else f'({where})'}")
     return found
 
 

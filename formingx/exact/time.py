@@ -154,8 +154,8 @@ class Body:
         limit_point.terminal = True                              # type: ignore[attr-defined]
         found = solve_ivp(rate, (self.s, end), np.append(self.time, self.w), method="DOP853", dense_output=True,
                           events=limit_point, max_step=0.01, **_TOLERANCES)
-        met = [self.time if s <= self.s else found.sol(s)[0] if s <= found.t[-1] else np.nan for s in targets]
-        return np.array(met), float(found.y_events[0][0][0]) if len(found.t_events[0]) else None
+        times = [self.time if s <= self.s else found.sol(s)[0] if s <= found.t[-1] else np.nan for s in targets]
+        return np.array(times), float(found.y_events[0][0][0]) if len(found.t_events[0]) else None
 
     def _load(self, s: float, w: np.ndarray) -> float:
         """Return the load for the degree of freedom s and the elastic strains w."""

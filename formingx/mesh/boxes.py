@@ -29,8 +29,8 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
     ends[0, :len(low)], ends[1, :len(low)] = low[order], high[order]
     tree = [ends]
     while len(tree) <= depth:
-        two = tree[-1].reshape(2, -1, 2, 2)
-        tree.append(np.stack([two[0].min(1), two[1].max(1)]))
+        children = tree[-1].reshape(2, -1, 2, 2)
+        tree.append(np.stack([children[0].min(1), children[1].max(1)]))
     waiting = [(depth, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
     while waiting:
         level, a, b = waiting.pop()

@@ -135,10 +135,10 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
     edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     sides = np.zeros(len(edges))
     np.add.at(sides, place.ravel(), side)
-    over = (times > 2) | (times == 2) & (sides != 0)
-    if over.any():
-        raise InputError(f"{what}: elements lie over each other at {_show(points[edges[over][0]].mean(0))}: each edge"
-                         f" must have one element on each side")
+    overlaps = (times > 2) | (times == 2) & (sides != 0)
+    if overlaps.any():
+        raise InputError(f"{what}: elements lie over each other at {_show(points[edges[overlaps][0]].mean(0))}: each"
+                         f" edge must have one element on each side")
     return edges[times == 1]
 
 

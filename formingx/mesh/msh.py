@@ -272,18 +272,18 @@ def _elements_2(section: Section) -> list[Block]:
         InputError: an element type is unknown.
     """
     found: dict[tuple[int, int, int], list] = {}
-    n, got = section.line() if section.binary else checked_count(section.ints(1), section), 0
-    while got < n:
+    n, done = section.line() if section.binary else checked_count(section.ints(1), section), 0
+    while done < n:
         # binary: type, number of such elements, number of tags, then elements; text: number, type, number of tags
         head = section.int_list(3)
-        kind, many, tags = head if section.binary else (head[1], 1, head[2])
-        if kind not in _KINDS or many < 1 or not 2 <= tags <= 1000:
-            raise InputError(f"{section.where}: element {got + 1}: type {kind} with {tags} tags is not known")
+        kind, number, tags = head if section.binary else (head[1], 1, head[2])
+        if kind not in _KINDS or number < 1 or not 2 <= tags <= 1000:
+            raise InputError(f"{section.where}: element {done + 1}: type {kind} with {tags} tags is not known")
         width = section.binary + tags + _KINDS[kind][1]
-        rows = section.ints(many * width).reshape(many, width)[:, int(section.binary):]
+        rows = section.ints(number * width).reshape(number, width)[:, int(section.binary):]
         for row in rows:
             found.setdefault((kind, int(row[0]), int(row[1])), []).append(row[tags:])
-        got += many
+        done += number
     section.end()
     return [Block(_KINDS[kind][0], entity, kind, (abs(group),) if group else (), np.array(rows))
             for (kind, group, entity), rows in found.items()]
@@ -361,8 +361,8 @@ def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]
         InputError: an element type is unknown.
     """
     blocks = []
-    many, total, *_ = section.sizes(4)
-    for _ in range(checked_count([many], section)):
+    number, total, *_ = section.sizes(4)
+    for _ in range(checked_count([number], section)):
         dim, entity, kind = section.int_list(3)
         n = checked_count(section.sizes(1), section)
         if kind not in _KINDS or _KINDS[kind][0] != dim:

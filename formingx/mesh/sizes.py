@@ -51,6 +51,6 @@ def moved_nodes(mesh: Any) -> float:
     """
     columns = mesh.columns
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
-    away = [np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
-            for k, name in enumerate(columns.faces)]
-    return max(away) / np.ptp(nodes, axis=0).max()
+    motions = [np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()
+               for k, name in enumerate(columns.faces)]
+    return max(motions) / np.ptp(nodes, axis=0).max()

@@ -40,7 +40,7 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
         raise ValueError("it is binary: save it as text")
     lines = [line.strip() for line in data.decode("latin-1").rstrip().split("\n")]
     section, kinds, entity = "", Counter[str](), list[tuple[int, str]]()
-    begun, last = "", ""
+    kind, last = "", ""
     for n in range(0, len(lines), 2):
         try:
             code = whole(lines[n])
@@ -49,19 +49,19 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
         if n + 1 == len(lines):
             raise ValueError("it ends within a tag")
         value = lines[n + 1]
-        if 10 <= code <= 59 and section == "ENTITIES" and begun in _NEEDED:
+        if 10 <= code <= 59 and section == "ENTITIES" and kind in _NEEDED:
             try:
                 number(value)
             except ValueError as error:
                 raise ValueError(f"line {n + 2}: {error}") from None
         if code != 0:
-            section = value if begun == "SECTION" and code == 2 else section
+            section = value if kind == "SECTION" and code == 2 else section
             entity.append((code, value))
             continue
-        if section == "ENTITIES" and begun not in ("", "SECTION"):
-            _check_entity(begun, entity, n, others)
-            kinds[begun] += begun in _NEEDED
-        begun, entity, last = value, [], value
+        if section == "ENTITIES" and kind not in ("", "SECTION"):
+            _check_entity(kind, entity, n, others)
+            kinds[kind] += kind in _NEEDED
+        kind, entity, last = value, [], value
         section = "" if value == "ENDSEC" else section
     if last != "EOF":
         raise ValueError("it has no end: it was cut off")
@@ -85,15 +85,15 @@ def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tup
         if kind not in _LETTERING and kind not in others:
             raise ValueError(f"{where}: an unknown kind of entity")
         return
-    many = Counter(code for code, _ in tags)
-    wrong = [code for code in _NEEDED[kind] if many[code] != 1]
+    counts = Counter(code for code, _ in tags)
+    wrong = [code for code in _NEEDED[kind] if counts[code] != 1]
     if wrong:
-        raise ValueError(f"{where}: has {many[wrong[0]]} values of group code {wrong[0]}, must have one")
+        raise ValueError(f"{where}: has {counts[wrong[0]]} values of group code {wrong[0]}, must have one")
     for code, counted in _COUNTED.get(kind, {}).items():
         found = [value for c, value in tags if c == code]
         if len(found) > 1 or not found and code != 74:
             raise ValueError(f"{where}: has {len(found)} counts of group code {code}, must have one")
         for other in counted:
-            if many[other] != whole((found or ["0"])[0]):
-                raise ValueError(f"{where}: announces {(found or ['0'])[0]} and has {many[other]} values of group code"
-                                 f" {other}")
+            if counts[other] != whole((found or ["0"])[0]):
+                raise ValueError(f"{where}: announces {(found or ['0'])[0]} and has {counts[other]} values of group"
+                                 f" code {other}")
