@@ -70,8 +70,8 @@ def _parser() -> argparse.ArgumentParser:
                             help="of a column of ours: a factor for theirs, or our unit, if their header states theirs")
     comparison.add_argument("--out", type=Path, default=Path("results") / "compare",
                             help="folder for curves.png and pairs.csv (default: %(default)s)")
-    contents = commands.add_parser("open", help="show what is in a checkpoint",
-                                   description="Show what is in a checkpoint: the scene, the states, how the run ended.")
+    contents = commands.add_parser("open", help="show what is in a checkpoint", description="Show what is in a"
+                                   " checkpoint: the scene, the states, how the run ended.")
     report_ = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
                                   " checkpoint: inputs, curves, thickness, convergence.")
     status_ = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
