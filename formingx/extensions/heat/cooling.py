@@ -188,7 +188,7 @@ class Cooling:
 
         Returns:
             {boundary: conductance, heat per time, area and degree}; infinite for a prescribed temperature. Boundaries
-                without conductance are left out.
+            without conductance are left out.
         """
         found: dict[str, float] = {}
         for law in [*self.boundaries, *self.contacts_with_tools(scene)]:
