@@ -188,7 +188,7 @@ class Path(States):
         return plots.curve(self, y, x, axes, **style)
 
     def plot_convergence(self, axes: Axes | None = None) -> Any:
-        """Draw the correction |dx|/|x| of every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
+        """Draw the relative correction in every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
 
         Args:
             axes: matplotlib axes; default new ones.
