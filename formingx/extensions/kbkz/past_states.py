@@ -70,6 +70,7 @@ class PastStates:
         self._n = len(self._own) * len(terms.places)
 
         def at_points(expression: Any) -> fem.Expression:
+            """Return a UFL expression, compiled for the quadrature points."""
             return _compat.compile_expression(expression, terms.places)
         self._C = at_points(ufl.as_vector(isochoric(forms.elastic_F)))
         self._aT = at_points(ufl.as_vector([terms.constants["aT"]])) if self._law.shifted else None
@@ -257,6 +258,8 @@ class PastStates:
         order = np.argsort(numbers)
 
         def of_all(values: np.ndarray) -> np.ndarray:
+            """Return values at the points of this rank, shape (..., n), for the cells of all ranks in original order.
+            """
             each = values.reshape(-1, len(self._own), len(self._terms.places)).transpose(1, 0, 2)
             return gathered(self._forms.comm, each)[order]
         states = [{"felt": of_all(s.reduced_time) if self._aT else s.reduced_time, "C": of_all(s.C)}
@@ -286,6 +289,7 @@ class PastStates:
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
 
         def own(values: np.ndarray) -> np.ndarray:
+            """Return the values of the cells of this rank, shape (..., n), from the values of all cells."""
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)
         states = tuple(Past(own(time)[0] if self._aT else float(time), own(C)) for time, C in found)
         smallest_h = own(np.array(data["least"], float)) if "least" in data else None

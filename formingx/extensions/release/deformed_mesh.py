@@ -76,6 +76,7 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
     parts = comm.allgather((triangles, points, layers, edges))
 
     def grid() -> Grid:
+        """Return the deformed mesh of all ranks as a grid."""
         place = np.zeros((1 + max(int(t.max(initial=0)) for t, *_ in parts), points.shape[-1]))
         for t, x, *_ in parts:
             place[t] = x

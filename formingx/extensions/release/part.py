@@ -29,6 +29,7 @@ def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
     grid = gathered(mesh)
 
     def part() -> Grid:
+        """Return the grid of the triangles whose centres are nearest to the first segments of the line."""
         return _part(grid, {name: rows[_nearest(grid.points[rows[:, :3]].mean(1), line) < pieces]
                             for name, rows in grid.layers.items()})
     return to_mesh(part, mesh.comm, "the trimmed part")

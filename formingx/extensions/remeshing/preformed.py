@@ -53,7 +53,8 @@ class Preformed(NamedTuple):
         b: deformation at the start of the old mesh, at corners and midpoints, shape (m, 6, 6). The six entries are rr,
             rz, zz and hoop entry of b, and cosine and sine of the rotation in the section.
         pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
-        volume_stiffness: additional volume stiffness of the model (`Model.volume_stiffness`) over the unit of stress.
+        volume_stiffness: additional volume stiffness (`Model.volume_stiffness` times shear modulus) over the unit of
+            stress of the problem.
         before: the problem on the old mesh and its last state.
     """
 

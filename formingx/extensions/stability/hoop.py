@@ -26,7 +26,8 @@ class HoopResultants(Sheet):
     membrane, which has no bending stiffness, wrinkles there.
 
     Attributes:
-        points: reference positions (R, Z) of the points, in the middle of the elements, shape (n, 2), length.
+        points: reference positions (R, Z) of the points, shape (n, 2), length: the middles of the elements of a solid,
+            the quadrature points of a membrane.
         resultant: hoop component of the first Piola-Kirchhoff stress P, integrated through the reference thickness,
             shape (n,), force per reference length of the middle line.
         comm: MPI communicator of the run.

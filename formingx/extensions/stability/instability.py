@@ -354,6 +354,7 @@ class InstabilityCondition(RunExtension):
         first: dict[Kind, int] = {}
 
         def examine() -> None:
+            """End the run if the last state has more unstable modes of a kind than the first state."""
             state = path.last
             modes = analysis.modes_of(path.segment(state))
             for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):

@@ -110,9 +110,11 @@ class TopLoad:
 
     def __str__(self) -> str:
         def text(value: float, quantity: str, digits: int = 5) -> str:
+            """Return a value with the unit of a quantity, as text."""
             return f"{value:.{digits}g} {self.units.of(quantity)}".rstrip()
 
         def pair(force: float, travel: float, between: str = ", ") -> str:
+            """Return a force and a travel, as text."""
             return f"{text(force, 'force')}{between}travel {text(travel, 'travel', 4)}"
         note = "" if self.peak else " (the last state: it may grow further)"
         lines = ["top load, elastic:",

@@ -187,6 +187,7 @@ class Study(Sheet):
         worst = max(map(self._distance, self.good))
 
         def objective(x):
+            """Return the measure to be minimised at a point x of the unit cube, from a stored or a new run."""
             values = start.values | dict(zip(within, (low + np.clip(x, 0, 1) * (high - low)).tolist()))
             run = next((run for run in self.runs if run.values == values), None) or pool.submit(
                 self._task, values).result()
