@@ -336,7 +336,7 @@ def test_coulomb_goes_over_into_free_and_stick():
 
 @pytest.mark.parametrize("friction, close", [("none", 1e-8), ("stick", 1e-4), (0.3, 1e-3)])
 def test_points_that_arrive_cost_few_iterations_and_change_no_state(friction, close, monkeypatch):
-    """At the foot of the ramp an iteration halves their penetration, unless they are settled by themselves.
+    """At the outer edge of the ramp an iteration halves their penetration, unless they are settled by themselves.
 
     (Fewer iterations make other steps, which with friction decide by so much where points slide.)
     """

@@ -64,7 +64,7 @@ def test_a_state_that_no_body_can_have_says_itself_what_to_try():
 
 
 def test_too_few_steps():
-    """The number of steps that it foretells is enough, and nothing is blamed."""
+    """The predicted number of steps is enough, and no other cause is named."""
     error, found = failure(lambda: fx.trace(treloar(), until=fx.pole_stretch(3.0), max_steps=5, progress=False))
     assert len(found.causes) == 1 and "max_steps = 5 were used up at" in found.causes[0]
     more = int(found.causes[0].split("about ")[1].split()[0])

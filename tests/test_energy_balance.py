@@ -8,7 +8,7 @@ from test_contact import cup
 
 import formingx as fx
 from formingx import Stage, tools
-from formingx.results.evaluate import work as ledger
+from formingx.results.evaluate import work as work_module
 
 RUBBER = fx.NeoHookean(c10=0.5)
 RELAXES = fx.Viscoelastic(RUBBER, [(1.0, 0.7), (0.5, 0.05)])
@@ -148,8 +148,8 @@ def test_books_that_are_off_are_said(caplog, monkeypatch):
     path = fx.trace(scene, until=fx.pole_height(2.0), progress=False)
     path.work()
     assert path.findings() == [] and caplog.text == ""
-    whole = ledger.EnergyBalance._load_work
-    monkeypatch.setattr(ledger.EnergyBalance, "_load_work",
+    whole = work_module.EnergyBalance._load_work
+    monkeypatch.setattr(work_module.EnergyBalance, "_load_work",
                         lambda *given: {k: 1.02 * v for k, v in whole(*given).items()})
     for _ in range(2):
         path.work()
@@ -230,7 +230,7 @@ def test_step_control_of_a_process_reaches_its_flows():
 
 
 def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
-    """Its points rest at the foot of the ramp, where there is no stiffness: the tool would move alone."""
+    """Its points rest at the outer edge of the ramp, where there is no stiffness: the tool would move alone."""
     path = fx.trace(sheet(friction="none"), until=fx.travel(0.05), progress=False)
     start = path.states[0]
     with path.problem.state_context(start) as problem:

@@ -57,9 +57,9 @@ def cup(friction="stick", **options):
 
 
 def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
-    """Of 19 looks a state, beside those of iterations, four are for the way of its points and three for its verdict.
+    """Of 19 evaluations a state, beside those of iterations, four follow its points and three check the state.
 
-    (Points foretold one after the other ask for more a state, and for less in all.)
+    (Contact events that are predicted one after the other need more evaluations a state, and fewer in all.)
     """
     calls, nearest = [0], limit.fx.Tool.nearest
 
@@ -99,7 +99,7 @@ def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction)
 
 def test_what_materials_remember_is_computed_four_times_a_step(monkeypatch):
     """Once, in two halves for the error, and half way for the energy dissipated (Simpson's rule): an accepted state
-    takes what was foretold."""
+    takes the predicted values."""
     calls, after = [0], MaterialHistory._after
 
     def counted(self, cells):
@@ -110,8 +110,8 @@ def test_what_materials_remember_is_computed_four_times_a_step(monkeypatch):
     mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.5, elements=(2, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)]),
                      supports=[fx.Symmetry("bottom", "z"), fx.Symmetry("top", "z")], loads=[fx.Pressure("inner")])
-    course = {lambda value: fx.displacement(value, at=(1.0, 0.0), component="r"): [(0, 0), (1, 1)]}
-    path = fx.Process(scene).run([fx.Stage("widen", control=scene.loads[0], amplitudes=course)], progress=False)
+    amplitudes = {lambda value: fx.displacement(value, at=(1.0, 0.0), component="r"): [(0, 0), (1, 1)]}
+    path = fx.Process(scene).run([fx.Stage("widen", control=scene.loads[0], amplitudes=amplitudes)], progress=False)
     assert len(path) > 8 and calls[0] <= 4 * (path.counts.steps + path.counts.failures) + 2
     before, last = path.states[-2:]
     with path.problem.state_context(last) as problem:

@@ -106,7 +106,7 @@ path = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(1
                              accuracy="draft", max_steps=300, progress=False)
 last = path.last.measures
 found = {"steps": path.counts.steps, "last": [last[c] for c in ("pole_height", "plug_force", "strain_energy")],
-         "ledger": float(path.work()["unbalanced"][-1]), "walls": path.profile().wall_ratio.tolist(), "said": []}
+         "balance": float(path.work()["unbalanced"][-1]), "walls": path.profile().wall_ratio.tolist(), "said": []}
 for bad, target in ((block(1.0), 0.95), (foot(), -0.85)):
     try:
         fx.trace(bad, until=fx.travel(target), progress=False)
@@ -125,7 +125,7 @@ def test_ranks_agree_on_a_process_and_on_verdicts():
     assert two["said"] == one["said"] and two["steps"] == one["steps"]
     for key in ("last", "walls"):
         assert two[key] == pytest.approx(one[key], rel=1e-6)
-    assert two["ledger"] == pytest.approx(one["ledger"], abs=1e-6 * abs(one["last"][2]))
+    assert two["balance"] == pytest.approx(one["balance"], abs=1e-6 * abs(one["last"][2]))
 
 
 LAYER = """

@@ -49,11 +49,11 @@ def test_stages_go_on_where_they_were(monkeypatch):
     time stands."""
     from formingx.extensions.remeshing import remeshing
 
-    def worn(record, state, remesh):
+    def needs_remeshing(record, state, remesh):
         travel = state.measures["travel"]
         return (state.kind == "target", travel > 0.4, state.stage == "back" and travel < 0.45, False)[
             state.setting["mesh"]]
-    monkeypatch.setattr(remeshing, "_needs_remeshing", worn)
+    monkeypatch.setattr(remeshing, "_needs_remeshing", needs_remeshing)
     scene = block("none")
     plate = scene.contacts[0]
     stages = [fx.Stage("press", control=plate, until=fx.travel(0.3), duration=0.5),
@@ -186,7 +186,7 @@ def test_what_is_not_carried_is_refused():
 
 
 def test_any_state_goes_on_to_the_same_path(tmp_path):
-    """From before the mesh is made again, from where it is worn, from the first state on the new one, and later."""
+    """From before remeshing, from the state with poor elements, from the first state on the new mesh, and later."""
     scene, remesh = block("stick"), fx.Remesh(size=0.2, corner=0.1, volume_ratio=(0.8, 1.2))
     whole = fx.trace(scene, until=fx.travel(0.5), remesh=remesh, progress=False, checkpoint=tmp_path / "run")
     same(fx.load(tmp_path / "run", scene), whole, rel=0)
@@ -214,9 +214,9 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
         assert after.measures[name] == pytest.approx(before.measures[name], rel=0.01)
     later = path.at(fx.displacement(0.25, at=(0.7, 0.6), component="r"), after=after)
     assert later.measures["u"] == pytest.approx(0.25) and later.setting["mesh"] == 1
-    ledger = path.work()
-    assert ledger["new_meshes"][-1] == pytest.approx(after.measures["strain_energy"] - before.measures["strain_energy"])
-    assert np.abs(ledger["unbalanced"]).max() < 2e-3 * ledger["tool 1"][-1]
+    work = path.work()
+    assert work["new_meshes"][-1] == pytest.approx(after.measures["strain_energy"] - before.measures["strain_energy"])
+    assert np.abs(work["unbalanced"]).max() < 2e-3 * work["tool 1"][-1]
     page = path.report(tmp_path / "report.html").read_text()
     assert "remesh" in page
     path.animate(tmp_path / "film.gif", frames=4)

@@ -352,7 +352,7 @@ def test_a_scene_without_time_compiles_no_derivative_by_it():
 
 
 def test_block_on_springs():
-    """A cylinder in homogeneous compression on an elastic foundation: P(l) = -k s, and a ledger that closes."""
+    """A cylinder in homogeneous compression on an elastic foundation: P(l) = -k s, and the energy balance."""
     height, radius, c10, k, down = 2.0, 1.5, 0.7, 0.9, 0.8
     mesh = fx.mesh.disc(radius=radius, thickness=height, elements=(3, 3))
     springs = Foundation("bottom", k, "springs")
@@ -429,7 +429,7 @@ class Mullins(Material):
 
 @pytest.mark.parametrize("speed", [None, 0.5], ids=["no time", "timed"])
 def test_mullins(speed, monkeypatch):
-    """A cylinder pulled, unloaded and pulled further: the closed form of each branch, and a ledger that closes.
+    """A cylinder pulled, unloaded and pulled further: the closed form of each branch, and the energy balance.
 
     Damage is no imbalance of a step: no step is halved because of it.
     """
