@@ -45,7 +45,7 @@ def _cylinder(cm: str) -> Row:
 
 
 def _disc(case: str, words: str) -> Row:
-    return Row(f"disc in space at pole stretch 3, pressure over the membrane's{words}",
+    return Row(f"disc in three dimensions at pole stretch 3, pressure over that of a membrane of revolution{words}",
                f"disc_in_space/{case}/pressure_over_axisymmetric/3", 1.0, "membrane of revolution", style=".5f")
 
 
@@ -71,7 +71,7 @@ EXACT = [
         "thick_cylinder/sphere/exact_limit_pressure_MPa", "exact", "MPa", ".7f"),
     Row("thick sphere, inner displacement there", "thick_cylinder/sphere/inner_displacement_cm_at_limit",
         "thick_cylinder/sphere/exact_inner_displacement_cm_at_limit", "exact", "cm", ".5f"),
-    Row("thick plate, simply supported, slope at rest over linear theory",
+    Row("thick plate, simply supported, initial slope over linear theory",
         "thick_plate/simply_supported/slope_over_linear_theory", 1.0, "linear plate theory, without shear"),
     Row("plate A, limit pressure", "material_constants/A/limit_pressure_psi",
         "material_constants/A/membrane_limit_pressure_psi", "membrane theory", "psi"),
@@ -87,7 +87,7 @@ EXACT = [
         "rectangular_part/membrane/least_thickness_ratio", "membrane without thickness", style=".3f"),
     _disc("size_0.05", ", triangles of 1/20 of the radius"), _disc("size_0.025", ", 1/40"),
     _disc("extrapolated", ", two sizes extrapolated"),
-    Row("trough in space, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
+    Row("trough in three dimensions, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
         style=".1e", absolute=True),
     Row("relaxing balloon at stretch 2, p R0/H0", "balloon/flow_2.6/p_R0_over_H0_at_stretch/2", _blown_balloon,
         "exact, thin wall", "MPa", ".5f"),
@@ -141,7 +141,7 @@ THESIS = [
         "figures 7.5, 7.6", style=".3g"),
     Row("plug without slip, travel reached", "williams_plug/held/reached_travel_cm", 20.0, "figures 6.1, 6.2", "cm",
         ".3g"),
-    Row("hinged over clamped rim, force at 20 cm",
+    Row("force at 20 cm, hinged over clamped rim",
         "williams_plug/held_hinged/force_N_at_travel_cm/20 OVER williams_plug/held/force_N_at_travel_cm/20", None,
         "figure 6.10: small differences", style=".4f"),
     Row("hoop stretch outside the plug, mean deviation from 1",
