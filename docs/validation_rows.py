@@ -87,8 +87,8 @@ EXACT = [
         "rectangular_part/membrane/least_thickness_ratio", "membrane without thickness", style=".3f"),
     _disc("size_0.05", ", triangles of 1/20 of the radius"), _disc("size_0.025", ", 1/40"),
     _disc("extrapolated", ", two sizes extrapolated"),
-    Row("trough in three dimensions, error of its wall", "tray/trough/size_0.05/wall_error", 0.0, "power law of a membrane",
-        style=".1e", absolute=True),
+    Row("trough in three dimensions, error of its wall", "tray/trough/size_0.05/wall_error", 0.0,
+        "power law of a membrane", style=".1e", absolute=True),
     Row("relaxing balloon at stretch 2, p R0/H0", "balloon/flow_2.6/p_R0_over_H0_at_stretch/2", _blown_balloon,
         "exact, thin wall", "MPa", ".5f"),
     *(Row(f"{what}, largest error over the span", f"{path}", 0.0, reference, style=".1e", absolute=True)
