@@ -118,7 +118,7 @@ def test_status_of_a_body_that_goes_on_while_its_pressure_falls(tmp_path):
     states = checkpoint_data.contents(tmp_path / "run")[1]
     falling = states[-1]["measures"]["pressure"] < max(state["measures"]["pressure"] for state in states)
     assert falling and found.moved[0] in ("enclosed_volume", "pole_height", "strain_energy")
-    assert found.left is None and "the body moves, " in str(found)
+    assert found.remaining_time is None and "the body moves, " in str(found)
 
 
 def test_volumes_that_a_clamped_corner_costs_are_no_warning(caplog):

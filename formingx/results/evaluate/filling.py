@@ -20,11 +20,11 @@ class Corner(NamedTuple):
     """Corner of a tool that the body must fill.
 
     Attributes:
-        at: middle of the corner (r, z), before the tool moves, length.
+        position: middle of the corner (r, z), before the tool moves, length.
         radius: radius of the fillet in the corner, length; 0 for a sharp corner.
     """
 
-    at: tuple[float, float]
+    position: tuple[float, float]
     radius: float
 
 

@@ -23,21 +23,21 @@ class Patches:
         points: q quadrature points (R, Z) of each of the n cells, shape (n, q, 2), length.
         corners: node numbers of the corners of each cell, shape (n, 3).
         layer: number of the layer of each cell, shape (n,).
-        mine: numbers of the m cells whose patches are fitted, shape (m,).
+        fitted: numbers of the m cells whose patches are fitted, shape (m,).
     """
 
-    def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, mine: np.ndarray):
+    def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, fitted: np.ndarray):
         self._points = points
         neighbours: dict[tuple[int, int], list[int]] = {}
         for cell, (three, where) in enumerate(zip(corners, layer, strict=True)):
             for corner in three:
                 neighbours.setdefault((int(where), int(corner)), []).append(cell)
         patches = [sorted({c for corner in corners[cell].tolist() for c in neighbours[int(layer[cell]), corner]})
-                   for cell in mine]
-        self._patch = np.full((len(mine), max(map(len, patches), default=0)), -1)
+                   for cell in fitted]
+        self._patch = np.full((len(fitted), max(map(len, patches), default=0)), -1)
         for row, patch in zip(self._patch, patches, strict=True):
             row[: len(patch)] = patch
-        self._origin = points[mine].mean(1)
+        self._origin = points[fitted].mean(1)
         self._size = np.ones_like(self._origin)
         for chunk in self._chunks():
             distance = np.abs(points[self._patch[chunk]] - self._origin[chunk, None, None])
@@ -46,10 +46,13 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Return the coefficients of the cubics fitted to k fields on the patches of the m cells, shape (m, 10, k).
+        """Fit a cubic in (R, Z) to each of k fields, on the patch around each of the m cells.
 
         Args:
-            values: values of the fields at the quadrature points of all n cells, shape (n, q, k).
+            values: values of the fields at the q quadrature points of each of the n cells of the mesh, shape (n, q, k).
+
+        Returns:
+            The coefficients of the cubics, shape (m, 10, k).
         """
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
         for chunk in self._chunks():

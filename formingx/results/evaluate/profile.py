@@ -75,7 +75,7 @@ class Profile:
 
     @property
     def wall_thickness(self) -> np.ndarray:
-        """Shortest distance from the deformed points of the bottom face to the top face, shape (n,), length."""
+        """Shortest deformed distance from each of the n bottom points to the top face, shape (n,), length."""
         return distance_to_line(self.bottom, fine(self.top))
 
     @property

@@ -410,7 +410,11 @@ class Stresses:
 
 
 def _cauchy(values: np.ndarray) -> np.ndarray:
-    """Return the Cauchy stress, shape (m, q, 3, 3), stress, from the entries of F and S, shape (m, q, _COUNT)."""
+    """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
+
+    Args:
+        values: entries of F (`BLOCK`), then of S (`_S`), shape (m, q, _COUNT).
+    """
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 

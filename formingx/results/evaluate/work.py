@@ -134,7 +134,7 @@ class EnergyBalance:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """Return True if the process time passes, independent of the control, in the step from state a to state b."""
+        """Return True if process time passes in the step from a to b, but not in proportion to the control."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _step_energies(self, a: Any, b: Any) -> dict[str, float]:
@@ -201,7 +201,7 @@ class EnergyBalance:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return {entry: reaction} of driven supports and tools in a state; each state is evaluated once."""
+        """Return {entry: reaction} of driven supports and tools in a state; it is computed once for each state."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]

@@ -30,14 +30,14 @@ class Status:
         stage: name of the present stage, or "".
         verdict: reason why the last state is inadmissible, or "" (`State.verdict`).
         target: target of the stage: (column, its value at the target, its present value); None if no column holds it.
-        spent: computing time so far, s.
-        left: computing time to the end of the stage, estimated from the last steps, s; 0 if the target is met. None if
-            the last steps came no nearer to the target.
+        computing_time: computing time so far, s.
+        remaining_time: computing time to the end of the stage, estimated from the last steps, s; 0 if the target is
+            met. None if the last steps came no nearer to the target.
         limits: {reason for a shorter or failed step: count}, over the whole run.
         age: time since the last state was written, s.
         ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or was
             killed.
-        begun: True if the stage has only one completed step.
+        just_begun: True if the stage has only one completed step.
         moved: (column, value before, value after) of the column that changed most over the last steps, or None. It
             shows progress while the target does not come nearer, such as the pole height after a pressure maximum.
     """
@@ -46,12 +46,12 @@ class Status:
     stage: str
     verdict: str
     target: tuple[str, float, float] | None
-    spent: float
-    left: float | None
+    computing_time: float
+    remaining_time: float | None
     limits: dict[str, int]
     age: float
     ended: dict[str, Any] | None
-    begun: bool = False
+    just_begun: bool = False
     moved: tuple[str, float, float] | None = None
 
     @property
@@ -66,25 +66,25 @@ class Status:
         if self.target:
             name, goal, now = self.target
             lines[0] += f": {name.replace('_', ' ')} {now:.6g} of {goal:.6g}"
-        spent = f"{self.spent:.0f} s" if self.spent >= 10 else f"{self.spent:.2g} s"
-        remaining = self._without_pace() if self.left is None else \
-            "the target is met" if self.left == 0 else f"about {self.left:.2g} s to the end of the stage"
+        spent = f"{self.computing_time:.0f} s" if self.computing_time >= 10 else f"{self.computing_time:.2g} s"
+        remaining = self._unknown_time() if self.remaining_time is None else "the target is met" \
+            if self.remaining_time == 0 else f"about {self.remaining_time:.2g} s to the end of the stage"
         frequent = sorted(self.limits.items(), key=lambda limit: -limit[1])[:3]
         limits = ", ".join(f"{reason} ({n} times)" for reason, n in frequent)
         if self.ended is None:
             remaining += f"; the last state is {_words(self.age)} old"
-        elif self.left != 0:
+        elif self.remaining_time != 0:
             remaining = "the run could not go on" if self.ended["failure"] else "the run ended before its target"
         lines += [f"after {spent}: {remaining}", f"steps limited by: {limits or 'their own control only'}"]
         if self.ended is not None and self.ended["failure"]:
             lines.append(self.ended["failure"])
         return "\n".join([*lines, *(map(str, self.findings) if self.findings else ["findings: none"])])
 
-    def _without_pace(self) -> str:
+    def _unknown_time(self) -> str:
         """Return the reason why the remaining time is unknown, as text."""
         if self.target is None:
             return "the remaining time is not known, as no column holds the target of the stage"
-        if self.begun:
+        if self.just_begun:
             return "the stage has just begun"
         if self.moved is None:
             return "the last steps came no nearer to the target"
