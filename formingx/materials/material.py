@@ -41,8 +41,8 @@ class Material(Energies):
 
     Attributes:
         parameters: {name: constant}, each a number or one of the varying constants in `formingx.materials.constants`.
-        internal: {name: value in the reference configuration} of the internal variables at a quadrature point, each a
-            number or nested tuples of the shape of the variable. Empty: no history.
+        internal: internal variables at a quadrature point, {name: value in the reference configuration}. A value is a
+            number, or nested tuples of the shape of the variable. Empty: no history.
         of_motion: names of internal variables that describe the motion in the last step and predict the rate in the
             next. With their values in the reference configuration they predict no motion.
         shapes: {name: 1 or -1} of internal variables that are positive definite tensors, like C or its inverse, with
@@ -160,8 +160,8 @@ class Material(Energies):
                   l_1 l_2 l_3 = 1
 
         Args:
-            mode: "uniaxial" for the stretches (l, l^-1/2, l^-1/2), "pure_shear" for (l, 1, 1/l), also called planar
-                tension, "equibiaxial" for (l, l, l^-2), or "biaxial" for any (l1, l2).
+            mode: "uniaxial" for the stretches (l, l^-1/2, l^-1/2), "pure_shear" (planar tension) for (l, 1, 1/l),
+                "equibiaxial" for (l, l, l^-2). "biaxial" is for any (l1, l2).
             stretches: stretches l in the loaded direction, any shape, each positive; for "biaxial" stretches (l1, l2),
                 shape (2, ...).
             true: True for the true stress P l, force over current area.

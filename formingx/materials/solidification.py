@@ -91,9 +91,9 @@ class Solidification(Material):
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
         """Internal variables, {name: value in the reference configuration}.
 
-        They are the variables of the base material, C of the last two states, A, and the fraction phi that A includes,
-        with the symbols of `Solidification`. A includes the material that solidifies in a step only from the beginning
-        of the next step, when the temperature at the end of the step is known.
+        They are the variables of the base material, and, with the symbols of `Solidification`, C of the last two
+        states, A, and the fraction phi that A includes. Material that solidifies in a step is included from the
+        beginning of the next step, when the temperature at the end of the step is known.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
@@ -122,8 +122,8 @@ class Solidification(Material):
 
         .. math:: W = W_{base}(F) + \frac{G \varphi}{2} (\mathrm{tr} \, C - 3)
 
-        The first term is the energy of the base material, G the modulus and phi the fraction of the solidified
-        material, and C the isochoric right Cauchy-Green tensor.
+        The first term is the energy of the base material. G is the modulus and phi the fraction of the solidified
+        material. C is the isochoric right Cauchy-Green tensor.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).

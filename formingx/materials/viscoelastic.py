@@ -18,8 +18,8 @@ class Viscoelastic(RelaxingMaterial):
         W = W_{eq}(C) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(C C_{v,k}^{-1}) - 3\right], \qquad
         \frac{dC_{v,k}}{dt} = \frac{1}{\tau_k} \left[C - \tfrac{1}{3} \mathrm{tr}(C C_{v,k}^{-1}) C_{v,k}\right].
 
-    Branch k has the shear modulus mu_k, the relaxation time tau_k and the internal variable Cv_k, with det Cv_k = 1,
-    and Cv_k = I in the reference configuration. C is the isochoric right Cauchy-Green tensor, W_eq the equilibrium
+    Branch k has the shear modulus mu_k, the relaxation time tau_k and the internal variable Cv_k. Its determinant is 1,
+    and it equals I in the reference configuration. C is the isochoric right Cauchy-Green tensor, W_eq the equilibrium
     energy. The law is known from Leonov (1976), Simo and Miehe (1992), Le Tallec, Rahier and Kaiss (1993), Reese and
     Govindjee (1998), Kumar and Lopez-Pamies (2016). With the equilibrium modulus mu_eq the small-strain relaxation
     modulus is
@@ -29,15 +29,15 @@ class Viscoelastic(RelaxingMaterial):
     In steady extension the stress of a branch is proportional to the rate, with the viscosity 3 mu tau.
 
     A step of the implicit Euler method has a closed form (Shutov, Landgraf and Ihlemann 2013). Let Cv_n be the internal
-    variable at the beginning of the step, G = Cv_n, x' = dt/tau, a = det G and b = det(G + x' C). The internal variable
-    at the end of the step, and the potential of the step, which is regular at dt = 0, are
+    variable at the beginning of the step, and G = Cv_n, x' = dt/tau. With a = det G and b = det(G + x' C), the internal
+    variable at the end of the step and the potential of the step are
 
     .. math::
         C_v = \frac{G + x' C}{b^{1/3}}, \qquad
         \frac{3 \mu}{2} \, \frac{\mathrm{cof}\, G : C + x' \, \mathrm{cof}\, C : G + x'^2 \det C}
         {b^{2/3} + (a b)^{1/3} + a^{2/3}}.
 
-    The step is of second order in time with
+    The potential is regular at dt = 0. The step is of second order in time with
 
     .. math::
         G = C_{v,n} + \frac{x}{2} C_n, \qquad
@@ -103,8 +103,8 @@ class TransientNetwork(RelaxingMaterial):
 
     .. math:: \tau_K = \mu F A F^T, \qquad \frac{dA}{dt} = \frac{C^{-1} - A}{\tau},
 
-    with the internal variable A, equal to I in the reference configuration, the isochoric right Cauchy-Green tensor C,
-    the shear modulus mu and the relaxation time tau. The law is linear in C^-1: in steady extension faster than
+    with the internal variable A, which equals I in the reference configuration. C is the isochoric right Cauchy-Green
+    tensor, mu the shear modulus and tau the relaxation time. The law is linear in C^-1: in steady extension faster than
     1/(2 tau) the stress grows without bound. The stored energy is
 
     .. math:: \frac{\mu}{2} \left[\mathrm{tr}(C A) - 3 - \ln \det A\right].

@@ -366,8 +366,8 @@ def swept_volume(problem: Any) -> Any:
 
     .. math:: V = -\int_0^1 \int_{\Gamma} u \cdot a(t u) \, dS \, dt
 
-    The area vector a of the face at the displacement t u is of degree 2 in t for an axisymmetric body, so the two-point
-    Gauss rule in t is exact.
+    a(t u) is the area vector of the face at the displacement t u. For an axisymmetric body it is of degree 2 in t, so
+    the two-point Gauss rule in t is exact.
 
     Args:
         problem: the `Problem`.

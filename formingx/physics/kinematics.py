@@ -279,8 +279,8 @@ class ThreeD(Kinematics):
     def rigid_motions(self):
         """Return the rigid motions in the plane of the sheet, and its translation normal to the plane.
 
-        Rotations out of the plane are not among them: a support may leave a flat sheet free to turn about a straight
-        rim, because the tension of the inflated sheet resists.
+        Rotations out of the plane are not among them: the tension of an inflated sheet resists them, so a support may
+        leave a flat sheet free to turn about a straight rim.
 
         Returns:
             {name: function from points, shape (n, 3), to displacements, shape (n, 3)}.

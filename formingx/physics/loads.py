@@ -50,8 +50,8 @@ class Load(Part):
         """Return the change of the virtual work of the load by a non-axisymmetric mode, for the stability analysis.
 
         Args:
-            body: as in `virtual_work`, with the amplitudes (u_r, u_z, u_hoop) of a mode and of its variation, `mode`
-                and `dmode` (UFL, shape (3,), length), and the change `H` of F by the mode (UFL, shape (3, 3)).
+            body: as in `virtual_work`. Besides it has the amplitudes (u_r, u_z, u_hoop) of a mode, `mode`, and of its
+                variation, `dmode` (UFL, shape (3,), length). `H` is the change of F by the mode (UFL, shape (3, 3)).
             value: value of the load (UFL scalar, user's units).
 
         Returns:

@@ -165,7 +165,7 @@ class MixedPressure(Model):
 
     .. math:: W(F) - \sigma_0 \ln J + p (J - 1) - \frac{\epsilon p^2}{16 \mu}
 
-    W is the strain energy of the material, mu its shear modulus, p the pressure (positive in tension) and J the
+    W is the strain energy of the material, mu its shear modulus, and p the pressure, positive in tension. J is the
     determinant of the deformation gradient F. The stress :math:`\sigma_0` makes the reference configuration free of
     stress, see `formingx.materials.material`. The pressure may jump across the interface of two materials.
 

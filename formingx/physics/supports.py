@@ -170,8 +170,8 @@ class SimplySupported(Support):
     Args:
         on: name of the boundary.
         weight: weight w of the mean. "area": w = 1, every layer carries the same traction. "stiffness": w is the shear
-            modulus of the layer, and tractions are proportional to it; for soft layers that cannot carry the traction
-            of the others.
+            modulus of the layer, and tractions are proportional to it. Soft layers may need this if they cannot carry
+            the traction of the others.
 
     >>> scene.supports
     [Symmetry('axis', 'r'), SimplySupported('rim')]

@@ -61,8 +61,8 @@ class Scene:
         preformed: deformation transferred from another mesh; only remeshing (`trace(remesh=)`) sets it.
 
     Attributes:
-        mesh: mesh of the body. If the argument `accuracy` of `formingx.mesh.disc` chose the elements of the given mesh,
-            and the scene has tools, it is a mesh with elements chosen for these tools.
+        mesh: mesh of the body. For a scene with tools its elements may differ from the given mesh: they are chosen for
+            the tools, unless `elements` was given to `formingx.mesh.disc`.
         materials: {layer name: material}.
         supports: list of supports.
         loads: list of loads.
@@ -78,9 +78,9 @@ class Scene:
         preformed: deformation transferred from another mesh, or None.
 
     Raises:
-        InputError: a boundary or a layer is unknown or empty, a layer has no material, the supports are too few,
-            elements overlap or are inverted, or the mesh reaches R < 0. Also if two controlled items have the same name
-            or no names, and if an argument is not allowed.
+        InputError: a boundary or a layer is unknown or empty, a layer has no material, or the supports are too few.
+            Elements overlap or are inverted, or the mesh reaches R < 0. Two controlled items have the same name or no
+            names. An argument is not allowed.
 
     >>> print(scene)
     mesh               16 six-node triangles, 10 by 0.3 (R, Z); layers: sheet; boundaries: axis, rim, bottom, top
