@@ -76,8 +76,7 @@ class HeatVectors:
         """Compile the form of a heat source, to be assembled by `assembled`.
 
         Args:
-            make: function of a UFL test function v that returns the integral (UFL) of heat per time and volume, times
-                v.
+            make: function of a UFL test function v that returns the integral (UFL) of v times heat per time and volume.
 
         Returns:
             The compiled form.

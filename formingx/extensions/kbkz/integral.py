@@ -211,7 +211,7 @@ def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
 
 
 def _mean_decay(x: np.ndarray) -> np.ndarray:
-    """Return (1 - e^-x)/x, the mean of e^-x over a step."""
+    """Return (1 - e^-x)/x, the mean of e^-t for t from 0 to x."""
     return np.where(x < 1e-12, 1.0, -np.expm1(-x) / np.where(x < 1e-12, 1.0, x))
 
 

@@ -196,7 +196,16 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
 
 
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
-    """Remesh the last body of a path, and add the first state on the new mesh with the earlier step length."""
+    """Remesh the last body of a path, and add the first state on the new mesh with the earlier step length.
+
+    Args:
+        path: the path, extended in place.
+        remesh: criterion and sizes.
+        tolerances: tolerances of the state.
+
+    Raises:
+        ConvergenceError: no new mesh has an equilibrium.
+    """
     record, last = path.record, path.last
     stepping = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
     step = stepping["step"]
@@ -219,9 +228,14 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 
 
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
-    """Return the segment on a new mesh of the last body, and the first state on it.
+    """Return the segment on a new mesh of the last body of a path, and the first state on it.
 
     Several sizes near the requested one are tried. The first mesh with good J is taken, or else the best of all.
+
+    Args:
+        path: the path.
+        remesh: criterion and sizes.
+        tolerances: tolerances of the state.
 
     Raises:
         ConvergenceError: no mesh has an equilibrium.
@@ -254,7 +268,13 @@ def _ratios(record: Record, state: State) -> tuple[float, float]:
 
 
 def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
-    """End the run if J leaves its range in a new state; store jumps of force and energy in a state of kind "remesh"."""
+    """End the run if J leaves its range in a new state; store jumps of force and energy in a state of kind "remesh".
+
+    Args:
+        record: record of the run.
+        state: its new state.
+        remesh: criterion and sizes.
+    """
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
         force = next((name for name in before if name.endswith("force")), None)

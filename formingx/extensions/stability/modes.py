@@ -313,7 +313,7 @@ class Modes:
         return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
 
     def _normal(self, x: Array) -> Array:
-        """Return a mode x over the root of its scalar product x M x."""
+        """Return a mode x scaled to x M x = 1 with the lumped mass M."""
         return x / np.sqrt(self._inner(x, x))
 
     def _clean(self, x: Array, others: list[Array]) -> Array:

@@ -214,7 +214,7 @@ class SecondVariation:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
     def _sum(self, values: np.ndarray) -> float:
-        """Return the sum of the entries of an array over all ranks."""
+        """Return the sum of the entries of an array on all ranks."""
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
@@ -409,9 +409,10 @@ class SecondVariation:
         return self._unknowns[guided], values
 
     def _unknowns_of(self, mode: Any) -> np.ndarray:
-        """Return a rigid motion as a mode, locally owned entries.
+        """Return a rigid motion as a mode, locally owned entries, shape (n,).
 
-        mode: function from deformed positions, shape (k, 2), length, to amplitudes (U, W, V), shape (k, 3).
+        mode: function from deformed positions, shape (k, 2), length, to radial, axial and hoop amplitudes, shape (k,
+        3).
         """
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]
