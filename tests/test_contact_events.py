@@ -180,8 +180,9 @@ def test_iterations_that_go_to_and_fro_are_mixed():
     starts = [fixed + offset for offset in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
     tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
     found = ContactEventSequence._mixed(SimpleNamespace(_comm=MPI.COMM_SELF), tried)
-    np.testing.assert_allclose(found.at[0][0], fixed, atol=1e-9)
-    np.testing.assert_allclose([found.begins, *found.off[0], found.off[1]], [*fixed[:1], *fixed, fixed[1]], atol=1e-9)
+    np.testing.assert_allclose(found.positions[0][0], fixed, atol=1e-9)
+    np.testing.assert_allclose(found.correction[0], fixed, atol=1e-9)
+    np.testing.assert_allclose([found.begins, found.correction[1]], fixed, atol=1e-9)
 
 
 def test_forces_of_sticking_sliding_and_open_points_together():
@@ -195,7 +196,7 @@ def test_forces_of_sticking_sliding_and_open_points_together():
                      np.zeros(5), random.uniform(-1, 1, 5))
     status = np.array([ContactStatus.STICKS, ContactStatus.STICKS, -1, 1, ContactStatus.FREE])
     u, to, force = random.uniform(-1, 1, (5, 2)), random.uniform(-1, 1, (5, 2)), near.normal * 2.0
-    F, change = points.held(u, status, near, force, to)
+    F, change = points.forces_at_end(u, status, near, force, to)
     dx = u - (points._C @ change.ravel()).reshape(5, 2)
     N, T = points.parts(F, near)
     assert change == pytest.approx(F - force) and F[4] == pytest.approx(0.0, abs=1e-12)

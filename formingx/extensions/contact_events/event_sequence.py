@@ -37,7 +37,7 @@ class EventSettings:
         taken_over: maximum number of sliding points at the start of the step that get contact forces of their own.
         same_place: convergence tolerance of a sticking point: its motion over its tributary length.
         about_there: the same tolerance for a point that may slide.
-        soon: fraction of the step within which two closures are simultaneous.
+        simultaneous: fraction of the step within which two closures count as simultaneous.
         earlier: maximum number of times that an earlier closure replaces the one being located.
         late: largest change of an event's arc length in an iteration, relative to that arc length.
         work: maximum number of equilibrium iterations and status changes in a step; then the step takes one closure.
@@ -50,7 +50,7 @@ class EventSettings:
     taken_over: int = 80
     same_place: float = 1e-3
     about_there: float = 1e-2
-    soon: float = 0.02
+    simultaneous: float = 0.02
     earlier: int = 3
     late: float = 1.0
     work: int = 200
@@ -81,7 +81,7 @@ class GapClosure(NamedTuple):
     sticks: bool
 
     @property
-    def who(self) -> tuple[int, int, int]:
+    def point_id(self) -> tuple[int, int, int]:
         """Identifier of the point, (rank, face, point)."""
         return self.rank, self.face, self.point
 
@@ -91,7 +91,7 @@ class _Segment(NamedTuple):
 
     Attributes:
         begins: arc length at the start of the segment.
-        at: positions of all points relative to the tools at this start, for each face.
+        positions: positions of all points relative to the tools at this start, for each face.
         speed: their derivatives by arc length.
         status: contact statuses, shape (m,).
         place: sticking positions, shape (m, 2), length.
@@ -99,11 +99,11 @@ class _Segment(NamedTuple):
         rate: their derivatives by arc length, shape (m, 2).
         extra: part of the force outside the factorised tangent, shape (m, 2).
         growth: its derivative by arc length, shape (m, 2).
-        off: correction of (x, control) from equilibrium iterations.
+        correction: correction of (x, control) from equilibrium iterations.
     """
 
     begins: float
-    at: list[np.ndarray]
+    positions: list[np.ndarray]
     speed: list[np.ndarray]
     status: np.ndarray
     place: np.ndarray
@@ -111,12 +111,12 @@ class _Segment(NamedTuple):
     rate: np.ndarray
     extra: np.ndarray
     growth: np.ndarray
-    off: tuple[np.ndarray, float]
+    correction: tuple[np.ndarray, float]
 
     def after(self, time: float) -> _Segment:
         """Return the segment with its start moved along the segment to an arc length `time`."""
         ds = time - self.begins
-        return self._replace(begins=time, at=[x + ds * w for x, w in zip(self.at, self.speed)],
+        return self._replace(begins=time, positions=[x + ds * w for x, w in zip(self.positions, self.speed)],
                              force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
 
     def of(self, m: int) -> _Segment:
@@ -150,10 +150,10 @@ class ContactEventSequence:
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
                  response: Response, batch: int):
         self._faces, self._response, self._comm, self._batch = faces, response, faces[0].comm, batch
-        self._n, self._way = n, (x, control, direction, slope)
+        self._n, self._tangent = n, (x, control, direction, slope)
         start = [face.positions(x[:n], control) for face in faces]
         self._along = [face.moved(direction[:n], slope) for face in faces]
-        self._free = [~face.law.touching(at, face.history) & (face.rule.area > 0) for face, at in zip(faces, start)]
+        self._free = [~face.law.touching(x, face.history) & (face.rule.area > 0) for face, x in zip(faces, start)]
         self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
         self._closures: list[GapClosure] = []
@@ -202,45 +202,45 @@ class ContactEventSequence:
             lengths, relative to the tool. Mask of the points that carry a predicted contact force at the end.
         """
         piece = self._piece(length)
-        times, at = [np.full(len(x), length) for x in piece.at], piece.after(length).at
+        times, positions = [np.full(len(x), length) for x in piece.positions], piece.after(length).positions
         for closure in self._closures:
             if closure.time < length and closure.rank == self._comm.rank:
                 times[closure.face][closure.point] = closure.time
-                at[closure.face][closure.point] = closure.place
-        sure = [np.zeros(len(x), dtype=bool) for x in at]
-        self._points.spread(piece.of(len(self._points.who)).status != ContactStatus.FREE, sure)
-        return times, at, sure
+                positions[closure.face][closure.point] = closure.place
+        sure = [np.zeros(len(x), dtype=bool) for x in positions]
+        self._points.spread(piece.of(len(self._points.point_ids)).status != ContactStatus.FREE, sure)
+        return times, positions, sure
 
     def positions(self, length: float) -> list[np.ndarray]:
         """Return the positions of locally owned points of each face at an arc length, relative to the tool."""
-        return self._piece(length).after(length).at
+        return self._piece(length).after(length).positions
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
         """Return the change of (x, control) from the tangent to the predicted path at an arc length; None: zero."""
-        piece, m = self._piece(length), len(self._points.who)
+        piece, m = self._piece(length), len(self._points.point_ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
         piece = piece.of(m).after(length)
         if not len(piece.status):
             return None
         for _ in range(_SETTINGS.to_tools):
-            piece = self._held(piece)
+            piece = self._projected(piece)
         if not np.isfinite(piece.extra).all():
             return None
-        return (piece.off[0] - self._points.columns @ piece.extra.ravel(),
-                piece.off[1] - float(self._points.steps @ piece.extra.ravel()))
+        return (piece.correction[0] - self._points.columns @ piece.extra.ravel(),
+                piece.correction[1] - float(self._points.steps @ piece.extra.ravel()))
 
-    def _held(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
+    def _projected(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
         """Return a segment whose closed points are projected onto their tools or sticking positions at its start.
 
         Curved tools need a few iterations. `moved` is a first motion of the points of each face, (n, 2), length.
         """
-        points, near = self._points, self._points.near(piece.at, piece.force)
-        u = points.at(moved) if moved else np.zeros_like(piece.force)
-        force, more = points.held(u, piece.status, near, piece.force,
-                                  points.back(piece.at, piece.place, near))
-        at = [x - points.moved_by(more, f) for f, x in enumerate(piece.at)]
-        return piece._replace(at=[x + m for x, m in zip(at, moved)] if moved else at, force=force,
+        points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
+        u = points.values_at(moved) if moved else np.zeros_like(piece.force)
+        targets = points.motion_to_targets(piece.positions, piece.place, near)
+        force, more = points.forces_at_end(u, piece.status, near, piece.force, targets)
+        positions = [x - points.motion_under(more, f) for f, x in enumerate(piece.positions)]
+        return piece._replace(positions=[x + m for x, m in zip(positions, moved)] if moved else positions, force=force,
                               extra=piece.extra + more)
 
     def _piece(self, length: float) -> _Segment:
@@ -249,7 +249,7 @@ class ContactEventSequence:
 
     def _take_over(self) -> bool:
         """Give sliding points of the accepted state contact forces of their own; return False if this fails."""
-        x, control = self._way[:2]
+        x, control = self._tangent[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
         number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
@@ -258,13 +258,13 @@ class ContactEventSequence:
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
         found = [face.tractions(x[: self._n], control) for face in self._faces]
-        force = self._points.at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
-        status = self._points.at([t.sense for t in found]).astype(int)
+        force = self._points.values_at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
+        status = self._points.values_at([t.sense for t in found]).astype(int)
         status[self._points.friction == 0] = ContactStatus.SLIDES
-        slip = self._points.at([np.zeros(len(face.points)) if face.history is None else face.history.slip
-                                for face in self._faces])
-        piece = self._pieces[0].of(len(status))
-        place = self._points.at(piece.at) - slip[:, None] * self._points.near(piece.at, force).tangent
+        slip = self._points.values_at([np.zeros(len(face.points)) if face.history is None else face.history.slip
+                                       for face in self._faces])
+        piece, points = self._pieces[0].of(len(status)), self._points
+        place = points.values_at(piece.positions) - slip[:, None] * points.tool_frame(piece.positions, force).tangent
         if not self._turn(piece._replace(status=status, force=force, place=place), status):
             return False
         del self._pieces[0]
@@ -272,18 +272,18 @@ class ContactEventSequence:
 
     def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
         """Append a segment with new statuses, shape (m,), at the start of `piece`; return False if this fails."""
-        points, near = self._points, self._points.near(piece.at, piece.force)
+        points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         self._work += 1
-        found = points.rates(points.at(self._along), status, near, piece.force)
+        found = points.rates(points.values_at(self._along), status, near, piece.force)
         if found is None:
             return False
         rate, growth, status = found
         stuck = (status == ContactStatus.STICKS) & (np.abs(piece.status) == 1)
         slip = (piece.status * points.elastic_slip)[:, None] * near.tangent
         piece = piece._replace(
-            place=np.where(stuck[:, None], self._points.at(piece.at) - slip, piece.place), status=status, rate=rate,
-            growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
-            speed=[w - points.moved_by(growth, f) for f, w in enumerate(self._along)])
+            place=np.where(stuck[:, None], points.values_at(piece.positions) - slip, piece.place), status=status,
+            rate=rate, growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
+            speed=[w - points.motion_under(growth, f) for f, w in enumerate(self._along)])
         points.spread(status == ContactStatus.FREE, self._free)
         self._pieces.append(piece)
         return True
@@ -291,12 +291,12 @@ class ContactEventSequence:
     def _hold(self, length: float) -> bool:
         """Append the segment after the last closure, with a contact force at its point; return False if that fails."""
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
-        if end is None or closure.who not in self._points.who and not self._learn(length):
+        if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
             return False
         self._taken += 1
-        end, k = end.of(len(self._points.who)), self._points.who.index(closure.who)
+        end, k = end.of(len(self._points.point_ids)), self._points.point_ids.index(closure.point_id)
         status, place = end.status.copy(), end.place.copy()
-        slips = self._points.at(last.speed)[k] @ self._points.near(end.at, end.force).tangent[k]
+        slips = self._points.values_at(last.speed)[k] @ self._points.tool_frame(end.positions, end.force).tangent[k]
         status[k] = ContactStatus.STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
         place[k] = closure.place
         return self._turn(end._replace(status=status, place=place), status)
@@ -308,10 +308,10 @@ class ContactEventSequence:
             if last.begins >= length or self.exhausted:
                 return False
             times = [gap_closures(face.law, x, w, free, length - last.begins)
-                     for face, x, w, free in zip(self._faces, last.at, last.speed, self._free)]
+                     for face, x, w, free in zip(self._faces, last.positions, last.speed, self._free)]
             first = min(self._comm.allgather(min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
-            after, status = self._points.change(last.status, self._points.near(last.at, last.force), last.force,
-                                                last.rate)
+            frame = self._points.tool_frame(last.positions, last.force)
+            after, status = self._points.change(last.status, frame, last.force, last.rate)
             if not after < min(first, length - last.begins):
                 break
             if not self._turn(last.after(last.begins + after), status):
@@ -322,21 +322,21 @@ class ContactEventSequence:
         self._end = self._moved(length, last)
         return self._end is not None and self._first(self._back(self._end, last), length, last)
 
-    def _first(self, times: list[np.ndarray], length: float, at: _Segment) -> bool:
+    def _first(self, times: list[np.ndarray], length: float, segment: _Segment) -> bool:
         """Store the earliest of the closures at arc lengths `times` before `length`; return False without one."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
         if not time < length:
             return False
-        self._closures.append(self._meets(rank, f, i, time, at.after(time).at))
+        self._closures.append(self._meets(rank, f, i, time, segment.after(time).positions))
         return True
 
-    def _meets(self, rank: int, f: int, i: int, time: float, at: list[np.ndarray]) -> GapClosure:
-        """Return the gap closure of point i of face f near an arc length, from the positions `at` of the points."""
+    def _meets(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
+        """Return the gap closure of point i of face f near an arc length, where the points have these positions."""
         closure = None
         if rank == self._comm.rank:
-            face, x, w = self._faces[f], at[f][[i]], self._pieces[-1].speed[f][[i]]
+            face, x, w = self._faces[f], positions[f][[i]], self._pieces[-1].speed[f][[i]]
             law, ds = face.law.part([i]), 0.0
             for _ in range(_SETTINGS.to_surface):
                 near = law.nearest(x + ds * w)
@@ -352,7 +352,7 @@ class ContactEventSequence:
         """Equilibrate the path at the last closure and locate the closure again; return False without convergence."""
         last, closure = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(closure.time)
-        if closure.time - last.begins < _SETTINGS.soon * length:
+        if closure.time - last.begins < _SETTINGS.simultaneous * length:
             return True
         tried: list[tuple[_Segment, _Segment]] = []
         for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
@@ -361,13 +361,13 @@ class ContactEventSequence:
             closure, moved = self._closures[-1], self._moved(closure.time, end)
             if moved is None:
                 return False
-            found = self._meets(*closure.who, closure.time, moved.at)
+            found = self._meets(*closure.point_id, closure.time, moved.positions)
             tried.append((end, moved.after(found.time)))
             mixed = self._mixed(tried)
             if mixed is None:
                 return False
             end = mixed
-            found = self._meets(*closure.who, end.begins, end.at)
+            found = self._meets(*closure.point_id, end.begins, end.positions)
             if not (found.time > last.begins and abs(found.time - closure.time) < _SETTINGS.late * closure.time):
                 return False
             self._closures[-1], self._end = found, (end := end.after(found.time))
@@ -386,7 +386,7 @@ class ContactEventSequence:
         For other points, and for the point of the closure `but`, it is the end of the segment.
         """
         times = [np.full(len(free), end.begins) for free in self._free]
-        for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.at, last.speed, self._free)):
+        for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.positions, last.speed, self._free)):
             near = face.law.nearest(x)
             inside, rate = free & (near.distance > -face.law.theta), np.einsum("ni,ni->n", near.normal, w)
             if but and (but.rank, but.face) == (self._comm.rank, f):
@@ -401,7 +401,8 @@ class ContactEventSequence:
 
         The stored LU factors make iterates without acceleration oscillate.
         """
-        changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.at, y.at)]) for x, y in tried])
+        changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.positions, y.positions)])
+                            for x, y in tried])
         gram = self._comm.allreduce(changes @ changes.T)
         if not gram.trace() < FAR:
             return None
@@ -413,36 +414,35 @@ class ContactEventSequence:
         def mean(values: list) -> Any:
             return sum(w * v for w, v in zip(weights, values))
         return after[-1]._replace(
-            begins=float(mean([p.begins for p in after])), at=[mean(list(at)) for at in zip(*(p.at for p in after))],
-            force=mean([p.force for p in after]), extra=mean([p.extra for p in after]),
-            off=(mean([p.off[0] for p in after]), float(mean([p.off[1] for p in after]))))
+            begins=float(mean([p.begins for p in after])), force=mean([p.force for p in after]),
+            positions=[mean(list(x)) for x in zip(*(p.positions for p in after))], extra=mean([p.extra for p in after]),
+            correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
     def _moved(self, time: float, piece: _Segment) -> _Segment | None:
         """Return a segment corrected by one equilibrium iteration at an arc length; None without valid LU factors."""
-        piece, points = piece.of(len(self._points.who)).after(time), self._points
-        x, control, direction, slope = self._way
+        piece, points = piece.of(len(self._points.point_ids)).after(time), self._points
+        x, control, direction, slope = self._tangent
         self._work += 1
-        # open points carry no force
-        forces = [np.where(free[:, None], 0.0, np.full(at.shape, np.nan)) for free, at in zip(self._free, piece.at)]
+        forces = [np.where(free[:, None], 0.0, np.full_like(x, np.nan)) for free, x in zip(self._free, piece.positions)]
         points.spread(piece.force, forces)
         change = self._response.to_equilibrium(
-            x + time * direction + piece.off[0] - points.columns @ piece.extra.ravel(),
-            control + time * slope + piece.off[1] - float(points.steps @ piece.extra.ravel()), forces)
+            x + time * direction + piece.correction[0] - points.columns @ piece.extra.ravel(),
+            control + time * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()), forces)
         if change is None:
             return None
         moved = [face.moved(change[0][: self._n], change[1]) for face in self._faces]
-        piece = self._held(piece, moved)
+        piece = self._projected(piece, moved)
         if not np.isfinite(piece.extra).all():
             return None
-        return piece._replace(off=(piece.off[0] + change[0], piece.off[1] + change[1]))
+        return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
         """Solve for the compliance of the last and of the expected next closures; return False without LU factors."""
         last, closure, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):
-            times = gap_closures(face.law, last.at[f], last.speed[f], self._free[f], left)
-            times[[i for rank, g, i in self._points.who if (rank, g) == (self._comm.rank, f)]] = left
+            times = gap_closures(face.law, last.positions[f], last.speed[f], self._free[f], left)
+            times[[i for rank, g, i in self._points.point_ids if (rank, g) == (self._comm.rank, f)]] = left
             if (closure.rank, closure.face) == (self._comm.rank, f):
                 times[closure.point] = -1.0
             first = np.argsort(times, kind="stable")[: self._batch]

@@ -37,14 +37,14 @@ class StatusSearch:
         all_at_once: number of trials in which all violating statuses change; later only one changes at a time.
         tries: maximum number of status sets that are tried.
         none: fraction of the largest rate of force or motion below which a rate is negligible.
-        soon: arc length over which rates of forces are compared with forces.
+        comparison_length: arc length over which rates of forces are compared with forces.
         limit: relative distance from the Coulomb cone, or from zero pressure, below which a force counts as on it.
     """
 
     all_at_once: int = 6
     tries: int = 60
     none: float = 1e-9
-    soon: float = 1e-4
+    comparison_length: float = 1e-4
     limit: float = 1e-6
 
 
@@ -77,10 +77,10 @@ class Points:
         response: linearised response of the body to contact forces.
 
     Attributes:
-        who: (rank, face, point) of each of the m points.
+        point_ids: (rank, face, point) of each of the m points.
         columns: changes of x by forces -1 at the points, locally owned rows, shape (size, 2 m).
         steps: changes of the control by these forces, shape (2 m,).
-        by: motion of all locally owned points of each face by these forces, shape (points, 2, 2 m).
+        motions: motion of all locally owned points of each face by these forces, shape (points, 2, 2 m).
         friction: coefficient of friction, infinite for stick, shape (m,).
         elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
@@ -88,10 +88,10 @@ class Points:
     def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
         self._faces, self._n, self._response, self._comm = faces, n, response, faces[0].comm
         none: Any = np.zeros(0)
-        self.who: list[tuple[int, int, int]] = []
+        self.point_ids: list[tuple[int, int, int]] = []
         self.columns, self.steps = np.zeros((size, 0)), none
         c = self._components = faces[0].points.shape[1]
-        self.by = [np.zeros((*face.points.shape, 0)) for face in faces]
+        self.motions = [np.zeros((*face.points.shape, 0)) for face in faces]
         self.friction, self.elastic_slip, self._scale, self._pulls = none, none, none, none.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
         self._owned: list[tuple[int, np.ndarray, np.ndarray, Any]] = []
@@ -111,26 +111,27 @@ class Points:
             return False
         new = [point for rank in self._comm.allgather([(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
                                                        for i in numbers]) for point in rank]
-        self.who += new
-        self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.who)]
+        self.point_ids += new
+        self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.point_ids)]
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
         for f, face in enumerate(self._faces):
-            by = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
-            self.by[f] = np.concatenate([self.by[f], *by], axis=-1)
-        self._C = self.at(self.by).reshape(len(self.steps), -1)
+            motions = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
+            self.motions[f] = np.concatenate([self.motions[f], *motions], axis=-1)
+        self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
         ones = [np.ones(len(face.points)) for face in self._faces]
-        more = self.at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
+        more = self.values_at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
                                          face.law.elastic_slip * unit, face.scale, face.law.pulls * unit])
                         for face, unit in zip(self._faces, ones)], new)
         friction, slip, scale, pulls = more.T
         self.friction = np.append(self.friction, np.where(friction < FAR, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)
-        known = self.at([face.stiffness_in_tangent for face in self._faces], new)
+        known = self.values_at([face.stiffness_in_tangent for face in self._faces], new)
         self._S = np.concatenate([self._S, known * touched])
         return True
 
-    def at(self, values: Sequence[np.ndarray], point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
+    def values_at(self, values: Sequence[np.ndarray],
+                  point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
         """Return values at contact points of all ranks, shape (m, ...).
 
         Args:
@@ -141,7 +142,7 @@ class Points:
             Values in the order of the points, the same on all ranks.
         """
         located = self._owned if point_ids is None else self._of_faces(point_ids)
-        found = np.zeros((len(self.who if point_ids is None else point_ids), *values[0].shape[1:]))
+        found = np.zeros((len(self.point_ids if point_ids is None else point_ids), *values[0].shape[1:]))
         for f, k, i, *_ in located:
             found[k] = values[f][i]
         return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
@@ -162,36 +163,37 @@ class Points:
         mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
         return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
 
-    def back(self, at: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
+    def motion_to_targets(self, positions: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
         """Return the motion of points along their tools to given positions, and normal to them to their contact depth.
 
         Args:
-            at: for each face, present positions of its locally owned points relative to the tool, shape (n, 2), length.
+            positions: for each face, present positions of its locally owned points relative to the tool, shape (n, 2),
+                length.
             place: tangential target positions of the m points, shape (m, 2), length.
             near: geometry of the tools at the m points.
 
         Returns:
             Motion, shape (m, 2), length.
         """
-        along = np.einsum("ni,ni->n", near.tangent, place - self.at(at))
+        along = np.einsum("ni,ni->n", near.tangent, place - self.values_at(positions))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
-    def near(self, at: Sequence[np.ndarray], force: np.ndarray) -> ToolFrame:
+    def tool_frame(self, positions: Sequence[np.ndarray], force: np.ndarray) -> ToolFrame:
         """Return the geometry of the tools at the m points.
 
         Args:
-            at: for each face, positions of its locally owned points relative to the tool, shape (n, 2), length.
+            positions: for each face, positions of its locally owned points relative to the tool, shape (n, 2), length.
             force: present contact forces in F at the m points, shape (m, 2), which give the depth `ToolFrame.beyond`.
 
         Returns:
             Normals, tangents, curvatures and missing penetrations.
         """
-        m = len(self.who)
+        m = len(self.point_ids)
         found = np.zeros(6 * m)
         frame = ToolFrame(found[:2 * m].reshape(m, 2), found[2 * m:4 * m].reshape(m, 2), found[4 * m:5 * m],
                           found[5 * m:])
         for f, k, i, law in self._owned:
-            near = law.nearest(at[f][i])
+            near = law.nearest(positions[f][i])
             N = (force[k] * near.normal).sum(1) / self._scale[k]
             depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
             frame.normal[k], frame.tangent[k], frame.curvature[k] = near.normal, near.tangent, near.curvature
@@ -212,20 +214,20 @@ class Points:
         """
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
-    def moved_by(self, by: np.ndarray, f: int) -> np.ndarray:
+    def motion_under(self, forces: np.ndarray, f: int) -> np.ndarray:
         """Return the motion of all locally owned points of a face due to contact forces at the m points.
 
         Args:
-            by: contact forces of sign -1, shape (m, 2).
+            forces: contact forces of sign -1, shape (m, 2).
             f: number of the face.
 
         Returns:
             Motion relative to the tool, shape (n, 2), length.
         """
-        return self.by[f] @ by.ravel()
+        return self.motions[f] @ forces.ravel()
 
-    def held(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
-             to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def forces_at_end(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
+                      to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the contact forces F at the end of a given motion, for given contact statuses.
 
         Args:
