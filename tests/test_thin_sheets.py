@@ -40,12 +40,32 @@ def test_walls_do_not_depend_on_the_steps(fine, target, close, caplog):
         caplog.text)
 
 
+def over_lip(**options):
+    """A plane-strain sheet of 25 x 0.8 on the lip of a mould; at small pressures it separates from the lip."""
+    trough = fx.tools.Tool([(0.0, 15.8), (14.0, 15.8), (20.0, 0.8), (70.0, 0.8)], [0.0, 3.0, 2.0, 0.0])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=25.0, thickness=0.8, accuracy="standard"), kinematics=fx.PlaneStrain(),
+                     materials=fx.NeoHookean(c10=0.3), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("bottom")], contacts=[fx.Contact("top", trough, "stick", **options)])
+    return fx.trace(scene, until=fx.pressure(0.1), progress=False)
+
+
+def test_a_step_ends_before_the_closures_after_a_separation(caplog):
+    """A point at the lip separates between two closures of a step; before, the wall there was wrong by 3 %.
+
+    The finding on points that stick again counts none of those that only rest on the lip before the first step.
+    """
+    path, one_by_one = over_lip(), over_lip(nodes_per_step=1)
+    assert path.profile().thickness == pytest.approx(one_by_one.profile().thickness, rel=2e-3)
+    assert path.counts.steps < 0.6 * one_by_one.counts.steps
+    assert "2 points that stuck to 'top' lifted off" in caplog.text
+
+
 def test_the_size_of_resticking(fine):
     """Zero where points stick once; else about the change of the wall by steps that are too long."""
     item = resticking.furthest(fine)
     assert 5e-3 < item.shift < 1e-2 and item.tool == "top" and resticking.findings(item)
     assert resticking.findings(item._replace(shift=2e-3)) == []
-    assert "by 10 % or more" in resticking.findings(item._replace(shift=3.0))[0].text
+    assert "may depend on the steps (that point moved by 20 %" in resticking.findings(item._replace(shift=0.2))[0].text
     once = pushed(travel=1.0)
     assert resticking.furthest(once) is None and once.last.measures["contact_length"] > 0
 

@@ -1,11 +1,16 @@
-"""Prediction of steps that close several gaps: step length, and positions of the points when their gaps close."""
+"""Prediction of steps that close several gaps: step length, and positions of the points when their gaps close.
+
+A step also ends before a gap closure that follows the separation of a point that sticks at the start of the step.
+"""
 
 from __future__ import annotations
 
 import logging
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ...contact.approach import LIMITS, Approach
 from ...contact.step_limit import StepLimit
@@ -105,13 +110,20 @@ class ContactEventPrediction:
         return found
 
     def _to_enough_closures(self, length: float) -> float | None:
-        """Return the arc length, at most `length`, at which enough gaps have closed; None if the prediction fails."""
-        sequence = self._sequence
+        """Return the arc length, at most `length`, at which enough gaps have closed; None if the prediction fails.
+
+        The step ends before a gap closure if a point that sticks at its start separates earlier: the later closures
+        depend on this point, which the prediction keeps closed.
+        """
+        sequence, before = self._sequence, 0.0
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
         for k in range(2 * sum(allowed)):
             closure = sequence.next(k, length)
             if closure is None:
                 break
+            if closure.time > LIMITS.closed_at_start * length and self._separates(closure.time):
+                return closure.time - LIMITS.closed_at_start * (closure.time - before)
+            before = closure.time
             allowed[closure.face] -= closure.time > LIMITS.closed_at_start * length
             if not allowed[closure.face]:
                 return min(LIMITS.overshoot * closure.time, length)
@@ -123,6 +135,30 @@ class ContactEventPrediction:
         if sequence.stops or sequence.ends <= LIMITS.closed_at_start * length:
             return None
         return min(LIMITS.overshoot * sequence.ends, length)
+
+    @cached_property
+    def _sticking(self) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Sticking points of the accepted state that may separate, a tuple for each face.
+
+        Number of the face, mask of these m points, their normal tractions N, positions x, shape (m, 2), length, and
+        derivatives dN/dx, shape (m, 2).
+        """
+        found = []
+        for f, (approach, x) in enumerate(zip(self._present, self._sequence.positions(0.0))):
+            face, contact = approach.face, approach.face.contact
+            if contact.sticks and contact.separates:
+                tractions = face.law.tractions(x, face.history)
+                closed = (tractions.normal > 0) & (face.rule.area > 0)
+                slope = np.einsum("ni,nij->nj", face.law.nearest(x).normal, tractions.stiffness)
+                found.append((f, closed, tractions.normal[closed], x[closed], slope[closed]))
+        return found
+
+    def _separates(self, length: float) -> bool:
+        """Return True if a sticking point of the accepted state is under tension at an arc length; collective."""
+        x = self._sequence.positions(length)
+        tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
+                      for f, closed, N, start, slope in self._sticking)
+        return bool(self._present[0].face.comm.allreduce(tension, MPI.LOR))
 
     def closures(self, length: float) -> list[tuple] | None:
         """Return the gap closures predicted within a step.

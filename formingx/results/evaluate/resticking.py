@@ -16,7 +16,7 @@ _WALL = 3e-3
 """Relative change of the wall, due to the step lengths, above which there is a finding."""
 
 _LARGE = 0.1
-"""Relative change of the wall from which the finding says "or more", because neighbouring points move, too."""
+"""Shift from which the finding estimates no error: the neighbouring points moved too, so the strain changed less."""
 
 
 class Resticking(NamedTuple):
@@ -53,7 +53,8 @@ def furthest(path: Any) -> Resticking | None:
         if definition.lagged or not (definition.sticks and definition.separates):
             continue
         touches = [state.memory[number].history for state in path.segments[-1].states
-                   if len(state.memory) > number and state.memory[number] is not None]
+                   if state.kind != "start"                 # points that touch there do not stick: they carry no force
+                   and len(state.memory) > number and state.memory[number] is not None]
         rows = gathered(contact.comm, np.column_stack([contact.points, _shifts(contact, touches)]))
         again = rows[rows[:, 2] > 0]
         if len(again):
@@ -87,8 +88,9 @@ def findings(item: Resticking | None) -> list[Finding]:
     """
     if item is None or item.shift < _WALL:
         return []
-    size = f"by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else f"by {100 * _LARGE:.0f} % or more"
+    depend = f"depend on the steps, by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else (
+        f"may depend on the steps (that point moved by {100 * item.shift:.2g} % of its tributary length)")
     count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"
     return [Finding("warning", item.tool, f"{count} to {item.tool!r} lifted off and stuck again elsewhere, most near"
-                    f" R = {item.point[0]:.5g}: walls near there depend on the steps, {size}. Compare"
+                    f" R = {item.point[0]:.5g}: walls near there {depend}. Compare"
                     f" StepControl(target=4) and StepControl(target=8).")]
