@@ -15,7 +15,7 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def imported() -> None:
-    """Restore `sys.excepthook` at the end of the import."""
+    """Restore `sys.excepthook` when the import of the package is complete."""
     if sys.excepthook is _one_line:
         sys.excepthook = _usual
 

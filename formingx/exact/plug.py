@@ -272,7 +272,8 @@ def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) 
 def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length where the membrane touches.
 
-    Lengths are over the radius of the membrane, tensions over 2 c10 h0.
+    R and r are the reference and deformed radius, z is the height, phi the slope, T1 the meridional tension. Lengths
+    are over the radius of the membrane, tensions over 2 c10 h0.
 
     Args:
         mu: coefficient of friction.
@@ -289,6 +290,14 @@ def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
 
 
 def _free(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
-    """Return the derivatives of (R, r, z, phi, T1) by R on the free part of a membrane under a plug."""
+    """Return the derivatives of (R, r, z, phi, T1) by R on the free part of a membrane under a plug.
+
+    Args:
+        R: reference radius over that of the membrane.
+        r: deformed radius.
+        z: height.
+        phi: slope, radians.
+        t: meridional tension T1 over 2 c10 h0.
+    """
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

@@ -27,12 +27,13 @@ from scipy.special import iv, ivp, jn_zeros
 def block(nu: float, kind: str) -> float:
     r"""Return the stretch at which a compressed plane-strain block buckles in one half wave along the load.
 
-    The block lies between frictionless plates (Biot 1965). For flexure, and for barrelling with coth in place of tanh:
+    The block lies between frictionless plates (Biot 1965). Let lambda be the stretch along the load, h half of the
+    deformed thickness and k = pi over the deformed length. For flexure, and for barrelling with coth in place of tanh:
 
     .. math:: 4 r \tanh(r k h) = (1 + r^2)^2 \tanh(k h), \qquad r = \lambda^2
 
     Args:
-        nu: slenderness pi H0/L0, with the length L0 and the thickness 2 H0.
+        nu: slenderness pi H0/L0, with the reference length L0 along the load and the reference thickness 2 H0.
         kind: "flexure" or "barrelling".
     """
     def f(stretch):
@@ -45,16 +46,17 @@ def block(nu: float, kind: str) -> float:
 def cylinder(nu: float, n: int) -> float:
     r"""Return the axial stretch at which a compressed solid cylinder buckles in one half wave along its axis.
 
-    The cylinder lies between frictionless plates; its mode is cos(pi z/H) cos(n theta). Two kinds of motion satisfy the
-    equations, with the modified Bessel function I_n. One is a gradient of I_n(k r). The other is a curl of axial
-    potentials I_n(k lambda^(3/2) r), for which the pressure q is 0:
+    The cylinder of the deformed length H lies between frictionless plates; its mode is cos(pi z/H) cos(n theta). Let v
+    be the displacement of the mode, q its pressure, mu the shear modulus, lambda the axial stretch and k = pi/H. Two
+    kinds of motion satisfy the equations below, with the modified Bessel function I_n. One is a gradient of I_n(k r).
+    The other is a curl of axial potentials I_n(k lambda^(3/2) r), for which q is 0:
 
     .. math:: \mathcal{L} v = \frac{\nabla q}{\mu}, \qquad
               \mathcal{L} = \lambda^{-1} \left(\frac{\partial^2}{\partial r^2} + \dots\right)
               + \lambda^2 \frac{\partial^2}{\partial z^2}
 
     Args:
-        nu: slenderness pi R0/H0, with the length H0.
+        nu: slenderness pi R0/H0, with the reference radius R0 and the reference length H0.
         n: number of waves round the axis.
 
     >>> from formingx.exact.stability import cylinder

@@ -113,7 +113,10 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
 
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:
-    """Return the numbers of the points of each arc: consecutive points of equal curvature, shape (m,), above 0."""
+    """Return the numbers of the points of each arc of a tool: consecutive points of equal curvature above 0.
+
+    curvature: absolute curvature at each point of the tool, shape (m,), 1/length.
+    """
     same = np.isclose(curvature[1:], curvature[:-1], rtol=1e-3)
     groups = np.split(np.arange(len(curvature)), np.flatnonzero(~same) + 1)
     return [group for group in groups if curvature[group[0]] > 0]

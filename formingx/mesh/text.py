@@ -38,7 +38,7 @@ _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
 
 
 def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:
-    """Write a grid in the text format (see the module).
+    """Write a grid in the text format of `formingx.mesh.text`.
 
     Args:
         grid: the grid.
@@ -70,7 +70,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a text file (format: see the module); clockwise elements become counter-clockwise.
+    """Return the grid in a text file (format of `formingx.mesh.text`); clockwise elements become counter-clockwise.
 
     Raises:
         InputError: the file is missing or not in this format; the message names the line.

@@ -173,7 +173,7 @@ class _Drawing:
         return int(number)
 
     def _number(self, text: str) -> float:
-        """Return the value of an expression of numbers, names, functions and + - * / ^.
+        """Return the value of an expression of a script: numbers, names, functions and + - * / ^.
 
         Raises:
             ValueError: the expression contains anything else.
