@@ -319,19 +319,22 @@ def test_no_compiler(tmp_path, monkeypatch):
     """A compiler that fails says so; nothing is left behind for the next run."""
     from formingx import _jit
     from formingx.tools import nearest
+
+    def compiled():
+        return _jit.functions.__wrapped__("nearest", nearest._HEADER, nearest._SOURCE)
     monkeypatch.setattr(_jit, "_compiler", lambda: ("false",))
     monkeypatch.setattr(_jit.jit, "get_options", lambda: {"cache_dir": tmp_path})
     with pytest.raises(RuntimeError, match="the C compiler failed, with status 1: false"):
-        nearest._compiled.__wrapped__()
+        compiled()
     def interrupted(command, code):
         Path(command[-1]).write_text("half of a library")
         raise KeyboardInterrupt
     with monkeypatch.context() as patch:
         patch.setattr(_jit, "compile_c", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            nearest._compiled.__wrapped__()
+            compiled()
     monkeypatch.setattr(_jit, "_compiler", lambda: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(RuntimeError, match="the C compiler cannot be run"):
-        nearest._compiled.__wrapped__()
+        compiled()
     assert [file for file in tmp_path.rglob("*") if file.is_file()] == []
