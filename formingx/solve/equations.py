@@ -234,9 +234,11 @@ class Residual(Protocol):
         """Compute F(x, control) in `out`, and set `force_scale`."""
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
-        """Compute dF/dx at (x, control) in `matrix`, and return this matrix.
+        """Compute dF/dx in `matrix`, and return this matrix.
 
         Args:
+            x: unknowns at which the derivative is taken.
+            control: control at which it is taken.
             ahead: True for the one-sided derivative towards the next step, where F has a kink at an accepted state.
         """
 
@@ -440,7 +442,7 @@ class Units(Protocol):
         return "the equations are not defined there"
 
     def examine(self, last: Standing | None, attempt: Attempt | None) -> Examined | None:
-        """Examine the last good state and a failed attempt, for a `Diagnosis`; None without a body. Collective."""
+        """Return the examination of the last good state and of a failed attempt; None without a body. Collective."""
         return None
 
 

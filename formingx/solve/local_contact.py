@@ -36,28 +36,28 @@ class LocalContact:
     The ramp is the range of gaps in which the contact stiffness grows from zero.
 
     Attributes:
-        most: largest number of points in a local solve; with more points Newton's method continues without it.
-        few: number of changed points up to which Woodbury's formula costs less than another factorisation.
+        most_points: largest number of points in a local solve; with more points Newton's method continues without it.
+        few_changes: number of changed points up to which Woodbury's formula costs less than another factorisation.
         iterations: largest number of iterations of the local solve.
-        full: number of full corrections, which may cycle. Later corrections of sticking points stop near the outer edge
-            of the ramp. Where a point slides, corrections are halved that increase the residual.
-        halved: largest number of halvings of a correction, which would stall at a kink.
-        stays: part of its present depth at which a point stops that a correction would move out of the ramp.
-        least: depth over the width of the ramp below which a point may leave the ramp.
-        behind: depth over the width of the ramp at which a point stops that enters the ramp again.
-        farther: factor of `behind` from one entry to the next.
+        full_corrections: number of full corrections, which may cycle. Later corrections of sticking points stop near
+            the outer edge of the ramp. Where a point slides, corrections are halved that increase the residual.
+        most_halvings: largest number of halvings of a correction, which would stall at a kink.
+        kept_depth: part of its present depth at which a point stops that a correction would move out of the ramp.
+        least_depth: depth over the width of the ramp below which a point may leave the ramp.
+        entry_depth: depth over the width of the ramp at which a point stops that enters the ramp again.
+        entry_growth: factor of `entry_depth` from one entry to the next.
         accuracy: tolerance of the motions over the half-width of the ramp.
     """
 
-    most: int = 40
-    few: int = 3
+    most_points: int = 40
+    few_changes: int = 3
     iterations: int = 40
-    full: int = 8
-    halved: int = 4
-    stays: float = 0.1
-    least: float = 1e-9
-    behind: float = 1e-6
-    farther: float = 10.0
+    full_corrections: int = 8
+    most_halvings: int = 4
+    kept_depth: float = 0.1
+    least_depth: float = 1e-9
+    entry_depth: float = 1e-6
+    entry_growth: float = 10.0
     accuracy: float = 1e-4
 
 
@@ -81,8 +81,10 @@ class LocalSolve:
         self.failed = 0
 
     def look(self) -> None:
-        """Mark the points whose gap closed, or whose status changed since the last call; call once after each
-        linearisation."""
+        """Mark the points whose gap closed, or whose status changed since the last call.
+
+        Called once after each linearisation.
+        """
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -104,7 +106,7 @@ class LocalSolve:
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
             points = self._problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
-            if not 0 < points <= _LOCAL.most:
+            if not 0 < points <= _LOCAL.most_points:
                 return step
             small = _Points(self._problem, self._contacts, chosen, solver, border)
             change = small.solve(dx, step)
@@ -149,12 +151,12 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
         solver: solver with the LU factors of the tangent.
 
     Returns:
-        The function (`Update`). None if more points change than `LocalContact.few`: another factorisation then costs
-        less.
+        The function (`Update`). None if more points change than `LocalContact.few_changes`: another factorisation then
+        costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
-    if points > _LOCAL.few:
+    if points > _LOCAL.few_changes:
         return None
     if not points:
         return lambda V, step: V
@@ -236,16 +238,16 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._taken()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
-        y, dy, behind = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.behind)
+        y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
         for k in range(_LOCAL.iterations):
             f, S = self._law(laws, y)
-            more = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
-            R = y - y0 + self._C @ more
+            added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
+            R = y - y0 + self._C @ added
             miss = np.abs(R).max()
             if miss < accuracy:
-                forces = -self._scale * more
+                forces = -self._scale * added
                 return self._columns @ forces, float(self._steps @ forces)
             if miss > before and halvings:
                 dy, halvings = dy / 2, halvings - 1
@@ -255,13 +257,13 @@ class _Points:
             if correction is None:
                 return None
             new = y - correction
-            if k >= _LOCAL.full:
-                new, keep = self._stop_at_edge(ramps, y, new, behind)
-                halvings = 0 if keep else _LOCAL.halved
+            if k >= _LOCAL.full_corrections:
+                new, keep = self._stop_at_edge(ramps, y, new, entry_depth)
+                halvings = 0 if keep else _LOCAL.most_halvings
             y, dy = new, new - y
         return None
 
-    def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, behind: Array) -> tuple[Array, bool]:
+    def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
         """Stop corrections of motions at the outer edge of the ramp.
 
         The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero at its outer edge. A point
@@ -272,17 +274,17 @@ class _Points:
             ramps: for each face, function of motions that returns depth and path in the ramp (`Increment.in_ramp`).
             y: motions before the correction.
             new: motions after it.
-            behind: depth over the width of the ramp at which each point stops that enters the ramp, shape (points,).
-                It grows for points that enter.
+            entry_depth: depth over the width of the ramp at which a point stops that enters the ramp, shape (points,);
+                changed in place, as it grows for points that enter.
 
         Returns:
             (the stopped motions, True if the correction must not be halved: a point was stopped, or all points stick).
         """
         (before, _), (depth, path) = (self._all(self._each(ramps, z), (), (self._c,)) for z in (y, new))
-        leaves, enters = (before > _LOCAL.least) & (depth <= 0), (before <= 0) & (depth > 0)
-        stopped = np.where(leaves, _LOCAL.stays * np.minimum(before, 1.0),
-                           np.where(enters, np.minimum(depth, behind), depth))
-        behind[enters] *= _LOCAL.farther
+        leaves, enters = (before > _LOCAL.least_depth) & (depth <= 0), (before <= 0) & (depth > 0)
+        stopped = np.where(leaves, _LOCAL.kept_depth * np.minimum(before, 1.0),
+                           np.where(enters, np.minimum(depth, entry_depth), depth))
+        entry_depth[enters] *= _LOCAL.entry_growth
         back = (stopped - depth)[:, None] * path
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
@@ -297,21 +299,20 @@ class _Points:
         Returns:
             The updated solutions, shape (n, m), or None if the changed tangent is singular.
         """
-        more = self._gather(np.concatenate(changes))
-        y = self._within(more, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
+        added = self._gather(np.concatenate(changes))
+        y = self._within(added, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:
             return None
-        forces = np.einsum("nij,njm->nim", more, y.reshape(len(more), self._c, -1)).reshape(y.shape)
+        forces = np.einsum("nij,njm->nim", added, y.reshape(len(added), self._c, -1)).reshape(y.shape)
         return V - self._columns @ (self._scale[:, None] * forces)
 
-    def _within(self, more: Array, y: Array) -> Array | None:
-        """Return (1 + C more)^-1 y, the motions y changed by additional stiffnesses `more`, shape (k, c, c), of the
-        points.
+    def _within(self, added: Array, y: Array) -> Array | None:
+        """Return (1 + C S)^-1 y, the motions y of the points, changed by additional stiffnesses S.
 
-        None if this system is singular.
+        added: the stiffnesses S of k points, shape (k, c, c). None if the system is singular.
         """
         n = len(y)
-        J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), more).reshape(n, n)
+        J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), added).reshape(n, n)
         try:
             found = np.linalg.solve(J, y)
         except np.linalg.LinAlgError:
@@ -319,35 +320,43 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: float) -> Array:
-        """Return the motion of locally owned points relative to their tools in an update (dx, step), flat, length.
-        Collective."""
+        """Return the motion of locally owned points relative to their tools, flat, length; collective.
+
+        dx: update of the locally owned unknowns, shape (n,). step: update of the control.
+        """
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _taken(self) -> tuple[Array, Array]:
-        """Return (forces, flat; stiffnesses, shape (k, c, c)) of the points in the last linearisation of the contact
-        law."""
+        """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.
+        """
         return self._forces([c.increment.taken(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return (forces, flat; stiffnesses, shape (k, c, c)) of the contact law after motions y; `laws`: a function
-        per face."""
+        """Return the forces, flat, and stiffnesses, shape (k, c, c), of the contact law after motions y, flat, length.
+
+        laws: for each face a function from motions of its points to their tractions.
+        """
         return self._forces([(tractions.force, tractions.stiffness) for tractions in self._each(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Gather pairs (forces, stiffnesses) of the faces from all ranks: flat forces, and stiffnesses, shape (k, c,
-        c)."""
+        """Gather pairs (forces, stiffnesses) of the faces from all ranks: forces, flat; stiffnesses, shape (k, c, c).
+        """
         force, stiffness = self._all(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness
 
     def _each(self, functions: list[Any], y: Array) -> list[Any]:
-        """Return for each face the value of its function, from `functions`, at the motions y of its locally owned
-        points."""
+        """Return for each face the value of its function in `functions` at the motions of its locally owned points.
+
+        y: motions of the points of all ranks, flat, length.
+        """
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Gather pairs of values of all faces and ranks; `shapes`: shapes of both values at a point, as a rank may
-        have none."""
+        """Gather pairs of values at the points of all faces and ranks.
+
+        parts: the pair of each face. shapes: shapes of both values at one point, since a rank may have no points.
+        """
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]
 
