@@ -149,7 +149,10 @@ class FaceContact:
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return a mask of the points in contact in a state, shape (n,); `fields`: locally owned unknowns."""
+        """Return a mask of the contact points that touch the tool in a state, shape (n,).
+
+        fields: locally owned unknowns of the state. control: its control.
+        """
         return self.law.touching(self.positions(fields, control), self.history)
 
     @property

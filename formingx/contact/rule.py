@@ -209,9 +209,9 @@ class Lobatto(_Nodes):
 
 
 class Vertices(_Nodes):
-    """Nodes of a sheet in three dimensions, each with a third of the area of the adjacent triangles.
+    """Contact points of a sheet in three dimensions: its nodes, each with a third of the area of adjacent triangles.
 
-    `lengths` is the square root of this area.
+    The tributary length of a node is the square root of this area.
 
     Args:
         surface: formulation of the sheet.

@@ -175,10 +175,10 @@ class Formulation(BodyModel):
         """Return the temperatures at the quadrature points of a material.
 
         Args:
-            terms: the `MaterialTerms`.
+            terms: the material in the forms (`MaterialTerms`).
 
         Returns:
-            Result of `Temperature.now_and_before`, shape (1 or 2, cells, q).
+            Temperatures now, and in the previous step if there is one, shape (1 or 2, cells, q).
         """
         return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 

@@ -120,10 +120,10 @@ class MaterialHistory:
                 "values": {name: gathered(comm, v)[order] for name, v in memory.values.items()}}
 
     def load(self, data: dict[str, Any]) -> InternalVariables:
-        """Return the internal variables of this rank from the result of `save`.
+        """Return the internal variables of this rank from stored data of all ranks.
 
         Args:
-            data: result of `save`.
+            data: data that `save` returned, such as the contents of a checkpoint.
 
         Returns:
             Values that `put` accepts.
@@ -181,7 +181,8 @@ class MaterialHistory:
         return where.eval(self._forms.domain, self._own).reshape(-1, components)
 
     def _array(self, name: str) -> np.ndarray:
-        """Return all values of a variable, shape (points, components)."""
+        """Return the values of an internal variable at all quadrature points of this rank, shape (points, components).
+        """
         return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
 
     def _points(self, name: str, cells: np.ndarray) -> np.ndarray:
@@ -189,7 +190,7 @@ class MaterialHistory:
         return self._terms.internal[name].function_space.dofmap.list[cells]
 
     def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
-        """Set a variable in some cells to values of shape (components,) or (cells, points, components)."""
+        """Set an internal variable in some cells to values of shape (components,) or (cells, points, components)."""
         self._array(name)[self._points(name, cells)] = values
 
 

@@ -115,10 +115,10 @@ class Outline:
     def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
         """Find a self-intersection of the deformed boundary.
 
-        Edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
+        Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
 
         Args:
-            edges: result of `edges`, shape (m, 3, 2), length.
+            edges: start, end and midpoint of each deformed edge, as `edges()` returns them, shape (m, 3, 2), length.
 
         Returns:
             A point where edges cross, shape (2,), length; None if there is none.

@@ -16,7 +16,7 @@ from ..ranks import gathered
 
 
 class Probe:
-    """Displacement at fixed reference points, as rows of weights of the unknowns.
+    """Evaluation of the displacement at fixed reference points, as weighted sums of the unknowns of a problem.
 
     Args:
         problem: the `Problem`.
@@ -84,12 +84,13 @@ class Probe:
         return self._problem.comm.allreduce(values, MPI.SUM)
 
     def stretch_row(self) -> tuple[np.ndarray, float]:
-        r"""Return the row that measures the in-plane stretch between two points on the axis, lower first.
+        r"""Return a vector that gives the in-plane stretch at the pole as a function of the unknowns x.
 
         .. math::
             \lambda = (1 + \text{row} \cdot x)^{\text{power}}
 
-        For incompressible material the thickness stretch between the points gives the in-plane stretch.
+        The two points of the probe lie on the axis, the lower one first. The material is incompressible: the thickness
+        stretch between them gives the in-plane stretch.
 
         Returns:
             Row, locally owned entries, shape (n,); power, -1/2 if axisymmetric, -1 in plane strain.
@@ -99,7 +100,7 @@ class Probe:
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row that measures a weighted sum of the displacements of the points.
+        """Return a vector whose product with the unknowns x is a weighted sum of the displacements of the points.
 
         Args:
             factors: weights, shape (n, components).
@@ -142,9 +143,10 @@ class Probe:
 
 
 class MidSurfaceProbe(Probe):
-    """Probe of a membrane; points off the mid-surface keep their material normal.
+    """Evaluation of the displacement of a membrane at fixed reference points through its thickness.
 
-    Their distance from the mid-surface changes in proportion to the thickness.
+    Points off the mid-surface stay on the normal of their mid-surface point. Their distance from the mid-surface
+    changes in proportion to the thickness.
     """
 
     def __init__(self, problem: Any, points: np.ndarray):
@@ -189,7 +191,7 @@ class MidSurfaceProbe(Probe):
         return self._problem.comm.allreduce(total, MPI.SUM)
 
     def stretch_row(self) -> tuple[np.ndarray, float]:
-        r"""Return the row that measures the in-plane stretch at the pole of a membrane.
+        r"""Return a vector that gives the in-plane stretch at the pole of a membrane as a function of the unknowns x.
 
         There the membrane is normal to the axis, and the stretch is
 
@@ -203,7 +205,7 @@ class MidSurfaceProbe(Probe):
         return row, 1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row that measures a weighted sum of the displacements of points on the mid-surface.
+        """Return a vector whose product with the unknowns x is a weighted sum of displacements on the mid-surface.
 
         Args:
             factors: weights, shape (n, components).

@@ -183,11 +183,13 @@ class Solid(Formulation):
 
     def elastic_densities(self, names: list[str], F: Any, pressures: Any, density: Any = MaterialTerms.step_energy
                           ) -> list[tuple[Any, dict]]:
-        """Return the energy densities of a body for an elastic deformation gradient; see `energy_densities`.
+        """Return the terms of the energy density of layers of one material, for an elastic deformation gradient.
+
+        The terms are the strain energy and the terms of incompressibility, see `energy_densities`.
 
         Args:
-            names: layers of the body.
-            F: elastic deformation gradient (UFL, shape (3, 3)).
+            names: names of the layers.
+            F: deformation gradient without thermal expansion (UFL, shape (3, 3)).
             pressures: pressure fields (UFL, dimensionless).
             density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
 

@@ -37,12 +37,12 @@ class Tangent:
             self._by_motion = forms.compile(ufl.action(forms.tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
-        """Set the constraints and the rates of a stage.
+        """Set the active constraints, and the motion of driven supports, for new step data.
 
         Args:
-            active: the `Active` constraints.
-            rate: change of each item's amplitude per control, then of the process time.
-            changed: True if the active constraints have changed.
+            active: constraints that are active under the step data (`Active`).
+            rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
+            changed: True if the active constraints differ from the present ones.
         """
         if changed:
             self.matrix.constrain(active.bcs, active.rows)
@@ -54,7 +54,7 @@ class Tangent:
         """Return the derivative of the residual with respect to the control, through loads, time and driven supports.
 
         Args:
-            rate: change of each item's amplitude per control, then of the process time.
+            rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
             assemble: function that returns the locally owned entries of a compiled linear form.
             n: number of locally owned field unknowns.
 

@@ -297,7 +297,10 @@ class Curve(StateSolver):
         raise Failure("points that come into contact late bring others into their tool again and again", [])
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
-        """Return the constraint of the plane through (x0, control0) normal to the tangent of `old`."""
+        """Return the constraint of the plane through (x0, control0) that is normal to the tangent of the state `old`.
+
+        The normal is taken in the inner product of arc length. x0: locally owned entries, shape (n,).
+        """
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
             self._a.array_w[:] = old.direction
             self.problem.metric_times(self._a, gradient)

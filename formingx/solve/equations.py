@@ -246,8 +246,8 @@ class Residual(Protocol):
         """Compute dF/dcontrol at (x, control) in `out`; `ahead`: as in `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the inner product of two changes of x, by which arc length is measured, independent of mesh and
-        units."""
+        """Return the inner product of two changes of x, such as the mean over the body of u_a . u_b; it measures arc
+        length."""
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
         """Compute in `out` the vector for which out . b = inner(a, b) for every b."""

@@ -24,7 +24,7 @@ from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Aim, Progress
-from .record import Record, Unusable
+from .record import InadmissibleState, Record
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separated, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
@@ -424,7 +424,7 @@ class Run:
         record = self.record
         try:
             record.accept(state)
-        except Unusable as unusable:
+        except InadmissibleState as unusable:
             if not self.states:
                 raise
             self._give_up("at {} {:.6g}: {}; allow_inadmissible=True goes on".format(

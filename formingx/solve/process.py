@@ -205,7 +205,10 @@ class Execution:
             self._trace([(target, target.bind(self.problem))], start)
 
     def _out_of_balance(self, x: Array) -> bool:
-        """Return True if the unbalanced forces exceed `balanced`; x: unknowns, locally owned entries, shape (n,)."""
+        """Return True if the unbalanced forces at the unknowns x are not negligible against the support forces.
+
+        x: locally owned entries, shape (n,).
+        """
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced

@@ -65,7 +65,7 @@ class Aim:
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def look(self, state: State) -> None:
-        """Append the value of the last target's quantity in an earlier state, of a run that is continued.
+        """Append the value of the last target's quantity in a state that a continued run already has.
 
         Args:
             state: the state.

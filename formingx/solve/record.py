@@ -54,7 +54,7 @@ class Segment:
     states: list[State] = field(default_factory=list)
 
 
-class Unusable(ConvergenceError):
+class InadmissibleState(ConvergenceError):
     """Error of a run that found a state which no body can have."""
 
 
@@ -163,7 +163,7 @@ class Record:
             state: the converged state; its history variables, stage, time and check of admissibility are set.
 
         Raises:
-            Unusable: no body can have this state. The record is then unchanged.
+            InadmissibleState: no body can have this state. The record is then unchanged.
         """
         problem, memory = self.equations, self.equations.memory
         problem.advance(state.x, state.control)
@@ -176,7 +176,7 @@ class Record:
                 listener(state)
             state.verdict = self.judge(state)
             if state.verdict and not self.allow_inadmissible:
-                raise Unusable(state.verdict)
+                raise InadmissibleState(state.verdict)
         except BaseException:
             self.segments[-1].states.pop()
             problem.memory = memory

@@ -121,7 +121,9 @@ class NoEquilibrium(Failure):
 
 
 class ViscousDrag:
-    """Viscous forces eta V (x - origin) on the body; they are 0 at constrained unknowns.
+    """Viscous forces eta V (x - origin) on the body, with the matrix V of a viscous stress.
+
+    The forces are 0 at constrained unknowns.
 
     Args:
         viscosity: the viscosity of the problem, with the matrix V.
@@ -141,7 +143,7 @@ class ViscousDrag:
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add eta V, the derivative of the viscous forces, to a tangent matrix."""
+        """Add the derivative of the viscous forces with respect to x, eta V, to a tangent matrix."""
         self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:
@@ -229,7 +231,7 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _hold_back(self, grows: float = 0.0) -> float:
-        """Return the factor by which eta grows after a rejected solution, and keep eta from falling after the next one.
+        """Return the factor by which the viscosity grows after a rejected solution; it may not fall after the next one.
 
         grows: the factor; 0: the factor of the settings.
         """
