@@ -37,6 +37,12 @@ def test_target_beyond_a_limit_point():
     assert "the pressure has its maximum, 0.493279, at a limit point that was passed, and the target 0.6" in str(error)
 
 
+def test_target_below_a_limit_point():
+    """A sheet that is drawn down by suction has a limit point at a minimum of the pressure."""
+    error, found = failure(lambda: fx.trace(treloar(), until=fx.pressure(-0.6), max_steps=30, progress=False))
+    assert "the pressure has its minimum, -0.49" in str(error) and "the target -0.6 lies below it" in str(error)
+
+
 def test_a_limit_point_that_a_path_has_left_behind_is_no_cause():
     """It rose above the first maximum again."""
     facts = {"what": "travel", "limit_points": (0.54, 0.51)}

@@ -340,9 +340,10 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
                       "a stage in which something goes on growing, such as"
                       " amplitudes={enclosed_volume: [(time, value), ...]}")
     elif target is not None and limits and abs(facts["control"]) <= max(map(abs, limits)) < abs(target):
+        extremum, side = ("maximum", "above") if target > 0 else ("minimum", "below")
         yield Finding("serious", "limit point",
-                      f"the {what} has its maximum, {max(limits, key=abs):.6g}, at a limit point that was passed, and"
-                      f" the target {target:.6g} lies above it",
+                      f"the {what} has its {extremum}, {max(limits, key=abs):.6g}, at a limit point that was passed,"
+                      f" and the target {target:.6g} lies {side} it",
                       "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
     if ahead is not None and failure.fixed_control:
