@@ -405,7 +405,8 @@ class Path(States):
             InputError: the body is a sheet in three dimensions.
         """
         if self.scene.kinematics.components == 3:
-            raise InputError(f"{what}: is not available yet for a sheet in space" + (f": {instead}" if instead else ""))
+            raise InputError(f"{what}: is not available yet for a sheet in three dimensions"
+                             + (f": {instead}" if instead else ""))
 
     @cached_property
     def _reader(self) -> Reader:

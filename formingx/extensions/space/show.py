@@ -166,7 +166,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     counts, basis = path.counts, planes.basis(None)
     body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>",
             f"<p class=lead>{counts.steps} states after the start, {counts.iterations} Newton iterations,"
-            f" {counts.seconds:.1f} s. A sheet in space, as a membrane."
+            f" {counts.seconds:.1f} s. Sheet in three dimensions, as a membrane."
             f"{f' Forces, energies, volumes and areas are given for {basis}.' * bool(basis)}</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")

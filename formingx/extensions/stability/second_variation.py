@@ -82,7 +82,7 @@ class SecondVariation:
     def __init__(self, problem: Any):
         forms = problem.forms
         if forms.domain.geometry.dim == 3:
-            raise InputError("stability: is not available yet for a sheet in space")
+            raise InputError("stability: is not available yet for a sheet in three dimensions")
         if forms.domain.topology.dim != 2:
             raise InputError("stability: a membrane has no bending stiffness: under hoop compression it wrinkles in"
                              " ever shorter waves; look at its stresses, or use a solid model, MixedPressure()")

@@ -74,7 +74,7 @@ function sectionTraces(run, at, field, range) {
 const paint = (field, range) => ({colorscale: field.startsWith("temperature") ? "Portland" : "Viridis",
   reversescale: field.startsWith("wall"), cmin: range[0], cmax: range[1], lighting: {ambient: 0.6, diffuse: 0.6, specular: 0.15}});
 
-// A sheet in space: its triangles and their images, and the tools.
+// A sheet in three dimensions: its triangles and their images, and the tools.
 function mesh(run, at, field, range) {
   const image = (points, [sx, sy, sz, dx, dy, dz]) => ({x: points[0].map(x => sx * x + dx), y: points[1].map(y => sy * y + dy),
     z: points[2].map(z => sz * z + dz)}), [i, j, k] = run.mesh.triangles;
@@ -99,7 +99,7 @@ function surface(run, at, field, range) {
     z: x.map(() => z.map(v => sz * v + dz)), surfacecolor: x.map(() => v), ...paint(field, range), showscale: false, hoverinfo: "skip"}));
 }
 
-// Lowest and highest coordinates of all that is drawn: (r, z), of a sheet in space (x, y, z).
+// Lowest and highest coordinates of all that is drawn: (r, z), of a sheet in three dimensions (x, y, z).
 function box(run) {
   const axes = run.mesh ? [0, 1, 2] : [0, 1], n = axes.length, low = axes.map(() => Infinity), high = axes.map(() => -Infinity);
   for (const of of run.mesh ? ["points"] : ["bottom", "top"]) for (const points of (run.mesh || run.sheet)[of])
