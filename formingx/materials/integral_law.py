@@ -8,8 +8,8 @@ class IntegralLaw(Protocol):
     """Law of a stress that depends on all past states (`Material.integral`).
 
     Attributes:
-        coefficients: {name: value in the reference configuration}, tuples for tensors. The forms have a function of
-            each name with values at quadrature points.
+        coefficients: fields at quadrature points from which the stress follows, {name: value in the reference
+            configuration}. A value is a number, or a tuple of the entries of a tensor.
     """
 
     coefficients: Mapping[str, object]

@@ -58,7 +58,7 @@ class Material(Energies):
 
     @property
     def varies(self) -> bool:
-        """True if a constant varies over the body."""
+        """True if a constant of the material varies over the body."""
         return any(varying(value) is not None for value in self.parameters.values())
 
     def constants(self) -> dict[str, float | Varying]:

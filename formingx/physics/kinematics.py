@@ -387,14 +387,14 @@ def _in_plane_determinant(F):
 def _powers_across(F, b, a):
     r"""Return the terms that the entries b = (C13, C23) add to tr C^a, to second order.
 
-    A is the in-plane part of C, x an eigenvalue of A, and c = C33. To second order x becomes x + b^2/(x - c), so the
+    C is F^T F, A its in-plane part with an eigenvalue x, and c = C33. To second order x becomes x + b^2/(x - c), so the
     terms are
 
     .. math:: b \cdot g(A) \, b, \qquad g(x) = a \, \frac{x^s - c^s}{x - c}
               = a \, (x c)^{(s - 1)/2} \, \frac{\sinh(s y)}{\sinh y}, \quad s = a - 1, \quad y = \tfrac{1}{2} \ln(x/c)
 
     The second form loses no digits where stretches coincide. At b = 0 the terms are exact in value and in first and
-    second derivatives by all entries of F. Where d < 1e-8 m, d is taken as 1e-8 m.
+    second derivatives by all entries of F. The half difference of the eigenvalues is at least 1e-8 of their mean.
     """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2

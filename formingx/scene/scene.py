@@ -226,7 +226,7 @@ class Scene:
 
     @property
     def driven(self) -> Any:
-        """Only item that a run can control; None if there is none or several."""
+        """Load, support or contact that a run controls if it is the only one that can be controlled; else None."""
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 

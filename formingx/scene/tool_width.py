@@ -31,7 +31,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
         axisymmetric: True for an axisymmetric body, False in plane strain.
 
     Raises:
-        InputError: the tool could pass between contact points, or penetrate the face by more than `CUT` times the
+        InputError: the tool could pass between contact points, or penetrate the face by more than 10 % (`CUT`) of the
             thickness before it meets one.
     """
     ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
