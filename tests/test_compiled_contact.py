@@ -1,4 +1,4 @@
-"""Functions of contact in C: the same values as the equations written out for one point after the other."""
+"""The contact law in C: the same values as the equations written out for one point after the other."""
 
 import math
 

@@ -32,6 +32,7 @@ class TemperatureCoefficient:
                  temperatures: Iterable[np.ndarray]):
         self._temperature, self._values, self._parts = forms.temperature, values, parts
         self._rate = None
+        self._known: dict[tuple, list[np.ndarray]] = {}      # values and rates at the last two temperatures
         if forms.scene.heat is not None:
             self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)
         self.take(temperatures)
@@ -56,6 +57,27 @@ class TemperatureCoefficient:
         Raises:
             InputError: f has no value at a temperature.
         """
+        given = list(temperatures)
+        key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)
+        known = self._known.pop(key, None)
+        if known is None:
+            self._evaluate(given)
+            known = [function.x.array.copy() for function in self._functions]
+        else:
+            for function, values in zip(self._functions, known, strict=True):
+                function.x.array[:] = values
+        if self._rate is not None:
+            self._since.value = self._temperature.time
+        last = list(self._known.items())[-1:]               # a run alternates between both ends of a step
+        self._known = dict([*last, (key, known)])
+
+    @property
+    def _functions(self) -> list[fem.Function]:
+        """DOLFINx functions of the coefficient and of its rate."""
+        return [self._values] if self._rate is None else [self._values, self._rate]
+
+    def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
+        """Evaluate the coefficient and its rate at temperatures, as in `take`."""
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]
@@ -65,6 +87,5 @@ class TemperatureCoefficient:
                 with np.errstate(all="ignore"):
                     rate = np.log(now / before[0]) / (temperature.time - temperature.time_before)
                 self._rate.x.array[rows] = np.where(np.isfinite(rate), rate, 0.0)
-                self._since.value = temperature.time
             elif self._rate is not None:
                 self._rate.x.array[rows] = 0.0

@@ -4,8 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .._jit import address, address_of_integers
+from .compiled import compiled
+
 _CHUNK = 2**18     # pairs that are compared at a time
-_MAX_DIRECT = 128  # largest number of boxes whose pairs are compared without a tree
+_MAX_DIRECT = 1024 # largest number of boxes whose pairs are compared without a tree
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -19,9 +22,12 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
         Numbers i and j of overlapping boxes, shape (k,) each; every pair occurs once.
     """
     if len(low) <= _MAX_DIRECT:
-        i, j = np.nonzero(np.all((low[:, None] <= high) & (low <= high[:, None]), axis=2))
+        pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)
+        while len(pairs) < count:
+            pairs = np.empty((count, 2), dtype=int)
+            count = compiled().overlaps(len(low), address(low), address(high), count, address_of_integers(pairs))
         if len(low) > 1:
-            yield i[i < j], j[i < j]
+            yield pairs[:count, 0], pairs[:count, 1]
         return
     order = np.argsort(_along_a_curve((low + high) / 2), kind="stable")
     depth = int(np.ceil(np.log2(len(low))))

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .._jit import address, address_of_integers
 from ..errors import InputError
 from .boxes import overlapping
+from .compiled import compiled
 
 _MIN_LENGTH = 1e-50                      # lengths whose squares are still numbers
 _MAX_LENGTH = 1e50                        # lengths whose products are still numbers
@@ -166,20 +168,11 @@ def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = 1e-9 * float((high - low).max())
     for first, second in overlapping(low - tolerance, high + tolerance):
-        e, f = edges[first], edges[second]
-        a, b, c, d = points[e[:, 0]], points[e[:, 1]], points[f[:, 0]], points[f[:, 1]]
-        separate = (e[:, :1] != f).all(1) & (e[:, 1:] != f).all(1)
-        crosses = separate & (_cross(b - a, c - a) * _cross(b - a, d - a) < 0)
-        crosses &= _cross(d - c, a - c) * _cross(d - c, b - c) < 0
-        for point, node, p, q, other in ((a, e[:, 0], c, d, f), (b, e[:, 1], c, d, f), (c, f[:, 0], a, b, e),
-                                         (d, f[:, 1], a, b, e)):
-            edge = q - p
-            length = (edge**2).sum(1)
-            t = np.clip(((point - p) * edge).sum(1) / length, 0, 1)
-            gap = ((point - p - t[:, None] * edge) ** 2).sum(1)
-            crosses |= (node[:, None] != other).all(1) & (gap <= 1e-18 * length)
+        crosses = np.zeros(len(first))
+        compiled().cross(len(first), address_of_integers(first), address_of_integers(second), address(points),
+                         address_of_integers(edges), address(crosses))
         if crosses.any():
-            yield np.column_stack([first, second])[crosses]
+            yield np.column_stack([first, second])[crosses > 0]
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:

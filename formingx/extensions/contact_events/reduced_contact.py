@@ -17,15 +17,13 @@ with the normal n into the tool and its tangent t: the geometric stiffness of co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
-from ..._jit import address, address_of_integers
-from ...physics.contact_law import FAR
-from .compiled import compiled
+from ...physics.contact_law import FAR, ContactStatus
 from .response import Response
 
 
@@ -48,7 +46,7 @@ class StatusSearch:
     limit: float = 1e-6
 
 
-_SEARCH = np.array(astuple(StatusSearch()), dtype=float)
+_SEARCH = StatusSearch()
 
 
 class ToolFrame(NamedTuple):
@@ -65,6 +63,20 @@ class ToolFrame(NamedTuple):
     tangent: np.ndarray
     curvature: np.ndarray
     beyond: np.ndarray
+
+
+class ReducedSystem(NamedTuple):
+    """Motion dx of m contact points as a linear function of their contact forces, free of contact stiffness.
+
+    Attributes:
+        free: dx without contact forces, shape (2 m,).
+        by: derivative of dx by forces of sign -1 (compliance), shape (2 m, 2 m).
+        turn: derivative by dx of contact forces that rotate with a curved tool, shape (m, 2, 2).
+    """
+
+    free: np.ndarray
+    by: np.ndarray
+    turn: np.ndarray
 
 
 class Points:
@@ -130,6 +142,11 @@ class Points:
         self._S = np.concatenate([self._S, known * touched])
         return True
 
+    @property
+    def _mu(self) -> np.ndarray:
+        """Coefficient of friction of each point, shape (m,), 0 for stick."""
+        return np.where(self.friction < np.inf, self.friction, 0.0)
+
     def values_at(self, values: Sequence[np.ndarray],
                   point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
         """Return values at contact points of all ranks, shape (m, ...).
@@ -188,19 +205,16 @@ class Points:
         Returns:
             Normals, tangents, curvatures and missing penetrations.
         """
-        m = len(self.point_ids)
-        found = np.zeros(6 * m)
-        frame = ToolFrame(found[:2 * m].reshape(m, 2), found[2 * m:4 * m].reshape(m, 2), found[4 * m:5 * m],
-                          found[5 * m:])
+        c = self._components
+        found = np.zeros((len(self.point_ids), c + c + 2))
         for f, k, i, law in self._owned:
             near = law.nearest(positions[f][i])
-            N = (force[k] * near.normal).sum(1) / self._scale[k]
+            N = np.einsum("ni,ni->n", force[k], near.normal) / self._scale[k]
             depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
-            frame.normal[k], frame.tangent[k], frame.curvature[k] = near.normal, near.tangent, near.curvature
-            frame.beyond[k] = depth - near.distance
-        if self._comm.size > 1:
-            found[:] = self._comm.allreduce(found, MPI.SUM)
-        return frame
+            found[k, :c], found[k, c:-2], found[k, -2] = near.normal, near.tangent, near.curvature
+            found[k, -1] = depth - near.distance
+        found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
+        return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
         """Return the components of vectors normal and tangential to the tools.
@@ -242,16 +256,15 @@ class Points:
             New forces F, and the change of force outside the factorised tangent, dF - S dx, shape (m, 2) each. If no
             such forces exist, the second is NaN and F is `force`.
         """
-        F, extra = np.empty(force.shape), np.empty(force.shape)
-        if compiled().forces_at_end(*self._given(near), address(u), address_of_integers(status), address(force),
-                                    address(to), address(F), address(extra)):
+        N, mu = self.parts(force, near)[0], self._mu
+        slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
+        try:
+            small = self._small(u + (self._C @ force.ravel()).reshape(u.shape), near,
+                                force * (status != ContactStatus.FREE)[:, None])
+            F, dx = self._solved(small, status, near, to, slips)
+        except np.linalg.LinAlgError:
             return force, np.full(force.shape, np.nan)
-        return F, extra
-
-    def _given(self, near: ToolFrame) -> tuple:
-        """Return the points as arguments of the functions in C."""
-        arrays = (_SEARCH, self._C, self._S, self.friction, self.elastic_slip, self._pulls, *near)
-        return len(self.friction), *map(address, arrays)
+        return F, F - force - np.einsum("nij,nj->ni", self._S, dx)
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -269,10 +282,69 @@ class Points:
             Rates of the forces F, shape (m, 2); rates outside the factorised tangent, dF - S dx, shape (m, 2);
             statuses, shape (m,). None if no admissible statuses were found.
         """
-        F, extra, status = np.empty(force.shape), np.empty(force.shape), np.array(status, dtype=int)
-        failed = compiled().admissible_rates(*self._given(near), address(u), address_of_integers(status),
-                                             address(force), address(F), address(extra))
-        return None if failed else (F, extra, status)
+        (N, T), here = self.parts(force, near), status != ContactStatus.FREE
+        try:
+            small = self._small(u, near, force)
+        except np.linalg.LinAlgError:
+            return None
+        slack = here & (np.abs(N).max(initial=0.0) * _SEARCH.limit >= N) & ~self._pulls
+        for begin in (status, np.where(slack, ContactStatus.FREE, status)):
+            found = self._agreed(small, begin.copy(), near, N, T, here)
+            if found is not None:
+                F, dx, status = found
+                return F, F - np.einsum("nij,nj->ni", self._S, dx), status
+        return None
+
+    def _agreed(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame, N: np.ndarray,
+                T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Search for contact statuses whose rates of force and motion satisfy Coulomb's law (active set).
+
+        Args:
+            small: condensed motion of the points.
+            status: first statuses, shape (m,), changed in place.
+            near: geometry of the tools.
+            N: normal forces, shape (m,).
+            T: tangential forces, shape (m,).
+            here: mask of the closed points, shape (m,).
+
+        Returns:
+            Rates of the forces and of the positions, shape (m, 2) each, and statuses; None if the search failed.
+        """
+        seen, mu = set(), self._mu
+        compliance = self._C.diagonal().reshape(len(N), -1).mean(1)
+        for k in range(_SEARCH.tries):
+            try:
+                F, dx = self._solved(small, status, near)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(F).all():
+                return None
+            (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
+            negligible = _SEARCH.limit * (np.abs(N).max() + _SEARCH.comparison_length * np.abs(dN).max())
+            other, miss = status.copy(), np.zeros(len(N))
+            slides = held & (status != ContactStatus.STICKS) & (mu > 0)
+            turns = slides & (status * along < -_SEARCH.none * np.abs(along).max())
+            other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
+            most = mu * ((1 - _SEARCH.limit) * N - negligible)
+            at_limit = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
+            sense = np.where(np.abs(T) > mu * negligible, np.sign(T), np.sign(dT))
+            over = sense * dT - mu * dN
+            slips = at_limit & (over > _SEARCH.none * np.abs(dT).max())
+            other[slips], miss[slips] = sense[slips], (over * compliance)[slips]
+            opens = held & ~self._pulls & (negligible >= N) & (dN < 0)
+            other[opens], miss[opens] = ContactStatus.FREE, -(dN * compliance)[opens]
+            closes = here & ~held & (into > 0)
+            sense = np.where(along[closes] < 0, ContactStatus.SLIDES_BACK, ContactStatus.SLIDES)
+            other[closes] = np.where(self.friction[closes] < np.inf, sense, ContactStatus.STICKS)
+            miss[closes] = into[closes]
+            changes = np.flatnonzero(other != status)
+            if not len(changes):
+                return F, dx, status
+            if k >= _SEARCH.all_at_once or status.tobytes() in seen:
+                changes = changes[[np.argmax(miss[changes])]]
+            seen.add(status.tobytes())
+            status[changes] = other[changes]
+        return None
 
     def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
                                                                                                         np.ndarray]:
@@ -288,7 +360,84 @@ class Points:
             Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
             change.
         """
-        after = np.empty(len(status), dtype=int)
-        time = compiled().next_change(*self._given(near), address_of_integers(status), address(force), address(rate),
-                                      address_of_integers(after))
-        return time, after
+        if not len(status):
+            return np.inf, status
+        (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
+        negligible = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
+        times, other = np.full(len(status), np.inf), status.copy()
+        opens = held & ~self._pulls & (dN < 0) & (negligible < N)
+        times[opens], other[opens] = -N[opens] / dN[opens], ContactStatus.FREE
+        k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
+        mu = self.friction[k]
+        for sense in (ContactStatus.SLIDES, ContactStatus.SLIDES_BACK):
+            margin, closing = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
+            slips = (closing > 0) & (margin > _SEARCH.limit * mu * np.abs(N[k]))
+            t = np.divide(margin, closing, out=np.full(len(k), np.inf), where=slips)
+            first = t < times[k]
+            times[k[first]], other[k[first]] = t[first], sense
+        first = int(np.argmin(times))
+        after = status.copy()
+        after[first] = other[first]
+        return float(times[first]), after
+
+    def _small(self, u: np.ndarray, near: ToolFrame, force: np.ndarray) -> ReducedSystem:
+        """Return the condensed motion of the points by u and by contact forces, with the contact stiffness S removed.
+
+        The stiffness of forces that rotate with a curved tool is included.
+
+        Args:
+            u: motion along the tangent of the path, shape (m, 2).
+            near: geometry of the tools.
+            force: present contact forces, shape (m, 2).
+        """
+        N, T = self.parts(force, near)
+        n, t = near.normal, near.tangent
+        turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
+        size, stiffness = len(self._C), self._S - turn
+        if not stiffness.any():
+            return ReducedSystem(u.ravel(), self._C, turn)
+        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), stiffness).reshape(size, size)
+        found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
+        return ReducedSystem(found[:, 0], found[:, 1:], turn)
+
+    def _solved(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame,
+                to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Solve the condensed equations for the contact forces at given statuses.
+
+        Args:
+            small: condensed motion of the points.
+            status: contact statuses, shape (m,).
+            near: geometry of the tools.
+            to: target motion of sticking points, shape (m, 2), length; None: solve for rates.
+            slips: compliance of elastic slip of the points, shape (m,), or None.
+
+        Returns:
+            Forces, or their rates without `to`, and motions of the points, shape (m, 2) each.
+        """
+        free, C, turn = small
+        held, m, c = status != ContactStatus.FREE, len(status), self._components
+        stuck = held & (status == ContactStatus.STICKS) & (self.friction > 0)
+        sticks, slides = np.flatnonzero(stuck), np.flatnonzero(held & ~stuck)
+        mu = self._mu
+        # one unknown force per direction: normal and tangent of sticking points, Coulomb's cone edge of sliding points
+        point = np.concatenate([sticks, sticks, slides])
+        into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
+        along = (mu * status)[slides, None] * near.tangent[slides]
+        against = np.concatenate([into[:2 * len(sticks)], near.normal[slides] + along])
+        each, columns = np.arange(len(point))[:, None], c * point[:, None] + np.arange(c)
+        A, B = np.zeros((len(point), len(free))), np.zeros((len(free), len(point)))
+        A[each, columns], B[columns, each] = into, against
+        compliance, a = A @ C @ B, np.zeros(len(point))
+        largest = np.abs(compliance).max(1, initial=0.0)
+        most = largest.max(initial=0.0)
+        stiff = np.flatnonzero(largest < _SEARCH.none * most)
+        compliance[stiff, stiff] = most                          # no motion along a support or across the axis
+        if to is not None:
+            n = 2 * len(sticks)
+            a[:n], a[n:] = np.einsum("ni,ni->n", to[point[:n]], into[:n]), near.beyond[slides]
+        if slips is not None:
+            k = each[len(sticks):2 * len(sticks), 0]
+            compliance[k, k] += slips[sticks]
+        amounts = np.linalg.solve(compliance, A @ free - a)
+        dx = (free - C @ (B @ amounts)).reshape(m, c)
+        return (B @ amounts).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx
