@@ -121,7 +121,8 @@ class ContactEventPrediction:
             closure = sequence.next(k, length)
             if closure is None:
                 break
-            if closure.time > LIMITS.closed_at_start * length and self._separates(closure.time):
+            negligible = max(LIMITS.closed_at_start * length, LIMITS.shortest)
+            if closure.time > negligible and self._separates(closure.time):
                 return closure.time - LIMITS.closed_at_start * (closure.time - before)
             before = closure.time
             allowed[closure.face] -= closure.time > LIMITS.closed_at_start * length
