@@ -422,8 +422,7 @@ class FaceContact:
         like = self.law.start(self.points)
         history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in ContactHistory._fields))
-        penalty = np.array(data["penalty"], dtype=float)[rows] if "penalty" in data else np.ones(len(rows))
-        return Memory(history, np.array(data["arrived"], dtype=bool)[rows], penalty)
+        return Memory(history, np.array(data["arrived"], dtype=bool)[rows], np.array(data["penalty"])[rows])
 
     def transfer(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:

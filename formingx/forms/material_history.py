@@ -135,9 +135,6 @@ class MaterialHistory:
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}
         q = len(self._terms.places)
-        for name in set(self._terms.material.of_motion) - set(found):        # older files do without
-            rest = np.ravel(np.asarray(self._terms.material.internal[name], dtype=float))
-            found[name] = np.tile(rest, (len(numbers), q, 1))
         if set(found) != set(self._sizes) or not np.array_equal(numbers[rows], self._numbers) \
                 or any(v.shape != (len(numbers), q, self._sizes[name]) for name, v in found.items()):
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
