@@ -52,7 +52,7 @@ class _Numbered(MultiFunction):
     expr = MultiFunction.reuse_if_untouched
 
     def label(self, label: Label) -> Label:
-        """Return the label that replaces `label`."""
+        """Return the numbered label that replaces a label of UFL, whose own number depends on earlier expressions."""
         return self._labels.setdefault(label, Label(len(self._labels)))
 
 

@@ -93,7 +93,7 @@ class Approach:
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             True if a point on any rank is in contact.
@@ -110,7 +110,7 @@ class Approach:
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             direction: derivative of the unknowns by arc length, shape (n,).
             slope: derivative of the control by arc length.
             length: largest arc length.
@@ -140,7 +140,7 @@ class Approach:
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             direction: derivative of the unknowns by arc length, shape (n,).
             slope: derivative of the control by arc length.
             length: arc length of the step.
@@ -187,7 +187,7 @@ class Approach:
             old: locally owned unknowns at the start of the step, shape (n,).
             old_control: control at the start of the step.
             new: locally owned unknowns at its end, shape (n,).
-            control: control at its end.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             True if the step is too long.
@@ -212,7 +212,7 @@ class Approach:
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
@@ -224,7 +224,7 @@ class Approach:
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             True if the pressure was updated. False if both pressures agree to `StepLimits.pressure_difference`, or
@@ -285,7 +285,7 @@ class Approach:
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             True if both happened in the step, on any ranks.
@@ -308,7 +308,7 @@ class Approach:
             old: locally owned unknowns at the start of the step, shape (n,).
             old_control: control at the start of the step.
             new: locally owned unknowns at its end, shape (n,).
-            control: control at its end.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             True if a path cuts the tool deeper than allowed, see `cuts`.
@@ -342,15 +342,16 @@ class Approach:
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:
-        """Return the fraction of a step at which the gap of a point closed that then slipped wrongly.
+        """Return the fraction of a step after which the first point closed its gap and then slipped wrongly.
 
         Pressure and slip since the gap closure are assumed to grow at their rates at the end of the step, along
-        (direction, slope). A sticking point is wrong if it slid too far without friction. A point with Coulomb friction
-        is wrong if its final sliding opposes the accumulated slip.
+        (direction, slope). A sticking point without a predicted gap closure carries no friction in the step. It slips
+        wrongly if it moved farther along the tool than `StepLimits.largest_slip` allows. A point with Coulomb friction
+        slips wrongly if its final sliding opposes the accumulated slip.
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
             direction: derivative of the unknowns by arc length at the end, shape (n,).
             slope: derivative of the control by arc length at the end.
             length: arc length of the step.

@@ -119,7 +119,7 @@ class FaceContact:
 
         Args:
             fields: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             Reference position plus displacement minus travel of the tool, shape (n, components), length.
@@ -144,7 +144,7 @@ class FaceContact:
 
         Args:
             fields: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
         """
         return self.increment.tractions(self.positions(fields, control))
 
@@ -186,7 +186,7 @@ class FaceContact:
 
         Args:
             old: locally owned unknowns of the accepted state; None: the increment only evaluates states.
-            control: control of the accepted state.
+            control: load parameter (control) of the accepted state, dimensionless.
         """
         if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
             self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
@@ -204,7 +204,7 @@ class FaceContact:
         Args:
             values: locally owned entries of the residual F, changed in place.
             fields: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
         """
         self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
 
@@ -214,7 +214,7 @@ class FaceContact:
         Args:
             values: locally owned entries of the residual F; the linearised minus the actual contact forces are added.
             fields: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
         """
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
@@ -223,7 +223,7 @@ class FaceContact:
 
         Args:
             fields: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             ahead: True for the derivative towards the next step at an accepted state, where just closed points are
                 stiff.
 
@@ -338,7 +338,7 @@ class FaceContact:
 
         Args:
             x: locally owned unknowns of the state.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             start: not used.
         """
         if self._memory is None or not self.present:
@@ -434,7 +434,7 @@ class FaceContact:
             source: the same contact on the other mesh.
             memory: its history variables, or None.
             x: locally owned unknowns of the state on this mesh.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             mapping: function that maps points of the other mesh to this mesh.
         """
         if memory is None:

@@ -20,7 +20,7 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Depth, length; 0 if no point is inside the tool.
@@ -32,13 +32,13 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
     """Return the reference length of the part of the face that is in contact; in three dimensions its reference area.
 
-    The node on the axis carries hardly any force and may have a small gap where its neighbours stick. It counts as in
-    contact if the point next to it does.
+    In an axisymmetric body the node on the axis carries hardly any force. It may have a small gap where its neighbours
+    stick. It counts as in contact if the next contact point does.
 
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Length; in three dimensions area, length^2.
@@ -57,7 +57,7 @@ def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Deformed area of the part of the face that is in contact, length^2.
@@ -74,7 +74,7 @@ def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Force, shape (components,), stress length^2; in plane strain per depth, stress length.
@@ -89,7 +89,7 @@ def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Sum of the normal forces, stress length^2; in plane strain per depth, stress length.
@@ -103,7 +103,7 @@ def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Energy, stress length^3; in plane strain per depth, stress length^2.
@@ -121,7 +121,7 @@ def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.
     Args:
         face: the contact.
         fields: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         Reference positions of the m points of all ranks, shape (m, components), length. Normal and tangential traction

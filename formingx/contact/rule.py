@@ -297,7 +297,7 @@ class Gauss:
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values at the nodes of each point, shape (n, 3), to the points, shape (n,).
+        """Interpolate values at the three nodes of the facet of each point, shape (n, 3), to the points, shape (n,).
 
         A uniform field stays uniform to the last bit.
         """
@@ -323,7 +323,9 @@ class Gauss:
 
 
 def _along(edges: np.ndarray) -> np.ndarray:
-    """Return dx/ds (0 <= s <= 1 along the edge) at the ends and the middle of edges, shape (m, 3, components)."""
+    """Return dx/ds at the first end, the second end and the middle of edges, shape (m, 3, components).
+
+    edges: positions of these three nodes of m edges, same shape, length. s increases from 0 to 1 along an edge."""
     a, b, m = edges.transpose(1, 0, 2)
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 

@@ -110,7 +110,7 @@ class TrialStep(NamedTuple):
 
     Attributes:
         x: unknowns at the state, locally owned entries, shape (n,).
-        control: control at the state.
+        control: load parameter (control) of the state, dimensionless.
         direction: derivative of x by arc length, shape (n,).
         slope: derivative of the control by arc length.
         length: arc length of the step, dimensionless.
@@ -200,13 +200,14 @@ class StepLimit:
     def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length of a step along a tangent.
 
-        The step ends where the first gap closes, or where the allowed number of new points has come into contact.
+        The step ends where the allowed number of points has closed their gaps (`Approach.at_once`; more if events are
+        predicted). If at most one point is in contact, it ends at the first gap closure.
 
         Args:
             trial: the trial step, with the wanted arc length.
 
         Returns:
-            Arc length, at most `trial.length`.
+            Arc length, dimensionless, at most `trial.length`.
         """
         found = trial.events.step_length(trial.length) if trial.events else None
         if found is not None:

@@ -70,7 +70,7 @@ class Tooling(NamedTuple):
 
         Args:
             setting: step data of the state, as plain data of a `StepData`; empty for the reference configuration.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             Travel of each tool along its direction of motion, length; None for an inactive tool.

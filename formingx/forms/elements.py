@@ -48,7 +48,7 @@ def body(problem: Any, x: Any, control: float) -> Body | None:
     Args:
         problem: the `Problem`.
         x: unknowns of the state.
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
 
     Returns:
         The elements; None for a membrane, which has no elements across its thickness.

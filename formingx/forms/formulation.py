@@ -388,7 +388,7 @@ class Formulation(BodyModel):
         """Return the process time at a control, for the present step data.
 
         Args:
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Process time.

@@ -36,7 +36,7 @@ class Histories:
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
         """
         raise NotImplementedError
 
@@ -107,7 +107,7 @@ class Histories:
         Args:
             start: state at the beginning of the step.
             x: unknowns at its end, locally owned entries, shape (n,).
-            control: control at its end.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             History variables of materials and temperature at the end of the step.

@@ -13,7 +13,7 @@ class Start(Protocol):
 
     Attributes:
         x: unknowns, locally owned entries, shape (n,).
-        control: dimensionless control.
+        control: load parameter (control), dimensionless.
     """
 
     x: np.ndarray
@@ -44,7 +44,7 @@ class History(Protocol):
 
         Args:
             x: unknowns of the state, locally owned entries, shape (n,).
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             start: state at the beginning of the step that ends now, or None.
         """
 
@@ -93,7 +93,7 @@ class History(Protocol):
             source: history of the same part in the other problem, which is set to the state of `memory`.
             memory: history variables of `source` in that state.
             x: unknowns of this problem, to which its forms are set, locally owned entries, shape (n,).
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
 
         Returns:

@@ -148,7 +148,7 @@ class MaterialHistory:
             source: history of the material on the other mesh.
             memory: its history variables.
             x: unknowns of this problem, locally owned entries.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
 
         Returns:

@@ -69,7 +69,7 @@ class StepData:
 
         Args:
             number: number of the item; -1 for the process time.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Amplitude, or process time.
@@ -81,7 +81,7 @@ class StepData:
 
         Args:
             number: number of the load.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The amplitude, 0 for an inactive load; while forces fade, the amplitude of a changed load times the control
@@ -96,7 +96,7 @@ class StepData:
         """Return the amplitudes of the items and the process time.
 
         Args:
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Amplitudes, then the process time.

@@ -102,10 +102,10 @@ class Solid(Formulation):
         return found
 
     def set_stiff(self) -> None:
-        """Set `w` to 0, or to a small stretch u = s X if bending stiffness is below round-off.
+        """Set the unknowns `w` to a first guess: 0, or in a very thin sheet a small uniform stretch u = s X.
 
-        The stress of the stretch stiffens a thin sheet as a membrane. The stretch is interpolated because the unknowns
-        of bubbles are no nodal values.
+        The bending stiffness of such a sheet is below round-off; the stress of the stretch stiffens it as a membrane.
+        The stretch is interpolated because the unknowns of bubbles are no nodal values.
         """
         super().set_stiff()
         if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:

@@ -49,17 +49,18 @@ class StepError:
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Estimate the time integration error of a step by step doubling.
 
-        Errors are root mean squares over the body, relative to the largest stress at the start, at the end or relaxed.
+        Errors are root mean squares over the body. They are divided by the largest stress: at the start of the step,
+        at its end, or in the fully relaxed body.
 
         Args:
             past: k accepted states; the step begins at the last of them.
             share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
             x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Error of the stress at the end of the step; the part that persists after another step of this length. The
-            second part adds up from step to step.
+            Relative error of the stress at the end of the step; relative error that is left after another step of this
+            length. The second error adds up from step to step.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)

@@ -24,8 +24,8 @@ class TemperatureCoefficient:
     Args:
         forms: the `Formulation`.
         values: `Function` of a quadrature element, set to f(T).
-        parts: list of (local numbers of cells, f).
-        temperatures: temperatures in the cells of each part, see `take`.
+        parts: list of (local numbers of cells, function f), a pair for each group of cells.
+        temperatures: temperatures at the q points of the cells of each group, shape (1 or 2, cells, q); see `take`.
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],
@@ -52,7 +52,7 @@ class TemperatureCoefficient:
         """Update the coefficient to changed temperatures.
 
         Args:
-            temperatures: `Temperature.now_and_before` for the cells of each part, shape (1 or 2, cells, q) each.
+            temperatures: `Temperature.now_and_before` for the cells of each group, shape (1 or 2, cells, q) each.
 
         Raises:
             InputError: f has no value at a temperature.

@@ -156,7 +156,7 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
         state: state of `source`.
         problem: problem whose history variables are set.
         x: unknowns of the same state on the mesh of `problem`, locally owned entries.
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
         moved: True if the mesh of `problem` is a mesh of the deformed body in `state`.
     """
     problem.set_fields_and_control(x, control)

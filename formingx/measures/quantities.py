@@ -27,7 +27,7 @@ class Bound:
 
         Args:
             x: unknowns of the problem (PETSc vector).
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The value, in the user's units.

@@ -54,7 +54,7 @@ class Amplitude(Bound):
 
         Args:
             x: not used.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The quantity, in the user's units.

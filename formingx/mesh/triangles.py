@@ -72,7 +72,7 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 
 
 class Triangles:
-    """The m triangles of a mesh on all ranks; collective.
+    """Sizes of the m triangles of a mesh, gathered from all ranks; collective.
 
     Args:
         mesh: the mesh.
@@ -83,7 +83,7 @@ class Triangles:
         edge: longest edges, shape (m,), length.
         area: areas, shape (m,), length^2.
         slenderness: longest edge over the height on it, shape (m,).
-        length: largest extent of the body, length.
+        length: longer side of the bounding box of the body, length.
         thickness: area of the body over its length, length.
     """
 

@@ -142,7 +142,7 @@ class Problem(Stages, Units):
         Args:
             number: number of the support in `Scene.items`.
             x: unknowns.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Force, stress times length^2; per unit depth in plane strain, stress times length.
@@ -167,7 +167,7 @@ class Problem(Stages, Units):
 
         Args:
             x: unknowns.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Dimensionless forces, locally owned field unknowns, shape (n,).
@@ -182,7 +182,7 @@ class Problem(Stages, Units):
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             Dimensionless forces, locally owned field unknowns, shape (n,).
@@ -205,7 +205,7 @@ class Problem(Stages, Units):
 
         Args:
             x: unknowns.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             True if a hoop stretch or an in-plane determinant is not positive.

@@ -157,7 +157,7 @@ class Stages(Vectors):
 
         Args:
             x: unknowns.
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The multipliers, on all ranks.

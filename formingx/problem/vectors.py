@@ -40,7 +40,7 @@ class Vectors(Histories):
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
-            control: dimensionless control.
+            control: load parameter (control), dimensionless.
         """
         self.forms.control.value = control
         self.set_fields(x)

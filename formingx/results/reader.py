@@ -62,7 +62,7 @@ class SectionReader:
         self._axisymmetric = path.scene.kinematics.axisymmetric
 
     def wall(self, state: State) -> Wall:
-        """Return the `Wall` in a state."""
+        """Return the wall thickness along the section of the part in a state."""
         return self._walls.of(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:

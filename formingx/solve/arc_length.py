@@ -57,7 +57,7 @@ class Curve(StateSolver):
 
         Args:
             rest: the unloaded state, with the first tangent of the path.
-            control: the control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The guess, locally owned entries, shape (n,).

@@ -61,7 +61,7 @@ class Standing(Protocol):
 
     Attributes:
         x: the unknowns, locally owned entries, shape (n,), dimensionless.
-        control: the dimensionless control.
+        control: load parameter (control), dimensionless.
         time: process time.
         memory: history variables of the problem after this state.
         setting: step data as plain data (`StepData`), or empty.
@@ -182,7 +182,7 @@ class Attempt(NamedTuple):
 
     Attributes:
         x: the unknowns, locally owned entries, shape (n,).
-        control: the control.
+        control: load parameter (control), dimensionless.
         dx: last correction of x.
         dcontrol: last correction of the control.
     """
@@ -363,7 +363,7 @@ class Histories(Protocol):
             past: k accepted states; the step begins at the last of them.
             share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
             x: unknowns at the end of the step.
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             Relative error at the end of the step, and the part that persists after another step of this length.

@@ -50,7 +50,7 @@ class FixedControl:
 
         Args:
             x: the guess; changed in place to the solution.
-            control: the given control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             False if the iteration did not converge; x is then meaningless.

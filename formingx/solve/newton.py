@@ -197,7 +197,7 @@ class BorderedNewton:
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """Return a context in which contact with history variables has few iterations to settle.
+        """Return a context with fewer iterations for the active set of contacts with history variables to converge.
 
         Args:
             hurried: True to allow `Newton.hurried` iterations only; False to change nothing.
@@ -213,7 +213,7 @@ class BorderedNewton:
 
         Args:
             x: unknowns of the solution.
-            control: its control.
+            control: load parameter (control) of the state, dimensionless.
             ahead: True for the one-sided derivatives of F towards the next step, where F has a kink.
 
         Returns:
@@ -246,7 +246,7 @@ class BorderedNewton:
 
         Args:
             x: unknowns of the solution.
-            control: its control.
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             False if too many points change, or the updated tangent is singular.
@@ -279,7 +279,7 @@ class BorderedNewton:
 
         Args:
             x: guess of the unknowns; changed in place to the solution.
-            control: guess of the control.
+            control: guess of the load parameter (control), dimensionless.
             constraint: the constraint c.
             old: accepted state before the guess, or None.
             chords: True to allow tangents of earlier iterations where they cost less and F has no kinks (modified

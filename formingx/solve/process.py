@@ -222,7 +222,7 @@ class Execution:
         self._trace(self._left_to_meet(), control)
 
     def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
-        """Set step data in which the amplitude of one item is the control; return the present value of the control.
+        """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
 
         numbers: numbers of the controlled item and of the items that move with it. clocked: process time passes while
         the control changes.

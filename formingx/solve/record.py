@@ -189,7 +189,7 @@ class Record:
         """Complete a step: store in the last state the data with which the run continues, and call `hooks.on_step`.
 
         Args:
-            step: step control of the next step.
+            step: control of the step length (`StepControl`) of the next step.
             until: the target that ends the run.
             entries: further data to store in `State.stepping`.
         """

@@ -15,7 +15,7 @@ class State:
 
     Attributes:
         x: the unknowns, locally owned entries, shape (n,), dimensionless.
-        control: the dimensionless control.
+        control: load parameter (control), dimensionless.
         direction: derivative of x with respect to arc length, locally owned entries, shape (n,).
         slope: derivative of the control with respect to arc length; (direction, slope) is the unit tangent of the path.
         measures: {name: value} of the output quantities, in the user's units.

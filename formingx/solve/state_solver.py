@@ -49,7 +49,7 @@ class StateSolver:
 
         Args:
             x: change of the unknowns.
-            control: change of the control.
+            control: change of the load parameter (control), dimensionless.
 
         Returns:
             Length of the straight line, dimensionless.
@@ -127,7 +127,7 @@ class StateSolver:
 
         Args:
             x: unknowns of the solution, locally owned entries, shape (n,).
-            control: its control.
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             The state, of kind "start", with the tangent of the path under the present step data of the problem.
@@ -147,7 +147,7 @@ class StateSolver:
 
         Args:
             x: guess of the unknowns, locally owned entries, shape (n,).
-            control: guess of the control.
+            control: guess of the load parameter (control), dimensionless.
             constraint: the constraint, such as control = 0.1.
             kind: kind of the new state (`State.kind`).
             before: accepted state before the guess; the tangent of the new state points away from it.
@@ -233,7 +233,7 @@ class StateSolver:
         Args:
             bound: the quantity.
             x: unknowns, locally owned entries, shape (n,).
-            control: the control.
+            control: load parameter (control), dimensionless.
 
         Returns:
             The value, in the user's units.

@@ -129,7 +129,7 @@ class TimeError:
         Args:
             states: the accepted states; the step starts from the last one.
             x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
             The ratio; 0 if no time passes in the step.

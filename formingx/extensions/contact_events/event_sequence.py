@@ -419,7 +419,7 @@ class ContactEventSequence:
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
     def _moved(self, time: float, piece: _Segment) -> _Segment | None:
-        """Return a segment corrected by one equilibrium iteration at an arc length; None without valid LU factors."""
+        """Return a path segment after one equilibrium iteration at the arc length `time`; None without LU factors."""
         piece, points = piece.of(len(self._points.point_ids)).after(time), self._points
         x, control, direction, slope = self._tangent
         self._work += 1

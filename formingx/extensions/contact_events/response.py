@@ -52,7 +52,7 @@ class Response:
 
         Args:
             x: unknowns at the present iterate, locally owned entries, shape (n,).
-            control: control at the present iterate.
+            control: load parameter (control) of the present iterate, dimensionless.
             forces: for each face, contact forces at its points in the residual F, shape (n, 2). NaN where the contact
                 law gives the force.
 

@@ -72,7 +72,7 @@ class PerturbedRun:
         F: residual, a PETSc vector for temporary results.
         gradient: gradient of a constraint, a PETSc vector for temporary results.
         x: locally owned unknowns of the state, shape (n,).
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
         memory: history variables of the state.
         plans: plans of the stages, see `formingx.solve.stage.plan`.
         piece_end: time at which the present piece of a stage ends.

@@ -250,7 +250,7 @@ def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
 
     Args:
         run: the `DesignRun`.
-        effects: derivatives of its wall by the parameters.
+        effects: `Effects`: derivatives of the wall thickness by the parameters.
         units: units of the labels.
         before: first run of a search, for a column with its values, or None.
     """

@@ -329,7 +329,7 @@ def _checked(name: str, test: TimedTest) -> dict[str, Any]:
         test: the test.
 
     Raises:
-        InputError: wrong or inconsistent arrays, or a first stretch without the time of its application.
+        InputError: wrong or inconsistent arrays, or a first stretch other than 1 whose time of application is unknown.
     """
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:

@@ -45,7 +45,7 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
 
 
 def _stretched(material: Any, data: dict, panel: Any) -> None:
-    """Draw stresses of tests without time over the stretch on matplotlib axes `panel`, with curves of the material."""
+    """Draw stresses of elastic tests over the stretch on matplotlib axes `panel`, with curves of the material."""
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _biaxial(material, (l, *others, P), panel)

@@ -169,7 +169,7 @@ class CoolingHistory:
 
         Args:
             x: unknowns at the end of the step, locally owned entries.
-            control: control at the end of the step.
+            control: load parameter (control) at the end of the step, dimensionless.
             start: state at the start of the step; None: the body stays as it is at the end.
         """
         until = self._forms.time_at(control)
@@ -273,7 +273,7 @@ class CoolingHistory:
             source: history of the temperature on the other mesh.
             memory: its state.
             x: unknowns of this problem, locally owned entries.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, 2), to reference points of this mesh.
 
         Returns:
@@ -312,7 +312,7 @@ def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.nda
     Args:
         body: heat equation of the body.
         touches: (`HeatContact`, contact of the problem, conductances in contact) of each tool.
-        control: control of the state, which gives the travel of the tools.
+        control: load parameter (control) of the state, dimensionless; it gives the travel of the tools.
     """
     u = body.displacements()
     for touch, contact, conductance in touches:

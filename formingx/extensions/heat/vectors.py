@@ -113,7 +113,9 @@ class HeatVectors:
         return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
-        """Return the capacity matrix over `capacity` times a change of temperature, locally owned entries, shape (n,).
+        """Return (M/c) dT, locally owned entries, shape (n,), for the capacity matrix M and the scalar c = `capacity`.
+
+        change: change of the nodal temperatures dT, shape (n,), degrees.
         """
         self._change.x.array[: self._n] = change
         self._change.x.scatter_forward()

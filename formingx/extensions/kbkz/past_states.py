@@ -133,7 +133,7 @@ class PastStates:
 
         Args:
             x: unknowns of the state, locally owned entries.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             start: state at the start of the step, or None.
         """
         (C, step, _), memory = self._now(), self._memory
@@ -159,7 +159,7 @@ class PastStates:
             source: past states on the other mesh.
             memory: history variables there.
             x: unknowns of this problem, locally owned entries.
-            control: control of the state.
+            control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to reference points of
                 this mesh.
 
@@ -249,10 +249,10 @@ class PastStates:
         """Return the past states as plain data, the same on all ranks; collective.
 
         Args:
-            memory: result of `get`.
+            memory: past states with their times, as `get` returns them.
 
         Returns:
-            Data for `load`.
+            Dictionary of numbers and arrays that `load` accepts.
         """
         numbers = gathered(self._forms.comm, self._numbers)
         order = np.argsort(numbers)

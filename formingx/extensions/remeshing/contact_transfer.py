@@ -40,8 +40,8 @@ class ContactState(NamedTuple):
 
         Args:
             face: the face on the old mesh.
-            fields: locally owned unknowns of the problem.
-            control: control of the state.
+            fields: locally owned unknowns of the problem on the old mesh, shape (n,).
+            control: load parameter (control) of the state, dimensionless.
 
         Returns:
             The contact state.
@@ -110,7 +110,7 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
         face: the face on the new mesh, changed in place.
         old: contact state of the face on the old mesh.
         fields: locally owned unknowns of the new problem.
-        control: control of the state.
+        control: load parameter (control) of the state, dimensionless.
     """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)

@@ -155,13 +155,13 @@ class Preformed(NamedTuple):
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
-        """Return the initial unknowns on the new mesh: no displacement, and the transferred pressures.
+        """Return the initial unknowns on the new mesh: zero displacements, and transferred pressure fields.
 
         Args:
             problem: the `Problem` on the new mesh.
 
         Returns:
-            Locally owned entries of `Problem.x`.
+            Locally owned entries of `Problem.x`, shape (n,).
         """
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]

@@ -418,7 +418,7 @@ def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, Con
 def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
     """Return the points of the outline that get small elements, shape (k, 2), length.
 
-    These are the corners between two faces under tools, and the ends of contact areas.
+    These are the corners between two boundaries that have contacts, and the ends of contact areas.
 
     Args:
         edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.

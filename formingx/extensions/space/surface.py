@@ -99,10 +99,10 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return the check of the volume ratio in a step, which a membrane always passes since J > 0.
+        """Return the admissibility check of a membrane (`Formulation.admissible`): every state passes, since J > 0.
 
         Returns:
-            A check that holds in every state.
+            Object with the methods of `Admissible`.
         """
         return _Always()
 

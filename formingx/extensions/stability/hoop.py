@@ -39,7 +39,7 @@ class HoopResultants(Sheet):
 
     @property
     def compressed(self) -> np.ndarray:
-        """Mask of the points with a negative resultant, shape (n,)."""
+        """Mask of the points with a negative hoop stress resultant (compression), shape (n,)."""
         return self.resultant < 0
 
     @property

@@ -195,7 +195,7 @@ def _shown(point: CriticalPoint) -> str:
 
 
 class StabilityAnalysis:
-    """Counts unstable modes in states of one path; keeps the matrices of each mesh.
+    """Number of unstable modes in the states of a path; stores the stiffness and mass matrices of each mesh.
 
     Args:
         path: the `Path`.

@@ -86,13 +86,13 @@ class TopLoad:
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
-        """Return force and travel of the neck when a mode with a number of waves first buckles.
+        """Return the force on the pressed neck and its travel at which the body first buckles with a number of waves.
 
         Args:
             number: number of waves round the axis.
 
         Returns:
-            (force, travel), or None if no such mode buckles.
+            Total force, force; travel, length, positive downwards. None if the body does not buckle so.
         """
         point = self.of(number)
         return None if point is None else (point.state.measures["support_force"], -point.control)

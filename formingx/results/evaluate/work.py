@@ -246,7 +246,7 @@ class EnergyBalance:
         Args:
             contact: the `FaceContact`.
             fields: all unknowns, locally owned entries.
-            control: the control.
+            control: load parameter (control), dimensionless.
         """
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:

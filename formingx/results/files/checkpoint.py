@@ -345,7 +345,8 @@ def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
-    """Return {attribute of `Profile`: its value} in a state, for a report without the scene; None without a sheet."""
+    """Return {attribute of `Profile`: its value} in a state, for reports that are made without the `Scene`; None if
+    the body is no sheet."""
     try:
         profile = path.profile(state)
     except InputError:
