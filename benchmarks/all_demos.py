@@ -84,10 +84,10 @@ def read(folder: Path, demo: str) -> dict[str, Any] | None:
 
 
 def write(stored: dict[str, Any]) -> None:
-    """Write the stored numbers, to 9 digits, a demo a line."""
+    """Write the stored numbers, to 7 digits, a demo a line."""
     for found in stored.values():
         for demo, values in found.items():
-            found[demo] = {key: float(f"{v:.9g}") if isinstance(v, float) else v for key, v in values.items()}
+            found[demo] = {key: float(f"{v:.7g}") if isinstance(v, float) else v for key, v in values.items()}
     kinds = [f'"{kind}": {{\n' + ",\n".join(f'"{demo}": {json.dumps(found[demo], separators=(",", ":"))}'
                                           for demo in sorted(found)) + "\n}" for kind, found in sorted(stored.items())]
     STORED.write_text("{\n" + ",\n".join(kinds) + "\n}\n")
