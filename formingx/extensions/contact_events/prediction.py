@@ -115,17 +115,16 @@ class ContactEventPrediction:
         The step ends before a gap closure if a point that sticks at its start separates earlier: the later closures
         depend on this point, which the prediction keeps closed.
         """
-        sequence, before = self._sequence, 0.0
+        sequence, before, at_start = self._sequence, 0.0, LIMITS.closed_at_start * length
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
         for k in range(2 * sum(allowed)):
             closure = sequence.next(k, length)
             if closure is None:
                 break
-            negligible = max(LIMITS.closed_at_start * length, LIMITS.shortest)
-            if closure.time > negligible and self._separates(closure.time):
+            if closure.time > max(at_start, LIMITS.shortest) and self._separates(closure.time):
                 return closure.time - LIMITS.closed_at_start * (closure.time - before)
             before = closure.time
-            allowed[closure.face] -= closure.time > LIMITS.closed_at_start * length
+            allowed[closure.face] -= closure.time > at_start
             if not allowed[closure.face]:
                 return min(LIMITS.overshoot * closure.time, length)
         else:
@@ -133,7 +132,7 @@ class ContactEventPrediction:
         if sequence.exhausted:
             log.info("the contact events of this step took too many iterations: it takes one gap closure")
             return None
-        if sequence.stops or sequence.ends <= LIMITS.closed_at_start * length:
+        if sequence.stops or sequence.ends <= at_start:
             return None
         return min(LIMITS.overshoot * sequence.ends, length)
 
