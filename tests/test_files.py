@@ -30,7 +30,7 @@ from formingx.results.files import checkpoint_data
 from formingx.results.files.description import describe
 from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
-from formingx.results.show import animation, report
+from formingx.results.show import animation, plots, report
 from formingx.results.show.picture import Picture
 
 
@@ -444,6 +444,27 @@ def test_a_sheet_that_creeps_under_its_weight(tmp_path):
     assert np.allclose(run["progress"], path["process_time"] / 5.0, atol=1e-4)
     path.animate(tmp_path / "run.gif", frames=2)
     assert animation.columns_of_stages(path) == {"sag": ("process_time", "pole_height")}
+
+
+def test_a_part_that_recovers_has_its_height_over_time():
+    """All tools are inactive: their travels are constant, their forces 0."""
+    names = ["process_time", "plug_travel", "plug_force", "pole_height"]
+    states = [SimpleNamespace(stage="recovery", measures=dict(zip(names, (t, 6.0, 0.0, 9.0 - t)))) for t in (0.0, 1.0)]
+    found = animation.columns_of_stages(SimpleNamespace(states=states, columns=names))
+    assert found == {"recovery": ("process_time", "pole_height")}
+
+
+def test_labels_of_all_stages_have_room_in_an_animation(formed, monkeypatch):
+    """The force of the second stage has longer numbers than the pressure of the first."""
+    figures, plain = [], plots.figure
+    monkeypatch.setattr(plots, "figure", lambda *size, **more: figures.append(plain(*size, **more)) or figures[-1])
+    curves = {("pole_height", "pressure"): ([0, 1], [0, 1]), ("process_time", "mould_force"): ([0, 1], [0, 12345.6])}
+    shape = formed.profile()
+    animation._draw([shape] * 2, [[]] * 2, [(names, (0, 0)) for names in curves], curves, True, fx.Units())
+    (figure, (_, loading)), = figures
+    bar = figure.axes[-1]
+    assert loading.get_ylabel() == "mould force"
+    assert loading.yaxis.label.get_window_extent().x0 > bar.yaxis.label.get_window_extent().x1
 
 
 def test_findings_name_the_control_of_their_stage(formed, tmp_path):

@@ -79,7 +79,7 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
     """Return the columns of the loading curve of each stage.
 
     Pressures and travels that are constant in the stage are left out. If all are constant, the curve shows a force
-    over the process time.
+    over the process time, or the pole height if the forces are constant, too.
 
     Args:
         path: the computed `Path`.
@@ -92,11 +92,12 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
         values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}
         moving = [c for c, v in values.items() if np.ptp(v) > 0 or not c.endswith(("travel", "pressure"))]
         driven = any(c.endswith(("travel", "pressure")) for c in moving)
+        timed = np.ptp(values.get("process_time", 0.0)) > 0
         over_time = next((c for c, v in values.items() if c.endswith("force") and np.ptp(v) > 0), None)
-        if not driven and over_time and np.ptp(values.get("process_time", 0.0)) > 0:
+        if not driven and timed and over_time:
             found[stage] = "process_time", over_time
         else:
-            found[stage] = plots.main_columns(moving if driven else path.columns)
+            found[stage] = plots.main_columns(moving if driven or timed else path.columns)
     return found
 
 
@@ -123,8 +124,8 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     figure, (sheet, loading) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=sheet, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
-    pictures: list[Any] = []
-    for shape, ratio, tool, (names, point) in zip(shapes, ratios, tools, now):
+
+    def draw(shape, ratio, tool, names, point):
         sheet.clear()
         sheet.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"), ylabel=units.label("z"),
                   aspect="equal")
@@ -134,10 +135,15 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
             plots.section(sheet, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
         _curve(loading, names, curves[names], point, units)
         figure.canvas.draw()
-        if not pictures:
-            figure.set_layout_engine("none")                # or the axes would shift from frame to frame
-        pictures.append(Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB"))
-    return pictures
+        return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
+
+    def width(names):
+        """Return the width that the labels of a loading curve leave for it, as a part of the figure."""
+        draw(shapes[0], ratios[0], tools[0], names, (curves[names][0][0], curves[names][1][0]))
+        return loading.get_position().width
+    width(min(curves, key=width))
+    figure.set_layout_engine("none")                        # or the axes would shift from frame to frame
+    return [draw(shape, ratio, tool, *curve) for shape, ratio, tool, curve in zip(shapes, ratios, tools, now)]
 
 
 def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], units: Units) -> None:
