@@ -446,6 +446,14 @@ def test_a_sheet_that_creeps_under_its_weight(tmp_path):
     assert animation.columns_of_stages(path) == {"sag": ("process_time", "pole_height")}
 
 
+def test_forces_of_round_off_are_0_in_the_table_of_stages(plugged):
+    record = report.of_path(plugged)
+    force = np.abs(record.forces["plug"]).max()
+    record.forces = {"floor": np.where(np.array(record.stages) == "up", force, 1e-14 * force)}
+    down, up = re.findall(r"<tr>.*?</tr>", report._stages(record, fx.Units()))[1:]
+    assert ">0<" in down and "e-1" not in down and f">{force:.6g}<" in up
+
+
 def test_a_part_that_recovers_has_its_height_over_time():
     """All tools are inactive: their travels are constant, their forces 0."""
     names = ["process_time", "plug_travel", "plug_force", "pole_height"]

@@ -126,6 +126,6 @@ def lines(text: str) -> str:
     return html.escape(text).replace("\n", "<br>")
 
 
-def number(value: float) -> str:
-    """Return a number as text with six significant digits."""
-    return f"{value:.6g}"
+def number(value: float, scale: float = 0.0) -> str:
+    """Return a number as text with six significant digits; below 1e-9 of a scale it is 0, because of round-off."""
+    return f"{0.0 if abs(value) < 1e-9 * scale else value:.6g}"

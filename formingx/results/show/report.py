@@ -315,7 +315,7 @@ def _stages(record: Record, units: Units) -> str:
         last = record.profiles[mine[-1]]
         gap = max((v[0] for v in record.gaps([mine[-1]]).values()), default=None) if last is not None else None
         rows.append([words(stage), str(len(mine) - 1), str(iterations), *(page.number(record.measures[c][mine[-1]])
-                     for c in columns), *(page.number(f[mine][np.argmax(np.abs(f[mine]))]) for f in
+                     for c in columns), *(page.number(max(f[mine], key=abs), np.abs(f).max()) for f in
                      record.forces.values()), "" if gap is None else page.number(gap),
                      "" if last is None else page.number(last.wall_ratio.min())])
     return page.table(["stage", "states", "iterations of accepted steps",
