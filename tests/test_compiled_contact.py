@@ -70,3 +70,19 @@ def test_law_of_many_points_is_the_law_of_each(mu, pulls, predicted):
     np.testing.assert_array_equal(found.sense, sliding)
     np.testing.assert_allclose(found.history.distance, distance, rtol=0, atol=1e-15)
     np.testing.assert_allclose(found.history.slip, slip, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, "each"])
+def test_law_of_some_points_has_their_penalties_and_friction(mu):
+    """Also after the law of all points was evaluated, and with other coefficients of friction."""
+    rng, n, some = np.random.default_rng(5), 20, np.array([7, 2, 11])
+    x = rng.uniform(0, 1.2, (n, 2))
+    near = TOOL.nearest(x)
+    x = x - near.normal * (near.distance - THETA * rng.uniform(-0.5, 2, n))[:, None]
+    mu = rng.uniform(0.1, 0.5, n) if mu == "each" else mu
+    law = Law(TOOL, mu, rng.uniform(10, 100, n), THETA, SLIP)
+    old = ContactHistory(x - SLIP * rng.normal(size=(n, 2)), np.full(n, THETA), SLIP * rng.normal(size=n), x)
+    part = ContactHistory(*(values[some] for values in old))
+    for whole in (law, law.with_friction(0.2), law.with_friction(rng.uniform(0.1, 0.5, n))):
+        force = whole.tractions(x, old).force
+        np.testing.assert_allclose(whole.part(some).tractions(x[some], part).force, force[some], rtol=1e-12)

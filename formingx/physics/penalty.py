@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, Self
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class Law(NormalLaw):
         self.elastic_slip, self.pulls = elastic_slip, pulls
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
+        self._constants: tuple | None = None
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """Return a copy of the law with other coefficients of friction.
@@ -63,7 +65,9 @@ class Law(NormalLaw):
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.has_history = self.has_friction or self.pulls
-        self._constants: tuple | None = None
+
+    def _with(self, **other: Any) -> Self:
+        return super()._with(_constants=None, **other)
 
     def _given(self) -> tuple:
         """Return the constants of the law as arguments of the functions in C, stored for repeated calls."""
