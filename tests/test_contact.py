@@ -135,6 +135,20 @@ def test_a_shear_limit_of_ones_own():
     assert np.abs(found.tangential).max() == pytest.approx(strength)
 
 
+def test_a_contact_has_the_shear_limit_of_its_class():
+    """Coulomb's law by default, evaluated with the other equations; a subclass's own limit if it has one."""
+    class Lubricated(fx.Contact):
+        def shear_limit(self, pressure, mu):
+            return 0.5 * mu * pressure, 0.5 * mu
+    x, tangent = points_near(TOOL, SIDES)
+    old = ContactHistory(x, np.full(len(x), -2 * THETA), np.zeros(len(x)), x - 20 * SLIP * tangent)
+    for kind, share in ((fx.Contact, 1.0), (Lubricated, 0.5)):
+        law = kind("bottom", TOOL, 0.3, ramp=THETA, elastic_slip=SLIP).law(K, 1.0, np.full((len(x), 2), [0.0, -9.0]))
+        found = law.tractions(x, old)
+        assert found.normal.max() > 0
+        np.testing.assert_allclose(np.abs(found.tangential), share * 0.3 * found.normal, rtol=1e-9)
+
+
 @pytest.mark.parametrize("mu", [0.3, np.inf])
 def test_an_accepted_state_keeps_its_forces(mu):
     law = Law(TOOL, mu, K, THETA, SLIP)

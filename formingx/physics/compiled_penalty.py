@@ -22,7 +22,7 @@ void tractions(long, const double *, const double *, long, const double *, long,
 _SOURCE = r"""
 #include <math.h>
 
-enum {THETA, ELASTIC_SLIP, PULLS, REMEMBERS, FRICTION, SLIDES, STICKS};
+enum {THETA, ELASTIC_SLIP, PULLS, FRICTION, SLIDES, STICKS};
 
 /* ramp F(d) of eq. (5.13) and its derivative; of contact that does not separate max(d + theta, 0), or d + theta */
 static double pressure(double d, double theta, int pulls, int bonded, double *slope)
@@ -110,7 +110,7 @@ void tractions(long points, const double *law, const double *k, long k_step, con
                 stiffness[4 * i + 2 * a + b] = n[a] * (stiff * n[b] - bent * curvature[i] * t[b])
                                              + t[a] * (pressed * curvature[i] * t[b] + dT[b]);
         }
-        kept_distance[i] = law[REMEMBERS] && bonded && d < 0 ? 0.0 : d;
+        kept_distance[i] = bonded ? fmax(d, 0.0) : d;
         kept_slip[i] = kept;
         resistance[i] = s;
     }

@@ -229,7 +229,7 @@ class Contact(Part):
         edge = (1 - RAMP_EDGE * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + edge, 0.0)
         mu = self.friction_at(temperature, clamped=True)
-        shear_limit: Callable | None = self.shear_limit
+        shear_limit = self.shear_limit if type(self).shear_limit is not Contact.shear_limit else None
         if self.separates and isinstance(mu, float) and mu == math.inf:
             mu, shear_limit = _ROUGH, None
         return Law(self.tool, mu, k, theta, elastic_slip, shift, not self.separates, shear_limit)

@@ -72,7 +72,7 @@ class Law(NormalLaw):
     def _given(self) -> tuple:
         """Return the constants of the law as arguments of the functions in C, stored for repeated calls."""
         if self._constants is None:
-            flags = (self.pulls, self.has_history, self.has_friction, self._slides)
+            flags = (self.pulls, self.has_friction, self._slides)
             each = [(np.array(value, dtype=float, ndmin=1), np.ndim(value)) for value in (self.k, self.mu)]
             self._constants = (address(np.array([self.theta, self.elastic_slip, *flags, STICKS])),
                                *(argument for value, stride in each for argument in (address(value), stride)))

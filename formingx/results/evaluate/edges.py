@@ -48,7 +48,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             if contact.contact.lagged or contact.contact.sticks or not contact.contact.separates:
                 continue
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)
-            slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.law.shear_limit(
+            slides = (law.normal != 0) & (np.abs(law.tangential) >= 0.99 * contact.contact.shear_limit(
                 np.abs(law.normal), contact.law.mu)[0])
             slides &= contact.displacement(free).any(axis=1)
             normal = contact.contact.tool.nearest(x).normal
