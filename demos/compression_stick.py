@@ -66,8 +66,8 @@ def main():
     fine = np.linspace(0, DEFLECTIONS[-1], 100)
     axes.plot(fine, lindley(fine), "k--", label="Lindley (7.9)")
     axes.plot(fine, tanner(fine), "k:", label="Tanner (7.11)")
-    axes.set(xlabel="total deflection, cm", ylabel="force, N")
-    axes.legend(frameon=False)
+    axes.set(xlabel="total deflection, cm", ylabel="force, N", ylim=(0, 2.2 * lindley(fine[-1])))
+    axes.legend(frameon=False, loc="upper right")
     save(figure, args.out / "force.png")
     summarise(args.out, {**summary, "mesh": {"elements": [n, n]}, "versions": files.versions()})
 

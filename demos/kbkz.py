@@ -23,8 +23,10 @@ PULLED = {"uniaxial": ("top", "z"), "equibiaxial": ("rim", "r")}
 SHEET = [(0.10, 0.01), (0.06, 0.1), (0.03, 1.0), (0.012, 10.0), (0.004, 100.0)]
 DAMPINGS = {"psm_10_0.05": fx.PSM(alpha=10.0, beta=0.05), "wagner_0.1_0.15": fx.Wagner(alpha=0.1, beta=0.15),
             "wagner_0.1_0.3": fx.Wagner(alpha=0.1, beta=0.3)}
-TITLES = {"lodge": "Lodge, no damping", "wagner": "Wagner", "psm": "PSM", "psm_10_0.05": "PSM, 10, 0.05",
-          "wagner_0.1_0.15": "Wagner, 0.1, 0.15", "wagner_0.1_0.3": "Wagner, 0.1, 0.3"}
+TITLES = {"lodge": "Lodge, no damping", "wagner": "Wagner", "psm": "PSM",
+          "psm_10_0.05": r"PSM, $\alpha$ = 10, $\beta$ = 0.05",
+          "wagner_0.1_0.15": r"Wagner, $\alpha$ = 0.1, $\beta$ = 0.15",
+          "wagner_0.1_0.3": r"Wagner, $\alpha$ = 0.1, $\beta$ = 0.3"}
 MET, R_OVER_H, VOLUME = (0.5, 1.0, 3.0), 100.0, 2.0                               # s; R0/h0; of R0^3
 
 
@@ -100,7 +102,8 @@ def main():
             + f" at {', '.join(found['p_R0_over_h0'])} s; {path.counts.steps} steps")
         axes[2].plot(path["process_time"], R_OVER_H * path["pressure"], label=TITLES[damping])
     axes[0].legend(frameon=False)
-    axes[2].set(xlabel="time, s", ylabel="p R$_0$/h$_0$, MPa", title="inflated discs", ylim=(0, None))
+    axes[2].set(xlabel="time, s", ylabel="p R$_0$/h$_0$, MPa", title="inflated discs",
+                ylim=(0, 1.3 * axes[2].get_ylim()[1]))
     axes[2].legend(frameon=False)
     save(figure, args.out / "kbkz.png")
     summarise(args.out, summary | {"accuracy": accuracy, "versions": files.versions()})

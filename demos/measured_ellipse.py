@@ -94,7 +94,7 @@ def draw(path, rows, file):
     axes[0].get_gridspec().set_width_ratios([1, 2])         # the film is twice as long as wide
     wall = path.wall()
     lines = axes[0].tricontourf(*wall.now[:, :2].T, wall.triangles, wall.now[:, 2], levels=np.arange(0, 13))
-    axes[0].plot(*np.array(PLACES).T, "w+", clip_on=False)
+    axes[0].plot(*np.array(PLACES).T, "ko", markerfacecolor="w", markersize=5, clip_on=False)
     axes[0].set(xlabel="x, mm", ylabel="y, mm", aspect="equal", title="rise, mm")
     figure.colorbar(lines, ax=axes[0])
     for k, (law, places) in enumerate(rows.items()):

@@ -65,10 +65,12 @@ def main():
             summary["walls_inside_the_95_percent_band"] = float(inside)
             figure, axes = plots.figure(1, width=7)
             for k, one in enumerate(runs):
-                axes.plot(run.profile.reference_length, one.wall, color="0.8", lw=0.6,
+                axes.plot(run.profile.reference_length, one.wall, color="0.6", lw=0.4,
                           label=None if k else f"{SAMPLES} samples")
             band.plot(axes, color="C0", label="wall of the run")
-            axes.set(xlabel="reference length / radius of the cup", ylabel="wall / radius of the cup", ylim=(0, None))
+            for edge in (band.low, band.high):
+                axes.plot(band.coordinates, edge, "C0--", lw=1)
+            axes.set(xlabel="reference length / radius of the cup", ylabel="wall / radius of the cup")
             axes.legend()
             save(figure, args.out / "uncertain_wall.png")
     run.report(args.out / "report.html", "A cup of uncertain constants", deviations=given)
