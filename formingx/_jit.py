@@ -126,11 +126,11 @@ def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
     kind, symbol = (("ufcx_form", naming.form_name(item, 0, name)) if isinstance(item, ufl.Form) else
                     ("ufcx_expression", naming.expression_name(item, name)))
     try:
-        library = ctypes.CDLL(str(folder / f"{name}.so"))
-        address = ctypes.addressof(ctypes.c_char.in_dll(library, symbol))
+        opened = ctypes.CDLL(str(folder / f"{name}.so"))
+        pointer = ctypes.addressof(ctypes.c_char.in_dll(opened, symbol))
     except (OSError, ValueError):
         return None
-    return ffi.cast(f"{kind} *", address)[0], SimpleNamespace(ffi=ffi, library=library), (None, None)
+    return ffi.cast(f"{kind} *", pointer)[0], SimpleNamespace(ffi=ffi, library=opened), (None, None)
 
 
 @functools.cache
@@ -243,7 +243,7 @@ def _command(jit_options: dict[str, Any]) -> list[str]:
              "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
     libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]
     return [*(_compiler() or ()), *(flag for flag in flags if not flag.startswith("-W")), f"-I{get_include_path()}",
-            "-shared", "-x", "c", "-", *(f"-l{library}" for library in libraries)]
+            "-shared", "-x", "c", "-", *(f"-l{name}" for name in libraries)]
 
 
 @functools.cache

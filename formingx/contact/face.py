@@ -319,8 +319,8 @@ class FaceContact:
 
     def _start_at(self, x: np.ndarray) -> None:
         """Set the history variables of points that begin at positions x relative to the tool, shape (n, c), length."""
-        new = Memory(self.law.start(x), np.zeros(len(x), dtype=bool), np.ones(len(x)))
-        self._take(new if self.has_history else None)
+        n = len(x)
+        self._take(Memory(self.law.start(x), np.zeros(n, dtype=bool), np.ones(n)) if self.has_history else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
         """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.arrival`).

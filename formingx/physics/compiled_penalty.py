@@ -25,7 +25,7 @@ _SOURCE = r"""
 enum {THETA, ELASTIC_SLIP, PULLS, FRICTION, SLIDES, STICKS};
 
 /* ramp F(d) of eq. (5.13) and its derivative; of contact that does not separate max(d + theta, 0), or d + theta */
-static double pressure(double d, double theta, int pulls, int bonded, double *slope)
+static double ramp_at(double d, double theta, int pulls, int bonded, double *slope)
 {
     if (pulls) {
         *slope = bonded || d > -theta;
@@ -38,7 +38,7 @@ static double pressure(double d, double theta, int pulls, int bonded, double *sl
 void ramp(long points, double theta, long pulls, const double *d, const double *bonded, double *F, double *slope)
 {
     for (long i = 0; i < points; i++)
-        F[i] = pressure(d[i], theta, pulls, bonded && bonded[i], slope + i);
+        F[i] = ramp_at(d[i], theta, pulls, bonded && bonded[i], slope + i);
 }
 
 /* elastic slip g that sticking points would have at x, and its gradient dg */
@@ -75,7 +75,7 @@ void tractions(long points, const double *law, const double *k, long k_step, con
         const double *n = normal + 2 * i, t[2] = {-n[1], n[0]};
         double penalty = k[i * k_step], d = distance[i], centre = expected ? expected[i] : d, slope;
         int bonded = law[PULLS] && before && before[i] > -theta;
-        double F = pressure(centre, theta, law[PULLS], bonded, &slope);
+        double F = ramp_at(centre, theta, law[PULLS], bonded, &slope);
         double pressed = penalty * F, ahead = d - centre, stiff = penalty * slope;
         double dT[2] = {0.0, 0.0}, bent = 0.0, kept = 0.0, s = 0.0;
         N[i] = pressed + stiff * ahead;

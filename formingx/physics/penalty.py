@@ -107,8 +107,8 @@ class Law(NormalLaw):
             F, shape (n,), length; dF/dd, shape (n,).
         """
         F, slope = np.empty(len(d)), np.empty(len(d))
-        held = NULL if bonded is False else address(bonded)
-        compiled().ramp(len(d), self.theta, self.pulls, address(d), held, address(F), address(slope))
+        mask = NULL if bonded is False else address(bonded)
+        compiled().ramp(len(d), self.theta, self.pulls, address(d), mask, address(F), address(slope))
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:

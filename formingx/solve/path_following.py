@@ -424,11 +424,11 @@ class Run:
         record = self.record
         try:
             record.accept(state)
-        except InadmissibleState as unusable:
+        except InadmissibleState as inadmissible:
             if not self.states:
                 raise
             self._give_up("at {} {:.6g}: {}; allow_inadmissible=True goes on".format(
-                *self.problem.shown(state.control), unusable), hint="")
+                *self.problem.shown(state.control), inadmissible), hint="")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
         self.aim.accept(state)

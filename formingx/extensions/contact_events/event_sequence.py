@@ -423,7 +423,7 @@ class ContactEventSequence:
         piece, points = piece.of(len(self._points.point_ids)).after(time), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
-        forces = [np.where(free[:, None], 0.0, np.full_like(x, np.nan)) for free, x in zip(self._free, piece.positions)]
+        forces = [np.where(free[:, None], 0.0, np.full_like(y, np.nan)) for free, y in zip(self._free, piece.positions)]
         points.spread(piece.force, forces)
         change = self._response.to_equilibrium(
             x + time * direction + piece.correction[0] - points.columns @ piece.extra.ravel(),
