@@ -341,11 +341,11 @@ def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarr
     Args:
         law: the contact law.
         x: positions relative to the tool at the start of the step, shape (n, 2).
-        touch: history variables of the points at the start of the step.
+        history: history variables of the points at the start of the step.
         end: positions relative to the tool at the end of the step, shape (n, 2).
 
     Returns:
-        Slip so far, in the units of `touch.slip`.
+        Slip so far, in the units of `history.slip`.
     """
     nearest, outer_edge = law.nearest(end), -law.theta
     touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
