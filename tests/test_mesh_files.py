@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.mesh import check
+from formingx.mesh import boxes, check
 from formingx.mesh.boxes import overlapping
 
 SQUARE = """$MeshFormat
@@ -295,9 +295,11 @@ def test_tangled_meshes_are_refused(change, words):
         moved(change).check()
 
 
+@pytest.mark.parametrize("largest", [0, boxes._MAX_DIRECT], ids=["tree", "direct"])
 @pytest.mark.parametrize("shape", ["scattered", "a row", "a column", "all over each other"])
-def test_overlapping_boxes_are_found(shape):
+def test_overlapping_boxes_are_found(shape, largest, monkeypatch):
     """Each pair once, the same as by looking at all of them."""
+    monkeypatch.setattr(boxes, "_MAX_DIRECT", largest)
     random = np.random.default_rng(3)
     for n in (1, 2, 3, 64, 65, 200):
         low = random.uniform(0, 1, (n, 2)) * {"a row": (1, 0), "a column": (0, 1)}.get(shape, (1, 1))
@@ -305,6 +307,37 @@ def test_overlapping_boxes_are_found(shape):
         found = sorted(tuple(sorted(pair)) for i, j in overlapping(low, high) for pair in zip(i.tolist(), j.tolist()))
         assert found == [(i, j) for i in range(n) for j in range(i + 1, n)
                          if np.all((low[i] <= high[j]) & (low[j] <= high[i]))]
+
+
+@pytest.mark.parametrize("grid", [4, 1000], ids=["many touch", "few touch"])
+def test_crossing_edges_are_found(grid):
+    """Random polygons with corners on a grid: the same pairs of edges as in integers, without round-off.
+
+    Two edges meet if they cross, or if an end of one, which is no node of the other, lies on the other.
+    """
+    random = np.random.default_rng(4)
+
+    def turn(a, b, c):
+        return np.sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+    def meet(e, f):
+        (a, b), (c, d) = corners[list(e)], corners[list(f)]
+        if turn(a, b, c) * turn(a, b, d) < 0 and turn(c, d, a) * turn(c, d, b) < 0:
+            return True
+        ends = [(p - x, q - x) for edge, other, p, q in ((e, f, c, d), (f, e, a, b))
+                for node, x in zip(edge, corners[list(edge)]) if node not in other]
+        return any(u[0] * v[1] == u[1] * v[0] and u @ v <= 0 for u, v in ends)
+    number = 0
+    for _ in range(150):
+        n = int(random.integers(3, 13))
+        corners = random.integers(0, grid, (n, 2))
+        edges = [(i, (i + 1) % n) for i in range(n) if np.any(corners[i] != corners[(i + 1) % n])]
+        found = check.crossings(0.1 * corners, np.array(edges)) if edges else ()
+        pairs = sorted((min(pair), max(pair)) for rows in found for pair in rows.tolist())
+        assert pairs == [(i, j) for i in range(len(edges)) for j in range(i + 1, len(edges))
+                         if meet(edges[i], edges[j])]
+        number += len(pairs)
+    assert number > 500
 
 
 def test_a_long_row_of_elements_takes_no_long_look(monkeypatch):
