@@ -78,10 +78,24 @@ def test_a_soft_layer_of_long_elements():
     assert layered(50).healthy and layered(20, concentrate={1.0: 0.3}).healthy
 
 
-def test_numbers_of_findings_have_units():
-    """Lengths, stresses and forces of every check before a run; a force of plane strain is per depth."""
-    assert " MPa, press the face" in str(fx.check(formed(penalty=1e-3), units=MM))
-    assert re.search(r"fillet of radius 0.1 mm .* is 0.157 mm long", str(fx.check(formed(elements=(4, 1)), units=MM)))
+@pytest.mark.parametrize("make, target, words", [
+    (lambda: formed(penalty=1e-3), [], "over length, 0.262 MPa, press the face"),
+    (lambda: formed(elements=(4, 1)), [],
+     r"fillet of radius 0.1 mm .* is 0.157 mm long, .* elements of the face \(0.31. mm each\)"),
+    (lambda: formed(tool=fx.tools.cup(radius=1250.0, depth=400.0, mouth=82.0, fillet=100.0)), [],
+     "the tool is 482 mm away from a body of length 1.25 mm"),
+    (lambda: formed(tool=fx.tools.cup(radius=1250.0, depth=400.0, mouth=82.0, fillet=100.0).moved(z=-460.0)), [],
+     "the tool is 2.5e.03 mm large, the body 1.25 mm:"),
+    (lambda: treloar(), [fx.pole_height(1000.0)], "800 times the length of the body, 1.25 mm:"),
+    (lambda: pushed(), [fx.force(1e9)], "shear modulus x thickness x length = 0.41 N:"),
+    (lambda: layers(1.0), [], r"shear modulus 2e.06 MPa\) is 1e.06 times stiffer than 'b' \(2 MPa\)"),
+])
+def test_numbers_of_findings_have_units(make, target, words):
+    """Lengths, stresses and forces of every check before a run."""
+    assert re.search(words, str(fx.check(make(), targets=target, units=MM)))
+
+
+def test_a_force_of_plane_strain_is_per_depth():
     strip = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(8, 1)), materials=fx.NeoHookean(c10=2.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], kinematics=fx.PlaneStrain(),
                      contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), direction=(0, -1))])
@@ -288,11 +302,14 @@ def test_triangles_too_slim_for_the_element():
     assert fx.check(thick(15, elements=(320, 2))).healthy and fx.check(thick(100, elements=(20, 8))).healthy
 
 
-def test_layers_and_nothing_driven():
+def layers(pressure):
     mesh = fx.mesh.disc(radius=1.0, thickness={"a": 0.5, "b": 0.5}, elements=(4, (1, 2)))
-    scene = fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=1e6), "b": fx.NeoHookean(c10=1.0)},
-                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", 1e12)])
-    report = fx.check(scene)
+    return fx.Scene(mesh=mesh, materials={"a": fx.NeoHookean(c10=1e6), "b": fx.NeoHookean(c10=1.0)},
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", pressure)])
+
+
+def test_layers_and_nothing_driven():
+    report = fx.check(layers(1e12))
     assert [f.severity for f in report.findings] == ["warning"] * 4
     for words in ("nothing is driven", "layer 'a': it is 0.5 of the body's length thick", "1e+06 times stiffer",
                   "units of stress"):

@@ -89,6 +89,8 @@ REFUSED = [
     (lambda: fx.trace(scene(), until=fx.pressure(0.1), progress=np.zeros(2)), "progress = .*must be True or False"),
     (lambda: fx.trace(scene(), until=fx.pressure(0.1), remesh=fx.instability()),
      "remesh = .*must be a formingx.Remesh"),
+    (lambda: fx.Process(scene()).run([fx.Stage("a", duration=1.0)], remesh=fx.instability()),
+     "Process: remesh = .*must be a formingx.Remesh"),
     (lambda: fx.trace(scene(), until=fx.pressure(0.1), stop_at=fx.Remesh(size=0.1)),
      "stop_at = Remesh.*must be fx.instability"),
     (lambda: fx.solve(scene(), to=0.1, increments=10**12),
