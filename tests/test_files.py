@@ -431,6 +431,7 @@ def test_runs_with_and_without_time_side_by_side(formed, tmp_path):
         gaps, = (chart for chart in drawn(tmp_path / "both.html")["charts"] if chart["title"].startswith("Gap"))
         assert gaps["x"] == "pressure, kg/cm2" and len(gaps["traces"]) == 2
         assert gaps["traces"][0]["y"][-1] == pytest.approx(gaps["traces"][1]["y"][-1], rel=1e-2)
+    assert report.of_path(timed).control(1) == "process_time" and report.of_path(formed).control(1) == "pressure"
 
 
 def test_a_sheet_that_creeps_under_its_weight(tmp_path):
@@ -444,6 +445,17 @@ def test_a_sheet_that_creeps_under_its_weight(tmp_path):
     assert np.allclose(run["progress"], path["process_time"] / 5.0, atol=1e-4)
     path.animate(tmp_path / "run.gif", frames=2)
     assert animation.columns_of_stages(path) == {"sag": ("process_time", "pole_height")}
+
+
+def test_a_sheet_that_sags_as_its_weight_grows(tmp_path):
+    """A run without time, pressure and travel: the load over the pole height."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Gravity(1e-3)])
+    path = fx.trace(scene, until=fx.pole_height(-0.05), progress=False)
+    path.animate(tmp_path / "run.gif", frames=2)
+    assert animation.columns_of_stages(path) == {"": ("pole_height", "load")}
+    # without a pole and a stored energy, as a K-BKZ body
+    assert plots.main_columns(["process_time", "volume_error"]) == ("process_time", "volume_error")
 
 
 def test_forces_of_round_off_are_0_in_the_table_of_stages(plugged):
@@ -481,13 +493,19 @@ def test_findings_name_the_control_of_their_stage(formed, tmp_path):
     n, half = len(formed), len(formed) // 2
     assert record.control(n - 1) == "pressure"
     later = np.arange(n) - half
+    record.findings = []
     record.stages = ["plug"] * half + ["blow"] * (n - half)
     record.measures = {"air_pressure": np.maximum(later, 0), "plug_travel": np.minimum(np.arange(n), half - 1),
-                       **record.measures, "penetration": np.zeros(n), "mass_error": np.where(np.arange(n) > 1, 0.1, 0)}
+                       **record.measures, "penetration": np.zeros(n), "volume_error": np.where(later > 1, 0.5, 0),
+                       "mass_error": np.where(np.arange(n) > 1, 0.1, 0)}
     assert (record.control(1), record.control(n - 1)) == ("plug_travel", "air_pressure")
     assert "from state 2 on ('plug', plug travel = 2)" in " ".join(record.warnings())
+    assert f"50 % (state {half + 2}, air pressure = 2)" in " ".join(record.warnings())
     report.write(record, tmp_path / "run.html", "", None, MPI.COMM_WORLD, fx.Units("mm", "MPa"))
     assert "state kind plug travel, mm air pressure, MPa iterations" in page(tmp_path / "run.html")
+    rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in report._iterations(record, fx.Units()).split("</tr>")]
+    shown = {row[0]: row[2:4] for row in rows if row}
+    assert shown["1"] == ["1", ""] and shown[str(n - 1)] == ["", str(n - 1 - half)]
 
 
 def test_largest_vacuum(tmp_path):
