@@ -30,7 +30,7 @@ MASS = 1e-3
 FRAMES = 100
 """Approximate number of drawn states."""
 
-_CONTROLS = "pressure", "travel", "displacement"
+CONTROLS = "pressure", "travel", "displacement"
 """Endings of the columns of controlled quantities."""
 
 
@@ -108,7 +108,7 @@ class Record:
         """
         first, end = next(ends for ends in self.stage_ranges if state < ends[1])
         changes = [c for c, v in self.measures.items()
-                   if c.endswith(_CONTROLS) and np.ptp(v[first:end]) > 1e-9 * np.ptp(v)]
+                   if c.endswith(CONTROLS) and np.ptp(v[first:end]) > 1e-9 * np.ptp(v)]
         return changes[0] if changes and not self.timed else next(iter(self.measures))
 
     @property
@@ -358,7 +358,7 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
-    driven = [c for c in measures if c.endswith(_CONTROLS)]
+    driven = [c for c in measures if c.endswith(CONTROLS)]
     columns = ["process_time"] if np.ptp(clock) > 0 else driven
     for column in columns:
         values = measures[column]

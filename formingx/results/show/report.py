@@ -25,7 +25,7 @@ from .. import files
 from ..evaluate.part import Part, part
 from ..evaluate.wall import Wall
 from . import interactive, page
-from .record import Record, of_checkpoint, of_path, words
+from .record import CONTROLS, Record, of_checkpoint, of_path, words
 
 
 def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, names: Sequence[str] | None = None,
@@ -303,10 +303,9 @@ def _key_numbers(record: Record, units: Units) -> str:
     return page.table(head, rows)
 
 
-
 def _stages(record: Record, units: Units) -> str:
     """Return a table with one row per stage: states, iterations, controls at its end, tool forces, gap and wall."""
-    columns = [c for end in ("pressure", "travel", "displacement") for c in record.measures if c.endswith(end)]
+    columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
     for stage in dict.fromkeys(record.stages):
@@ -369,13 +368,14 @@ def _convergence(record: Record) -> str:
 
 def _iterations(record: Record, units: Units) -> str:
     """Return a table of the Newton iterations of each drawn state: control, corrections and last residual."""
-    rows, controls = [], list(dict.fromkeys(map(record.control, record.frames)))
-    for k in record.frames:
-        kind, history, control = record.kinds[k], record.histories[k], record.control(k)
+    controls = {k: record.control(k) for k in record.frames}
+    rows, columns = [], list(dict.fromkeys(controls.values()))
+    for k, control in controls.items():
+        kind, history = record.kinds[k], record.histories[k]
         corrections = ", ".join(f"{row[1]:.1e}" for row in history[:-1])
-        rows.append([str(k), kind, *(page.number(record.measures[c][k]) if c == control else "" for c in controls),
+        rows.append([str(k), kind, *(page.number(record.measures[c][k]) if c == control else "" for c in columns),
                      str(max(len(history) - 1, 0)), corrections, f"{history[-1][0]:.1e}" if history else ""])
-    head = ["state", "kind", *map(units.label, controls), "iterations", "corrections", "last residual"]
+    head = ["state", "kind", *map(units.label, columns), "iterations", "corrections", "last residual"]
     return page.table(head, rows)
 
 
