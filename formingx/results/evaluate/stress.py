@@ -369,9 +369,9 @@ class Stresses:
         mass: Any = 0
         rhs: Any = 0
         column = {name: k for k, name in enumerate(self.cells)}
-        for body in bodies:
-            parts = self._parts(body[1])
-            for name in body[1]:
+        for _, names in bodies:
+            parts = self._parts(names)
+            for name in names:
                 k, dx = column[name], forms.dx(mesh.layers[name])
                 mass += trial[k] * test[k] * dx
                 rhs += sum(self._selector[i] * f for i, f in enumerate(self._F)) * test[k] * dx
