@@ -58,7 +58,7 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
         if error.path is None or len(error.path) < 3:
             raise
         first = error.path
-        log.warning("the pilot run ended early, at %s; the mesh is adapted to the states before",
+        log.warning("the pilot run ended early, at %s; the mesh is adapted to its states",
                     first.describe(first.last))
     adapted = meshes.make(first, options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(

@@ -7,8 +7,8 @@ import numpy as np
 from .._jit import address, address_of_integers
 from .compiled import compiled
 
-_CHUNK = 2**18     # pairs that are compared at a time
-_MAX_DIRECT = 1024 # largest number of boxes whose pairs are compared without a tree
+_CHUNK = 2**18      # pairs that are compared at a time
+_MAX_DIRECT = 1024  # largest number of boxes whose pairs are compared without a tree
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -145,7 +145,9 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """Return the middle of an edge that crosses or touches another without sharing a node, shape (2,), or None.
+    """Return the middle of an edge that crosses another, or touches it anywhere but in a common node, or None.
+
+    The middle has the shape (2,), length.
 
     Args:
         points: ends of the edges, shape (n, 2), length.
@@ -156,7 +158,7 @@ def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
 
 
 def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the pairs of edges that cross or touch without sharing a node.
+    """Yield the pairs of edges that cross, or touch anywhere but in a common node.
 
     Args:
         points: ends of the edges, shape (n, 2), length.

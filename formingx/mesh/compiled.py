@@ -51,7 +51,7 @@ static int on(const double *x, const double *p, const double *q)
     return u * u + v * v <= 1e-18 * length;
 }
 
-/* found[k]: whether the edges first[k] and second[k] cross or touch without sharing a node */
+/* found[k]: whether the edges first[k] and second[k] cross, or touch anywhere but in a common node */
 void cross(long pairs, const long *first, const long *second, const double *points, const long *edges, double *found)
 {
     for (long k = 0; k < pairs; k++) {
