@@ -321,7 +321,7 @@ REFUSED = [
         ({"columns": ["a", ["b"]]}, r"compare: columns: column = \['b'\]: must be a name"),
         ({"columns": 3}, "compare: columns = 3: must be a list of names"),
         ({"units": {"a": "cm"}}, "does not state the unit of column 'a'")]),
-    (lambda: fx.compare(GOOD, {"a": [1, 2], "b": [1]}), "as long as each other"),
+    (lambda: fx.compare(GOOD, {"a": [1, 2], "b": [1]}), "^compare: theirs: columns must be as long as each other"),
     (lambda: fx.compare(GOOD, {"a": ["x"], "b": [1]}), "numbers"),
     (lambda: fx.compare({"a": T, "b": T**2}, {"a": T[::-1], "b": T[::-1] ** 2}, along="arc length"), "backwards"),
     (lambda: fx.compare({"a": T * np.cos(T), "b": T * np.sin(T)}, {"a": (T * np.cos(T))[::-1],

@@ -197,6 +197,8 @@ def test_ring_under_outer_pressure():
     assert repr(found.first).startswith("CriticalPoint(n=2, lost at pressure 0.0112")
     with pytest.raises(InputError, match="CriticalPoint.view3d: file 'mode.svg'"):
         found.first.view3d("mode.svg")
+    with pytest.raises(InputError, match="^CriticalPoint.view3d: scale = 0: must be greater than 0"):
+        found.first.view3d("mode.png", scale=0)
 
 
 def test_what_is_formed_is_silent():
