@@ -8,6 +8,7 @@ from .._jit import address, address_of_integers
 from ..errors import InputError
 from .boxes import overlapping
 from .compiled import compiled
+from .edges import edges_of
 
 _MIN_LENGTH = 1e-50                      # lengths whose squares are still numbers
 _MAX_LENGTH = 1e50                        # lengths whose products are still numbers
@@ -132,11 +133,10 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
     Raises:
         InputError: two elements lie on the same side of an edge.
     """
-    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    side = np.where(ends[:, 0] < ends[:, 1], 1, -1) * np.tile(turn, 3)   # side of the element
-    edges, place, times = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    directed, edges, numbers, times = edges_of(triangles)
+    side = np.where(directed[:, 0] < directed[:, 1], 1, -1) * np.tile(turn, 3)           # side of the element
     sides = np.zeros(len(edges))
-    np.add.at(sides, place.ravel(), side)
+    np.add.at(sides, numbers, side)
     overlaps = (times > 2) | (times == 2) & (sides != 0)
     if overlaps.any():
         raise InputError(f"{what}: elements lie over each other at {_show(points[edges[overlaps][0]].mean(0))}: each"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES
 from ...mesh.sizes import GROWTH
 
@@ -53,10 +54,10 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
     triangles: node numbers, shape (m, 3).
     """
-    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+    numbers = edges_of(triangles)[2]
     triangle = np.tile(np.arange(len(triangles)), 3)
-    order = np.lexsort(edges.T)
-    same = (edges[order[1:]] == edges[order[:-1]]).all(1)
+    order = np.argsort(numbers, kind="stable")
+    same = numbers[order[1:]] == numbers[order[:-1]]
     return np.column_stack([triangle[order[:-1]][same], triangle[order[1:]][same]])
 
 
@@ -68,7 +69,7 @@ def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.n
         triangles: node numbers, shape (m, 3).
         size: edge lengths of triangles at the nodes, shape (n,), length.
     """
-    a, b = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]).T
+    a, b = edges_of(triangles)[1].T
     reach = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:
         before = size.copy()

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...io.stl import volume
+from ...mesh.edges import edges_of
 
 
 def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
@@ -65,22 +66,6 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
     triangles = same.ravel()[triangles]
     a, b, c = triangles.T
     return points[first], triangles[(a != b) & (b != c) & (c != a)]
-
-
-def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the edges of triangles, and the number of triangles at each edge.
-
-    Args:
-        triangles: vertex numbers of m triangles, shape (m, 3).
-
-    Returns:
-        Edges of all triangles in the order of their vertices, the first of each triangle first, shape (3 m, 2). Then
-        the k distinct edges with ascending vertex numbers, shape (k, 2). Then the number of the distinct edge for each
-        of the 3 m edges, shape (3 m,). Last the number of triangles at each distinct edge, shape (k,).
-    """
-    directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges, numbers, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return directed, edges, numbers.ravel(), times
 
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import figures
 from ...errors import InputError
+from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES
 from ...results import files
 from ...results.show import interactive, page
@@ -20,7 +21,6 @@ from ...results.show.report import PROCESS, scripts
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
-from .bodies import edges_of
 from .wall import wall_of
 
 _DRAWN, _FRAMES = 200_000, (10, 100)

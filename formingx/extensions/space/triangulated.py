@@ -9,7 +9,8 @@ import numpy as np
 
 from ...errors import InputError, direction, instance, place, positive
 from ...io.stl import volume
-from .bodies import edges_of, merged, separate_bodies
+from ...mesh.edges import edges_of
+from .bodies import merged, separate_bodies
 from .solid_tool import SolidTool
 
 

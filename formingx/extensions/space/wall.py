@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, direction, pair, positive, triple
+from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...ranks import gathered
 from ...results.files.sheet import Sheet
-from .bodies import edges_of
 from .surface import wrinkled
 
 
