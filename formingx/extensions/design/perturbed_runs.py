@@ -229,13 +229,11 @@ def settle(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation
             if iteration != 1:                               # iteration 1 checks one perturbed run, and updates none
                 run.x, run.control = run.x + dx[:, j], run.control + steps[j]
             away = _norm(problem, run.x - state.x) + abs(run.control - state.control)
-            if not np.isfinite(correction):
+            far = correction > max(_TOLERANCES.last_tolerance * away, 10 * _TOLERANCES.round_off * size)
+            if not np.isfinite(correction) or iteration == _TOLERANCES.iterations - 1 and far:
                 raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
             good &= correction <= max(tolerance * away, _TOLERANCES.round_off * size)
-            if iteration == _TOLERANCES.iterations - 1 and correction > max(_TOLERANCES.last_tolerance * away,
-                                                                            10 * _TOLERANCES.round_off * size):
-                raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
         if good:
             break
         # the error is now of second order: if the most corrected run has converged, so have the others

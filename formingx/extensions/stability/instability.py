@@ -358,10 +358,10 @@ class InstabilityCondition(RunExtension):
             state = path.last
             modes = analysis.modes_of(path.segment(state))
             for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):
-                count = modes.count(state, kind)
+                unstable = modes.count(state, kind)
                 if not (kind.number or kind.flipped):
-                    count -= state.slope * path.states[0].slope < 0      # a limit point is expected
-                if count > first.setdefault(kind, count):
+                    unstable -= state.slope * path.states[0].slope < 0      # a limit point is expected
+                if unstable > first.setdefault(kind, unstable):
                     path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
                                          f" path.stability(modes=[{kind.number:g}]) finds where")
                     return

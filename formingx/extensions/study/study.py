@@ -284,9 +284,9 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         known("study: goal", name, task.measure)
         known(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
-    checked = None if folder is None else stored_runs.checked(place("study: folder", folder), task, names)
-    found = Study(task, names, goals, checked)
-    found.runs += [] if checked is None else stored_runs.read(checked, names)
+    folder = None if folder is None else stored_runs.checked(place("study: folder", folder), task, names)
+    found = Study(task, names, goals, folder)
+    found.runs += [] if folder is None else stored_runs.read(folder, names)
     todo = [case for case in cases if not any(run.values == case for run in found.runs)]
     with pool_of(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
