@@ -207,6 +207,9 @@ def test_trim_and_printed_squares_are_exact():
     for line, (axis, at) in zip(lines, [(axis, 0.25 * k) for axis in (0, 1) for k in range(5)]):
         np.testing.assert_allclose(line[:, axis], at, atol=1e-6)
     assert wall.printed(0.25)[1].shape[1] == 3
+    for size in (1e-3, 1e-200):                                  # a size in metres, of a sheet in millimetres
+        with pytest.raises(fx.InputError, match=f"size = {size}.* more than 500000 squares .* sides are 1 and 1"):
+            wall.printed(size)
 
 
 def test_ranks():

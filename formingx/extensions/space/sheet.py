@@ -17,7 +17,9 @@ from ...mesh.check import crossing
 from ...mesh.grid import Grid, counter_clockwise, to_mesh
 from ...mesh.mesh import Mesh
 
-_MOST = 500_000            # triangles
+MAX_TRIANGLES = 500_000
+"""Largest number of triangles of a sheet."""
+
 _PARTS = ("whole", "half", "quarter")
 
 
@@ -188,9 +190,9 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     lines = several("sheet: reflected", reflected, "names")
     for k, name in enumerate(lines):
         known("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
-    if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > _MOST:
-        raise InputError(f"sheet: size = {size!r}: would make more than {_MOST} triangles of the sheet, whose area is"
-                         f" {areas.sum():.4g}")
+    if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > MAX_TRIANGLES:
+        raise InputError(f"sheet: size = {size!r}: would make more than {MAX_TRIANGLES} triangles of the sheet, whose"
+                         f" area is {areas.sum():.4g}")
     words = several("sheet: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")

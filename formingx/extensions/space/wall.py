@@ -14,6 +14,7 @@ from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES, of_cells, own_cells
 from ...ranks import gathered
 from ...results.files.sheet import Sheet
+from .sheet import MAX_TRIANGLES
 from .surface import wrinkled
 
 
@@ -186,8 +187,16 @@ class WallInSpace(Sheet):
 
         Returns:
             Deformed polylines, shape (k, 3) each, length.
+
+        Raises:
+            InputError: a size that is not positive, or so small that the grid has more squares than a sheet may have
+                triangles.
         """
         size, found = positive("printed: size", size), []
+        sides = np.ptp(self.rest[:, :COORDINATES], axis=0)
+        if np.prod(sides) > MAX_TRIANGLES * size * size:
+            raise InputError(f"printed: size = {size!r}: would make more than {MAX_TRIANGLES} squares on the sheet,"
+                             f" whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
         edges = edges_of(self.triangles)[1]
         for axis in (0, 1):
             a, b = self.rest[edges[:, 0]], self.rest[edges[:, 1]]
