@@ -111,6 +111,22 @@ def non_negative(name: str, value: Any) -> float:
     return number
 
 
+def fraction(name: str, value: Any) -> float:
+    """Return a number between 0 and 1, neither 0 nor 1, as a float.
+
+    Args:
+        name: name of the argument, for the message.
+        value: the argument.
+
+    Raises:
+        InputError: the argument is not a number, or outside (0, 1).
+    """
+    number = finite(name, value)
+    if not 0 < number < 1:
+        raise InputError(f"{name} = {value!r}: must be between 0 and 1")
+    return number
+
+
 def finite(name: str, value: Any) -> float:
     """Return a finite number as a float.
 

@@ -307,6 +307,8 @@ def test_covariance_of_a_fit():
     assert band.deviation[0] == pytest.approx(np.hypot(expected, 0.02 * pressure), rel=1e-4)
     assert band.high[0] - pressure == pytest.approx(1.96 * band.deviation[0], rel=1e-3)
     assert "deviation" in str(band) and run.band(fit).plot().get_ylabel() == "wall"
+    with pytest.raises(fx.InputError, match="band: confidence = 0: must be between 0 and 1"):
+        run.band(fit, confidence=0)
     with pytest.raises(fx.InputError, match="parameter 'c10' is not known; known: c01, h"):
         fx.Design(lambda c01, h: inflated(0.2, c01, h), {"c01": 0.01, "h": 0.01}).run().spread(fit)
     bare = fx.fit(fx.MooneyRivlin, {"uniaxial": ([1.5, 2.0], [0.3, 0.5])})       # as many points as constants

@@ -129,6 +129,10 @@ def test_standard_errors_are_the_scatter_of_the_fits(relative):
     left = J @ list(fits[0].constants.values()) - stress / sizes
     assert fits[0].covariance == pytest.approx(left @ left / 58 * np.linalg.inv(J.T @ J), rel=1e-5)
     assert fits[0].undetermined == () and fits[0].points == 60
+    low, high = fits[0].intervals()["c10"]
+    assert (high - low) / 2 == pytest.approx(2.001717 * fits[0].errors["c10"])      # t of 58 degrees of freedom, 95 %
+    with pytest.raises(fx.InputError, match="intervals: confidence = 1: must be between 0 and 1"):
+        fits[0].intervals(1)
 
 
 def test_what_the_data_leave_open_is_named():

@@ -61,6 +61,7 @@ def test_a_fit_finds_what_the_wall_tells(truth):
     sure = answer.confidence
     for name, (low, high) in sure.intervals(0.99).items():
         assert low < TRUE[name] < high
+        assert (high - low) / 2 == pytest.approx(3.054540 * sure.errors[name])      # t of 12 degrees of freedom, 99 %
     wall, by = answer.best.derivative(part.of_path)
     J, left = by / part.wall[:, None], wall / part.wall - 1
     assert sure.covariance == pytest.approx(left @ left / 12 * np.linalg.inv(J.T @ J), rel=1e-6)

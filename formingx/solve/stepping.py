@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError, count, finite, positive
+from ..errors import InputError, count, fraction, positive
 from . import predictor
 from .equations import Array, Equations
 from .state import State
@@ -102,9 +102,7 @@ def allowed(caller: str, accuracy: str | float) -> float:
             raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"
                              f" or an error such as 1e-4")
         return ACCURACY[accuracy]
-    if not 0 < finite(f"{caller}: accuracy", accuracy) < 1:
-        raise InputError(f"{caller}: accuracy = {accuracy!r}: must be between 0 and 1")
-    return float(accuracy)
+    return fraction(f"{caller}: accuracy", accuracy)
 
 
 class TimeError:

@@ -1,1 +1,1 @@
-"""Constants that depend on another quantity: tables, functions of the temperature."""
+"""Constants that depend on another quantity: tables, functions of the temperature; intervals of fitted constants."""

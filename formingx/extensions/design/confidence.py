@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite
+from ...errors import InputError
+from ...values.intervals import t_intervals
 
 _OPEN = 0.25
 """Standard error over the range of a parameter above which the wall leaves it undetermined."""
@@ -58,12 +59,8 @@ class Confidence:
         Raises:
             InputError: a confidence outside (0, 1).
         """
-        from scipy.stats import t
-        if not 0 < (confidence := finite("intervals: confidence", confidence)) < 1:
-            raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
-        width = t.ppf((1 + confidence) / 2, max(self.points - len(self.names), 1))
-        return {name: (value - width * error, value + width * error)
-                for value, (name, error) in zip(self.values.tolist(), self.errors.items())}
+        values = {name: float(value) for name, value in zip(self.names, self.values)}
+        return t_intervals(values, self.errors, self.points, confidence)
 
     @property
     def undetermined(self) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite, non_negative
+from ...errors import InputError, fraction, non_negative
 from .parameters import Parameters
 
 
@@ -139,8 +139,7 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
     Raises:
         InputError: a confidence outside (0, 1), a name that is no parameter, or the run has no derivative.
     """
-    if not 0 < finite("band: confidence", confidence) < 1:
-        raise InputError(f"band: confidence = {confidence!r}: must be between 0 and 1")
+    confidence = fraction("band: confidence", confidence)
     effects = run.sensitivities(measure)
     deviation = deviations(effects.jacobian, covariance_of("band", run.parameters, given))
     return Band(effects.measure, effects.coordinates, effects.value, deviation, confidence)

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, finite, place
+from ...errors import InputError, place
 from ...figures import Axes
 from ...materials.material import Material
 from ...materials.relaxing import RelaxingMaterial
+from ...values.intervals import t_intervals
 from .fit_in_time import TimedTest, fitted_in_time
 from .fit_plot import plotted
 from .measured import read_tests
@@ -77,12 +78,7 @@ class Fit(NamedTuple):
         Raises:
             InputError: a confidence outside (0, 1).
         """
-        from scipy.stats import t
-        if not 0 < (confidence := finite("intervals: confidence", confidence)) < 1:
-            raise InputError(f"intervals: confidence = {confidence!r}: must be between 0 and 1")
-        width = t.ppf((1 + confidence) / 2, max(self.points - len(self.errors), 1))
-        return {name: (value - width * self.errors[name], value + width * self.errors[name])
-                for name, value in self.constants.items()}
+        return t_intervals(self.constants, self.errors, self.points, confidence)
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
         """Draw measured and fitted nominal stresses over the stretch; of relaxation tests over the time.
