@@ -17,7 +17,7 @@ class Polynomial(NamedTuple):
 
     coefficients: tuple
 
-    def at(self, s: float) -> Any:
+    def value(self, s: float) -> Any:
         """Return the value of the polynomial at s, a number or an array."""
         return sum(c * s**k for k, c in enumerate(self.coefficients))
 
@@ -47,4 +47,4 @@ def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomia
 
 def integral(f: Polynomial, y: Polynomial) -> float:
     """Return the integral of f dy over 0 <= s <= 1, exact if f and y are cubics."""
-    return float(sum(w * np.sum(f.at(s) * y.slope(s)) for s, w in zip(*GAUSS)))
+    return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

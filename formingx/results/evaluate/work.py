@@ -192,11 +192,11 @@ class EnergyBalance:
             n, fading = problem.n_owned, problem.fading_forces
             for s, w in zip(*GAUSS):
                 rate = x.slope(s)[:n]
-                problem.set_fields_and_control(x.at(s), control.at(s))
+                problem.set_fields_and_control(x.value(s), control.value(s))
                 for name, form in self._loads:
                     found[name] += w * self._sum(problem.assemble(form) * rate)
                 if fading is not None:
-                    unbalanced = (1 - control.at(s)) * self._energy * fading
+                    unbalanced = (1 - control.value(s)) * self._energy * fading
                     found["change"] = found.get("change", 0.0) + w * self._sum(unbalanced * rate)
         return found
 
