@@ -8,6 +8,7 @@ from test_contact import cup
 
 import formingx as fx
 from formingx import Stage, tools
+from formingx.results.evaluate import step_polynomials
 from formingx.results.evaluate import work as work_module
 
 RUBBER = fx.NeoHookean(c10=0.5)
@@ -251,3 +252,14 @@ def test_what_a_bond_holds():
     assert books["bonds"][pulled] == pytest.approx(force**2 / (2 * 5.0), rel=1e-4)
     assert books["tool"][pulled] == pytest.approx(books["strain_energy"][pulled] + books["bonds"][pulled], rel=1e-4)
     assert abs(books["bonds"][-1]) < 1e-8 and np.abs(books["unbalanced"]).max() < 1e-3 * books["tool"][pulled]
+
+
+@pytest.mark.parametrize("end", [None, -2.0])
+@pytest.mark.parametrize("start", [None, 0.5])
+def test_polynomials_of_a_step(start, end):
+    """They have the given values and slopes at the ends; the integral of y dy is exact."""
+    y = step_polynomials.interpolate(1.0, 4.0, start, end)
+    assert (y.value(0.0), y.value(1.0)) == (1.0, 4.0)
+    assert start in (None, y.slope(0.0)) and end in (None, y.slope(1.0))
+    assert len(y.coefficients) == 2 + (start is not None) + (end is not None)
+    assert step_polynomials.integral(y, y) == pytest.approx((4.0**2 - 1.0**2) / 2, rel=1e-14)
