@@ -32,6 +32,7 @@ from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
 from formingx.results.show import animation, plots, report
 from formingx.results.show.picture import Picture
+from formingx.results.show.record import progress
 
 
 @pytest.fixture(scope="module")
@@ -211,6 +212,16 @@ def test_every_stage_has_its_frames(plugged):
     """Frames are even in the process: the plug goes down by 1 and up by 0.5."""
     shown = [b.stage for _, b, _ in animation.spread(plugged, 60)]
     assert 30 <= shown.count("down") <= 50 and shown.count("up") >= 10
+
+
+def test_stages_without_time_have_their_share(monkeypatch):
+    """A plug moves in 1 s, then vacuum comes at once; the last frame shows the end of a last stage without motion."""
+    measures = {"process_time": np.array([0, 0.5, 1, 1, 1, 1]), "plug_travel": np.array([0, 1, 2, 2, 2, 2]),
+                "pressure": np.array([0, 0, 0, 0, 0.5, 1])}
+    assert progress(measures, [None] * 6) == pytest.approx([0, 0.4, 0.8, 0.8, 0.9, 1])
+    monkeypatch.setattr(animation, "progress", lambda *given: np.array([0, 0.5, 1, 1]))
+    path = SimpleNamespace(states=list(range(4)), columns=[], profile=lambda state: None)
+    assert animation.spread(path, 3) == [(0, 1, 0.0), (1, 2, 0.0), (2, 3, 1.0)]
 
 
 def test_every_stage_has_its_curve():

@@ -130,7 +130,8 @@ class Path(States):
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
         """Draw an animation of the forming: the section of the sheet and the loading curve (rank 0 writes).
 
-        The frames are evenly spaced over the process time, or else over the motion of the controls and the sheet.
+        The frames are evenly spaced over the process time, and over the change of the controls in stages without time.
+        In a run without time they are evenly spaced over the motion of the controls and the sheet.
         Between states the body follows the cubic path through them. The last frame is shown for one second more.
 
         Args:

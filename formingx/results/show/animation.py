@@ -71,7 +71,8 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
     found = []
     for s in np.linspace(0, done[-1], frames) if frames > 1 else done[-1:]:
         k = int(np.clip(np.searchsorted(done, s, side="right") - 1, 0, len(done) - 2))
-        found.append((path.states[k], path.states[k + 1], float((s - done[k]) / ((done[k + 1] - done[k]) or 1.0))))
+        gap = done[k + 1] - done[k]                         # 0 at the end only
+        found.append((path.states[k], path.states[k + 1], float((s - done[k]) / gap) if gap else 1.0))
     return found
 
 

@@ -349,7 +349,8 @@ def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAM
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    It is proportional to the process time if the time advances. Otherwise each step counts by its change of the
+    It is proportional to the process time in stages that take time. In other stages of the run, a change of a control
+    by its whole range counts as a quarter of the whole time. Without time, each step counts by its change of the
     controls, over their ranges, and by the motion of the sheet, over the total motion.
 
     Args:
@@ -358,14 +359,17 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
-    driven = [c for c in measures if c.endswith(CONTROLS)]
-    columns = ["process_time"] if np.ptp(clock) > 0 else driven
-    for column in columns:
-        values = measures[column]
-        steps[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0) / len(columns)
-    if not np.ptp(clock) > 0 and all(p is not None for p in profiles):
-        moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(profiles, profiles[1:])]
-        steps[1:] += np.array(moved) / (sum(moved) or 1.0)
+    driven = [measures[c] for c in measures if c.endswith(CONTROLS)]
+    for values in driven:
+        steps[1:] += np.abs(np.diff(values)) / (np.ptp(values) or 1.0)
+    if np.ptp(clock) > 0:
+        elapsed = np.diff(clock) / np.ptp(clock)
+        steps[1:] = np.where(elapsed > 0, elapsed, steps[1:] / 4)
+    else:
+        steps /= len(driven) or 1
+        if all(p is not None for p in profiles):
+            moved = [np.hypot(*(b.middle - a.middle).T).mean() for a, b in zip(profiles, profiles[1:])]
+            steps[1:] += np.array(moved) / (sum(moved) or 1.0)
     done = np.cumsum(steps)
     return done / done[-1] if done[-1] > 0 else np.linspace(0, 1, n)
 

@@ -16,7 +16,7 @@ const font = {family: "system-ui, Segoe UI, Roboto, sans-serif", size: 13, color
 function place(run, s) {
   const p = run.progress;
   let k = 0;
-  while (k < p.length - 2 && p[k + 1] < s) k++;
+  while (k < p.length - 2 && (p[k + 1] < s || s >= 1)) k++;              // the end is the last state
   const j = Math.min(k + 1, p.length - 1), gap = p[j] - p[k], same = run.stage[k] === run.stage[j];
   return {k, j, f: !same ? 1 : gap > 0 ? Math.min(Math.max((s - p[k]) / gap, 0), 1) : 1};
 }
