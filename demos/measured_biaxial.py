@@ -104,7 +104,7 @@ def picture(out, best, law):
     for style, label in (("o", "stress 1, measured"), ("s", "stress 2, measured"),
                          ("--", f"{law}, fitted to the uniaxial test"), ("-", f"{law}, fitted to the biaxial test")):
         axes[0].plot([], [], style, color="0.3", ms=3, lw=1, mfc="none" if style == "s" else None, label=label)
-    axes[0].legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0.0, 1.0))
+    axes[0].legend(frameon=False, fontsize=8, loc="upper left")
     save(figure, out / "measured_biaxial.png")
 
 

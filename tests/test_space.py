@@ -525,6 +525,8 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
     for name in ("stability", "work", "profile", "stress", "deformed_mesh", "springback", "contact"):
         with pytest.raises(fx.InputError, match="in three dimensions"):
             getattr(path, name)()
+    with pytest.raises(fx.InputError, match="animate: is not available yet for a sheet in three dimensions"):
+        path.animate(tmp_path / "run.gif")
     with pytest.raises(fx.InputError, match="stability.*in three dimensions"):
         fx.trace(trough(), until=fx.pressure(0.2), stop_at=fx.instability(), progress=False)
     assert fx.check(path, targets=[fx.pressure(0.2)]).findings == []

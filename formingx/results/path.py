@@ -148,6 +148,7 @@ class Path(States):
                 allowed, the body is not a sheet, or the path has one state only.
         """
         from .show import animation
+        self.section_only("animate", "use report, or view3d for each state")
         animation.animate(self, file, frames, seconds, units or NONE)
         return Picture(file)
 
