@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import InputError, finite
 from ...forms.probes import Probe, probe
+from ...mesh.sizes import length_along
 
 FACES = (("bottom", "top"), ("inner", "outer"))
 """Names of the boundaries that are the two faces of a sheet, or of the wall of a parison."""
@@ -48,7 +49,7 @@ class Profile:
 
         It is R for a flat sheet.
         """
-        return _length_along((self.reference_bottom + self.reference_top) / 2)
+        return length_along((self.reference_bottom + self.reference_top) / 2)
 
     @property
     def original_thickness(self) -> np.ndarray:
@@ -86,7 +87,7 @@ class Profile:
     @property
     def arc_length(self) -> np.ndarray:
         """Arc length of the deformed middle line from the axis to each point, shape (n,), length."""
-        return _length_along(self.middle)
+        return length_along(self.middle)
 
     def thickness_ratio_at(self, radius: float) -> float:
         """Return `thickness_ratio` at a reference radius, interpolated linearly between the bottom points.
@@ -210,8 +211,3 @@ def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _unit(vectors: np.ndarray) -> np.ndarray:
     """Return vectors, shape (n, 2), scaled to unit length."""
     return vectors / np.hypot(*vectors.T)[:, None]
-
-
-def _length_along(points: np.ndarray) -> np.ndarray:
-    """Return the arc lengths from the first point of a polyline to each of its points (n, 2), shape (n,), length."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
