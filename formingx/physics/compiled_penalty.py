@@ -119,5 +119,9 @@ void tractions(long points, const double *law, const double *k, long k_step, con
 
 
 def compiled() -> Any:
-    """Return the functions `ramp`, `elastic_slips` and `tractions` of the penalty law in C."""
+    """Compile the contact equations of the penalty law (`formingx.physics.penalty.Law`) in C, once.
+
+    Returns:
+        Library with the functions `ramp`, `elastic_slips` and `tractions`. Their arguments are addresses of arrays.
+    """
     return functions("penalty", _HEADER, _SOURCE)

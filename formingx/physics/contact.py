@@ -55,7 +55,12 @@ The last pair also belongs to every tool in three dimensions; a stiffer penalty 
 
 
 class Contact(Part):
-    """Contact of a face of the body with a rigid tool.
+    r"""Contact of a boundary of the body with a rigid tool, by a penalty k (Song 1993, eqs. (5.7) to (5.14)).
+
+    .. math:: N = k F(d), \qquad F = (d + \theta)^2 / (4\theta) \text{ for } |d| < \theta, \quad \max(d, 0) \text{ else}
+
+    N is the normal traction per reference area and d the signed distance from a plane tool, positive inside. The
+    contact ramp :math:`|d| < \theta` regularises the onset of contact.
 
     Args:
         on: name of the boundary that faces the tool.
@@ -65,13 +70,14 @@ class Contact(Part):
             temperature is that at the last accepted state.
         penalty: penalty k divided by shear modulus / thickness of the sheet; default 2e5; 2e4 with
             separates=False and in three dimensions.
-        ramp: half-width theta of the ramp over thickness of the sheet; default 1e-7 where points slide, 1e-5 where
-            they stick and in three dimensions.
-        elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, over thickness of the sheet.
+        ramp: half-width theta of the contact ramp, divided by the thickness of the sheet. The default is 1e-7 where
+            points slide, 1e-5 where they stick and in three dimensions.
+        elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, divided by the thickness of
+            the sheet.
         separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
-            "stick" is False: a point stays in contact until a stage makes the tool inactive. With True, points under
-            tension separate there, for materials that do not relax.
+            "stick" is False: a point stays in contact until a stage of a process makes the tool inactive. With True,
+            points under tension separate there, for materials that do not relax.
         nodes_per_step: largest number of nodes that come into contact in one step; an element edge has two. In three
             dimensions it is a percentage of all nodes, default 1. The results of stick, friction and heat exchange
             depend on the time of gap closure. None: if any face sticks, up to 5 % of the nodes of each face with stick
@@ -82,9 +88,9 @@ class Contact(Part):
             one. Only without friction. The penetration then depends on the steps.
         points: "nodes" of the face, or the number of Gauss points of each facet. Gauss points separate one by one,
             which is smoother where a sheet slides over an edge.
-        direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z); the travel is a control
-            of the run. None: the tool is fixed.
-        name: name in a process and in columns.
+        direction: motion of the tool per unit of travel, (r, z), in three dimensions (x, y, z). The travel is a load
+            parameter (control) of the run. None: the tool is fixed.
+        name: name of the contact in the stages of a `Process` and in the column names of results.
 
     Raises:
         InputError: an argument is not allowed.
@@ -134,17 +140,17 @@ class Contact(Part):
 
     @property
     def label(self) -> str:
-        """Name of the tool, or of the face that it touches, for messages and tables."""
+        """Name of the contact for messages and tables: `name`, or without one the boundary `on`."""
         return self.name or self.on
 
     @property
     def driven(self) -> bool:
-        """True if the run controls the motion of the tool."""
+        """True if the tool moves: its travel is then a load parameter (control) of the run."""
         return self.direction is not None
 
     @property
     def friction_by_temperature(self) -> bool:
-        """True if friction depends on the temperature."""
+        """True if the coefficient of friction depends on the temperature of the body."""
         return isinstance(self.mu, FunctionOfTemperature)
 
     @property
@@ -164,7 +170,7 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True for tools in three dimensions, on which points stick only from the step after their gap closure."""
+        """True if friction at a point begins only in the step after its gap closure: for tools in three dimensions."""
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
@@ -212,11 +218,11 @@ class Contact(Part):
 
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
-        """Return the contact law that gives the tractions at n contact points of the face.
+        """Return the contact law of this contact: tractions at n contact points as a function of their positions.
 
         Args:
             k: penalty, shape () or (n,), stress/length.
-            thickness: thickness of the sheet, length; the ramp and the elastic slip are multiplied by it.
+            thickness: thickness of the sheet, length; `ramp` and `elastic_slip` are multiplied by it.
             points: reference positions of the points, shape (n, 2), length; not used in three dimensions.
             temperature: temperature of the body at the points, shape (n,), if friction depends on the temperature.
 

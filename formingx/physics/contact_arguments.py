@@ -12,7 +12,7 @@ _MOST_POINTS = 100
 
 
 def coefficient(name: str, friction: Any) -> Any:
-    """Check a coefficient of friction and return it in the form that the contact law uses.
+    """Check the argument `friction` of a contact and return it as a number or a function of the temperature.
 
     Args:
         name: name of the argument, for messages.

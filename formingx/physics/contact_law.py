@@ -39,8 +39,8 @@ class ContactHistory(NamedTuple):
         position: positions, shape (n, c), length.
         distance: signed distances from the tool, shape (n,), length.
         slip: elastic slips g, shape (n,), length.
-        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length; NaN for
-            no friction in that step.
+        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length. NaN
+            excludes the point from friction in that step.
     """
 
     position: np.ndarray
@@ -50,10 +50,11 @@ class ContactHistory(NamedTuple):
 
 
 class Tractions:
-    """Contact tractions at n points per unit reference area, of the body on the tool.
+    """Contact tractions that the body exerts on the tool at n points, per unit reference area.
 
     Args:
-        force: traction vectors, shape (n, c), stress. Their sign equals the sign of contact forces in the residual.
+        force: traction vectors, shape (n, c), stress. They enter the residual (internal minus external forces) with
+            positive sign.
         normal: normal tractions N, shape (n,), stress, positive in compression.
         tangential: tangential tractions T, shape (n,), stress.
         sense: sense of sliding, 1 or -1 along the tangent of the tool, 0 for a sticking point, shape (n,).
@@ -68,12 +69,13 @@ class Tractions:
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """Derivative of the traction vectors by the positions, shape (n, c, c), stress/length."""
+        """Derivative of the traction vectors with respect to the positions of their points, shape (n, c, c),
+        stress/length."""
         return self._stiffness()
 
     @cached_property
     def history(self) -> ContactHistory:
-        """History variables that hold after the state with these tractions is accepted."""
+        """`ContactHistory` of the n points in the state with these tractions, valid once the state is accepted."""
         return self._history()
 
     @property
@@ -134,11 +136,11 @@ class ContactLaw:
     * `stiffness_ahead` at an accepted state, for the tangent towards the next step;
     * `distance`, `nearest` and `ramp` for the limits of the next step.
 
-    A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. The
-    other members have defaults, or are needed for friction, in a section, or where a contact is left out.
+    A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. Other
+    methods without a default are needed only for friction, for a section, or if some points are kept open.
 
     Attributes:
-        theta: half-width of the ramp, length: contact begins at the signed distance -theta.
+        theta: half-width of the contact ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip at which a point begins to slide, length.
         shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
         has_friction: True if tractions depend on the slip.
@@ -162,7 +164,14 @@ class ContactLaw:
         return False
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the history variables of points that begin at positions x, shape (n, c), length."""
+        """Return the history variables of points at the beginning of contact analysis, before any slip.
+
+        Args:
+            x: positions relative to the tool, shape (n, c), length.
+
+        Returns:
+            `ContactHistory` of the n points.
+        """
         raise NotImplementedError
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
@@ -178,7 +187,9 @@ class ContactLaw:
         raise NotImplementedError
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and elastic slips of the points with their gradients; by default 0, for a linear law.
+        """Return distances and elastic slips of the points with their gradients.
+
+        By default all are 0, which is enough for a law that is linear in x.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
@@ -205,9 +216,10 @@ class ContactLaw:
         raise NotImplementedError
 
     def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
-        """Return the derivative of the tractions by the positions at an accepted state, towards the next step.
+        """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
-        A law with a ramp gives points that have just closed the stiffness that they have further inside the ramp.
+        A point whose gap has just closed lies at the outer edge of the contact ramp, where the stiffness is 0. A law
+        may return its stiffness further inside the ramp instead. By default the stiffness is that of `tractions`.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
@@ -215,19 +227,19 @@ class ContactLaw:
             arrived: mask of the points whose gap closed in the last step, shape (n,).
 
         Returns:
-            Stiffness, shape (n, c, c), stress/length.
+            Derivative of the tractions with respect to the positions, shape (n, c, c), stress/length.
         """
         return self.tractions(x, old).stiffness
 
     def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
-        """Return the derivative of the circumferential traction by the circumferential motion.
+        """Return the derivative of the circumferential traction with respect to the circumferential displacement.
 
         The second variation of non-axisymmetric modes of an axisymmetric body uses this stiffness.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
             old: history variables of the last accepted state; None: there are none.
-            radius: radius of the points, shape (n,), length; infinite in plane strain.
+            radius: deformed radius of the points, shape (n,), length; infinite in plane strain.
 
         Returns:
             Stiffness, shape (n,), stress/length.
@@ -252,12 +264,17 @@ class ContactLaw:
             x: positions relative to the tool, shape (n, c), length.
 
         Returns:
-            Signed distances as in `distance`, normals and curvatures.
+            Signed distances as in `distance`, shape (n,), length; unit normals (gradients of the distance), shape
+            (n, c); curvatures, shape (n,), 1/length.
         """
         raise NotImplementedError
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return F(d), the normal traction over the penalty at distance d, and its derivative; by default 0.
+        r"""Return the function F(d) of the normal traction, and its derivative; by default 0.
+
+        .. math:: N = k F(d)
+
+        N is the normal traction and k the penalty.
 
         Args:
             d: signed distances from the tool, shape (n,), length.
@@ -281,27 +298,29 @@ class ContactLaw:
         return np.zeros(len(x))
 
     def part(self, points: np.ndarray | slice) -> ContactLaw:
-        """Return the contact law of some of the points (indices, shape (m,), or a slice)."""
+        """Return the contact law of some of the points only (indices, shape (m,), or a slice)."""
         raise NotImplementedError
 
     def without(self, points: np.ndarray) -> ContactLaw:
-        """Return the same law in which some points (a mask, shape (n,)) stay open."""
+        """Return a copy of the law that gives no traction at some points, for any position (mask, shape (n,))."""
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> Self:
-        """Return the same law with another coefficient of friction mu, shape () or (n,); by default unchanged."""
+        """Return a copy of the law with the coefficient of friction mu, shape () or (n,); by default the law itself."""
         return self
 
 
 class NormalLaw(ContactLaw):
-    """Contact law without friction and history: the normal traction is a function of the distance.
+    r"""Contact law without friction and history: the normal traction N is a function of the signed distance d.
 
-    A subclass defines `ramp`, the traction over the penalty, and `stored`, its integral.
+    .. math:: N = k F(d)
+
+    A subclass defines `ramp`, which returns F and dF/dd, and `stored`, the integral of F.
 
     Args:
         tool: the tool, which gives the signed distance.
         k: penalty, stress/length, a number or one for each point, shape (n,).
-        theta: half-width of the ramp, length: contact begins at the signed distance -theta.
+        theta: half-width of the contact ramp, length: contact begins at the signed distance -theta.
         shift: reduction of the signed distances, length, a number or one for each point, shape (n,). With a shift a
             point that touches in the reference configuration begins at the outer edge of the ramp, free of stress.
     """
@@ -315,7 +334,9 @@ class NormalLaw(ContactLaw):
                                   f" friction must define it")
 
     def stored(self, d: np.ndarray) -> np.ndarray:
-        """Return the energy of the normal traction over the penalty, the integral of `ramp` over the distance.
+        r"""Return the energy of the normal traction per reference area, divided by the penalty.
+
+        .. math:: \int_{-\theta}^{d} F(s) \, ds
 
         Args:
             d: signed distances from the tool, shape (n,), length.
@@ -334,9 +355,15 @@ class NormalLaw(ContactLaw):
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Return the geometry of the tool nearest to positions x, shape (n, c), with distances less `shift`.
+        """Return the geometry of the tool nearest to given positions.
 
         The last result is stored, for repeated calls with equal x.
+
+        Args:
+            x: positions relative to the tool, shape (n, 2), length.
+
+        Returns:
+            Signed distances less `shift`, unit normals and curvatures of the tool, see `ContactLaw.nearest`.
         """
         positions = x.tobytes()
         if self._near is None or positions != self._near[0]:
@@ -364,12 +391,16 @@ class NormalLaw(ContactLaw):
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
     def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
-        """Return the derivative N n_r/r of the circumferential traction by the circumferential motion.
+        r"""Return the derivative of the circumferential traction with respect to the circumferential displacement.
+
+        .. math:: \frac{N n_r}{r}
+
+        N is the normal traction and n_r the radial component of the normal of the tool.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
             old: not used.
-            radius: radius r of the points, shape (n,), length; infinite in plane strain.
+            radius: deformed radius r of the points, shape (n,), length; infinite in plane strain.
 
         Returns:
             Stiffness, shape (n,), stress/length.
@@ -385,7 +416,7 @@ class NormalLaw(ContactLaw):
         return self._with(shift=self.shift + np.where(points, FAR, 0.0))
 
     def _with(self, **other: Any) -> Self:
-        """Return a copy of the law with other values of some attributes."""
+        """Return a copy of the law with the attributes in `other` replaced, and without stored results."""
         law = object.__new__(type(self))
         vars(law).update(vars(self), **other, _near=None)
         return law

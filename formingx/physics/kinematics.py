@@ -23,18 +23,18 @@ BLOCK = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 2))
 
 
 class Kinematics:
-    """Base class of the kinematics of a body: coordinates, deformation gradient, areas and rigid motions.
+    """Base class of the kinematics of a body: coordinates, deformation gradient, area vectors and rigid motions.
 
     Attributes:
         axes: names of the components of a displacement.
         components: number of components of a displacement, and of a deformed position.
-        coordinates: number of coordinates of a reference point, which tables and functions take.
-        axisymmetric: True if the section turns about R = 0.
+        coordinates: number of coordinates of a reference point, which tables and functions of the position take.
+        axisymmetric: True if the body is the section rotated about the axis R = 0.
         dimension_of_volume: power of the length in a volume: 3, or 2 per unit depth.
-        formulation: class of the forms, made from a scene; None: the formulation of the model. An extension sets it.
-        reader: class of the `Reader` of a path; None: `SectionReader`. An extension sets it.
-        scene_checks: the module `formingx.extensions.space.scene_checks`; None: the checks of a section. An extension
-            sets it.
+        formulation: subclass of `formingx.forms.formulation.Formulation` with the variational forms of the body; None:
+            the class that belongs to the model (solid or membrane).
+        reader: class that evaluates results of a path; None: the class for a section.
+        scene_checks: module with the checks of the model declaration (`Scene`); None: the checks for a section.
     """
 
     axes: tuple[str, ...] = ("r", "z")
@@ -51,13 +51,14 @@ class Kinematics:
 
         Args:
             support: the `Support`, for the message.
-            items: its constraints, with component numbers that index `formingx.physics.supports.NAMES`.
+            items: constraints of the support (`Constrained` or `ConstrainedMean`). Their component numbers index
+                `formingx.physics.supports.NAMES`.
 
         Returns:
-            The constraints with numbers in `axes`.
+            The constraints with component numbers that index `axes`.
 
         Raises:
-            InputError: the body does not have a component.
+            InputError: the body does not have a constrained component.
         """
         for item in items:
             if NAMES[item.component] not in self.axes:
@@ -66,7 +67,7 @@ class Kinematics:
         return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
-        """Return the deformation gradient.
+        """Return the deformation gradient F; the classes `Axisymmetric` and `PlaneStrain` state it.
 
         Args:
             u: displacement (UFL, shape (2,), length).
@@ -257,10 +258,11 @@ class ThreeD(Kinematics):
 
         Args:
             support: the `Support`.
-            items: its constraints, with component numbers that index `formingx.physics.supports.NAMES`.
+            items: constraints of the support (`Constrained`). Their component numbers index
+                `formingx.physics.supports.NAMES`.
 
         Returns:
-            The constraints with numbers in `axes`.
+            The constraints with component numbers that index `axes`.
         """
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
@@ -279,8 +281,8 @@ class ThreeD(Kinematics):
     def rigid_motions(self):
         """Return the rigid motions in the plane of the sheet, and its translation normal to the plane.
 
-        Rotations out of the plane are not among them: the tension of an inflated sheet resists them, so a support may
-        leave a flat sheet free to turn about a straight rim.
+        Rotations out of the plane are left out, because the tension of an inflated sheet resists them. A flat sheet on
+        one straight rim therefore counts as supported.
 
         Returns:
             {name: function from points, shape (n, 3), to displacements, shape (n, 3)}.
@@ -290,7 +292,7 @@ class ThreeD(Kinematics):
 
 
 def _along_z(X):
-    """Return unit displacements along Z at positions X, shape (n, 2) each."""
+    """Return the unit displacement (0, 1) at each of n positions X: both arrays have the shape (n, 2)."""
     return np.stack([0 * X[:, 0], 1 + 0 * X[:, 0]], 1)
 
 
@@ -318,7 +320,8 @@ def is_block(F):
         F: deformation gradient (UFL, shape (3, 3)).
 
     Returns:
-        True for an F of this module, the F of a section; False if one of these entries is an expression, as in a mode.
+        True for the F of a section; False if one of these entries is an expression, as in the F of a non-axisymmetric
+        mode.
     """
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
@@ -352,7 +355,7 @@ def sum_of_powers(F, alpha):
     is even in d. Near d = 0 its series in x = (d/m)^2 avoids 0/0 in value and derivatives. Elsewhere the small
     eigenvalue is det C / (m + d), which loses no digits in a thin sheet, as m - d does. At the switch x = 1e-4, five
     terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10). The F of
-    a mode may have entries across the blocks; the sum is exact to their second order.
+    a non-axisymmetric mode also has entries 13, 23, 31 and 32; the sum is exact to second order in these.
 
     Args:
         F: deformation gradient (UFL, shape (3, 3)).
@@ -433,7 +436,7 @@ def cofactor_change(F, H):
 
 
 def _rows(gradient, last):
-    """Return the tensor with the in-plane gradient of a mode and a given last column (UFL, shape (3, 3))."""
+    """Return the tensor with the in-plane gradient of a mode, shape (3, 2), and its last column (UFL, shape (3, 3))."""
     return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 

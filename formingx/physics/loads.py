@@ -17,8 +17,8 @@ class Load(Part):
 
     Args:
         on: name of the boundary on which the load acts; None for a body force.
-        value: fixed value of the load, in the user's units; None: the value is a control of the run.
-        name: name in a process and in columns.
+        value: fixed value of the load, in the user's units; None: the value is a load parameter (control) of the run.
+        name: name of the load in the stages of a `Process` and in the column names of results.
     """
 
     quantity = "load"
@@ -30,7 +30,7 @@ class Load(Part):
 
     @property
     def driven(self) -> bool:
-        """True if the run controls this load."""
+        """True if the value of the load is a load parameter (control) of the run, False if it is fixed."""
         return self.value is None
 
     def virtual_work(self, body: Any, value: Any) -> Any:
@@ -47,11 +47,12 @@ class Load(Part):
         raise NotImplementedError
 
     def mode_work(self, body: Any, value: Any) -> Any:
-        """Return the change of the virtual work of the load by a non-axisymmetric mode, for the stability analysis.
+        """Return the first-order change of the virtual work by a non-axisymmetric mode, for the stability analysis.
 
         Args:
-            body: as in `virtual_work`. Besides it has the amplitudes (u_r, u_z, u_hoop) of a mode, `mode`, and of its
-                variation, `dmode` (UFL, shape (3,), length). `H` is the change of F by the mode (UFL, shape (3, 3)).
+            body: object with the members of `virtual_work` and three more. `mode` has the amplitudes (u_r, u_z,
+                u_hoop) of a mode, and `dmode` the amplitudes of its variation (UFL, shape (3,), length). `H` is the
+                change of F by the mode (UFL, shape (3, 3)).
             value: value of the load (UFL scalar, user's units).
 
         Returns:
@@ -64,9 +65,9 @@ class Load(Part):
                          f" mode_work(body, value) that returns a form, or None if it does not")
 
     def unit(self, body: Any) -> float:
-        r"""Return the value of the load that corresponds to a dimensionless amplitude of 1.
+        r"""Return the unit of the load: its value divided by its dimensionless amplitude.
 
-        By default the nodal forces :math:`f_i` of this value in the reference configuration add up to
+        By default the nodal forces :math:`f_i` of a unit load in the reference configuration add up to
 
         .. math:: \sum_i |f_i| = \frac{\mu V}{L}
 
@@ -95,8 +96,8 @@ class Pressure(Load):
 
     Args:
         on: name of the boundary. A positive pressure pushes into the body.
-        value: fixed pressure (stress); None: the pressure is a control of the run.
-        name: name in a process and in columns.
+        value: fixed pressure (stress); None: the pressure is a load parameter (control) of the run.
+        name: name of the load in the stages of a `Process` and in the column names of results.
 
     >>> scene.driven                                                                  # `trace` finds its value
     Pressure('bottom')
@@ -118,7 +119,8 @@ class Pressure(Load):
 
         .. math:: -p \int_{\Gamma} \left(\delta \, \mathrm{cof} F[H] \, N\right) \cdot \delta v \, dA
 
-        `formingx.physics.kinematics.cofactor_change` gives the change of the cofactor by the change H of F.
+        H is the change of F by the mode, and N the reference normal. `formingx.physics.kinematics.cofactor_change`
+        gives the change of the cofactor.
 
         Args:
             body: as in `Load.mode_work`.
@@ -132,7 +134,7 @@ class Pressure(Load):
         return -value * face.integral(ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
 
     def unit(self, body):
-        r"""Return the pressure that corresponds to a dimensionless amplitude of 1.
+        r"""Return the unit of the pressure: its value divided by its dimensionless amplitude.
 
         .. math:: p = \frac{\mu \, h}{L}, \qquad h = \frac{V}{A}
 
@@ -156,8 +158,8 @@ class Gravity(Load):
         density: density rho in the reference configuration, positive; {layer: density} if only some layers have weight.
             Its unit is kg/m3 with Pa, m and s, and t/mm3 with MPa, mm and s.
         value: acceleration g, length/time^2, such as 9.81 m/s2 or 9810 mm/s2, negative for an upward load; None: g is a
-            control of the run.
-        name: name in a process and in columns.
+            load parameter (control) of the run.
+        name: name of the load in the stages of a `Process` and in the column names of results.
 
     >>> fx.Gravity(density=0.95e-9, value=9810.0)                                        # t/mm3, mm/s2
     Gravity(9810.0)
@@ -183,8 +185,9 @@ class CentrifugalLoad(Load):
 
     Args:
         density: density rho in the reference configuration, see `Gravity`.
-        value: omega^2, the square of the angular speed, 1/time^2; None: omega^2 is a control of the run.
-        name: name in a process and in columns.
+        value: omega^2, the square of the angular speed, 1/time^2; None: omega^2 is a load parameter (control) of the
+            run.
+        name: name of the load in the stages of a `Process` and in the column names of results.
 
     >>> fx.CentrifugalLoad(density=0.95e-9, value=100.0**2)                                         # t/mm3; 100 rad/s
     CentrifugalLoad(10000.0)
@@ -215,7 +218,7 @@ class CentrifugalLoad(Load):
 
 
 def _density(caller: str, given: Any) -> dict[str | None, float]:
-    """Return {layer: density} for a density or {layer: density}; the layer None stands for all layers."""
+    """Return {layer: density} from the argument `density` of a load; the layer None stands for all layers."""
     each = given if isinstance(given, Mapping) else {None: given}
     return {layer: positive(f"{caller}: density", value) for layer, value in each.items()}
 

@@ -36,8 +36,8 @@ class Locking(NamedTuple):
 
     Attributes:
         error: expected relative error of the bending stiffness of the body.
-        slenderness: height over width of the triangle with the largest expected error.
-        place: place of this triangle.
+        slenderness: ratio of height to width of the triangle with the largest expected error.
+        place: reference position, layer and boundary of this triangle (`Place`).
     """
 
     error: float
@@ -53,11 +53,11 @@ class Locking(NamedTuple):
 
 
 class Model:
-    """Base class of the models of a body: solid or membrane, and the treatment of incompressibility.
+    """Base class of body models: a membrane, or a solid with one of the treatments of incompressibility.
 
     Attributes:
         solid: True if the body has bending stiffness and a stress through its thickness.
-        volume_stiffness: bulk stiffness at each point over the shear modulus, see `MixedPressure`.
+        volume_stiffness: additional bulk stiffness divided by the shear modulus, see `MixedPressure`.
     """
 
     solid = True
@@ -69,17 +69,17 @@ class Model:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
-        """Check that the model allows all items of a scene.
+        """Check that the body model allows all supports, contacts and materials of a model declaration.
 
         Args:
-            scene: the `Scene`.
+            scene: the model declaration (`Scene`).
 
         Raises:
-            InputError: the model does not allow an item.
+            InputError: the body model excludes one of them.
         """
 
     def locking(self, mesh: Any) -> Locking | None:
-        """Estimate the locking of the elements in the triangles of a mesh; collective.
+        """Estimate the locking of the elements in the triangles of a mesh; by default no locking. Collective.
 
         Args:
             mesh: the `Mesh`.
@@ -209,7 +209,8 @@ class MixedPressure(Model):
         r"""Estimate how much slender triangles across a thick sheet stiffen its bending; collective.
 
         The inf-sup constant of "P1dg" decreases as 2 width/height of the triangles. For hinged sheets 2 to 15 times
-        wider than thick the error of the bending stiffness is at most (benchmarks/thickness.py)
+        wider than thick, each triangle causes a relative error of the bending stiffness of at most
+        (benchmarks/thickness.py)
 
         .. math::
             0.3 \, \frac{\text{height}}{\text{width}}
@@ -222,7 +223,7 @@ class MixedPressure(Model):
             mesh: the `Mesh`.
 
         Returns:
-            The warning, if the mean error over the area of the section exceeds 0.3 %, else None.
+            The warning if the area-weighted mean of this error over all triangles exceeds 0.3 %, else None.
         """
         if not self.pressure.bubble:
             return None
@@ -244,7 +245,7 @@ class MixedPressure(Model):
             eps: penalty parameter epsilon (UFL scalar); not used if the model has eps = 0.
 
         Returns:
-            List of (energy density (UFL, stress), quadrature metadata).
+            List of (energy density (UFL, stress), metadata of the UFL measure that integrates it).
         """
         density = p * (J - 1)
         if self.eps > 0:
@@ -298,6 +299,8 @@ class DisplacementPenalty(Model):
 
         .. math:: \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad I_3 = J^2
 
+        The factor mu makes epsilon dimensionless; (3.4.1) has none.
+
         Args:
             J: det F (UFL scalar).
             p: not used.
@@ -305,7 +308,7 @@ class DisplacementPenalty(Model):
             eps: penalty parameter epsilon (UFL scalar).
 
         Returns:
-            List of (energy density (UFL, stress), quadrature metadata).
+            List of (energy density (UFL, stress), metadata of the UFL measure with the quadrature rule).
         """
         rule = _RULES[self.points]
         metadata = {} if rule is None else {

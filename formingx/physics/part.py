@@ -6,15 +6,15 @@ from typing import Any
 
 
 class Part:
-    """Base class of the items of a scene: loads, supports and contacts. Each kind overrides some of the defaults.
+    """Base class of loads, supports and contacts, the items of a model declaration (`Scene`).
 
     Attributes:
-        name: name of the item in stages of a process and in columns of results, or None.
+        name: name of the item in the stages of a `Process` and in the column names of results, or None.
         on: name of the boundary on which the item acts, or None.
-        driven: True if the run controls the `quantity` of the item.
-        quantity: quantity of the item that a run can control, such as "pressure" or "travel", or None.
+        driven: True if the `quantity` of the item is a load parameter (control) of the run.
+        quantity: quantity of the item that can be a load parameter, such as "pressure" or "travel", or None.
         symmetric: True if the contribution of the item to the tangent is symmetric.
-        direction: motion of a tool per unit of travel, (r, z) or (x, y, z); None for items that are no moving tool.
+        direction: motion of a tool per unit of travel, (r, z) or (x, y, z); None except for moving tools.
         holds_rotation: True if a support also constrains the rotation of its boundary.
         described: names of attributes that `repr` shows as text; a summary of the scene leaves their numbers out.
     """
@@ -29,7 +29,7 @@ class Part:
     described: tuple[str, ...] = ()
 
     def constraints(self) -> list[Any]:
-        """Return the constraints that the item imposes on the displacement; by default none.
+        """Return the constraints that a support imposes on the displacement; none for loads and contacts.
 
         Returns:
             List of `formingx.physics.supports.Constrained` and `formingx.physics.supports.ConstrainedMean`.

@@ -17,11 +17,17 @@ STICKS = 100.0
 """Coefficient of friction from which on a point counts as sticking."""
 
 RAMP_EDGE = 1e-7
-"""Distance from the outer edge of the ramp, over theta, that is negligible."""
+"""Negligible distance from the outer edge of the ramp, divided by theta."""
 
 
 class Law(NormalLaw):
-    """Contact law with a penalty, a regularised ramp and friction, eqs. (5.7) to (5.14) of Song (1993).
+    r"""Contact law with a penalty k, a regularised ramp F and friction, eqs. (5.7) to (5.14) of Song (1993).
+
+    .. math:: N = k F(d), \qquad T_{stick} = k F'(d)\, g, \qquad
+              T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g
+
+    N and T are the normal and tangential traction, d is the signed distance (positive inside the tool), and g the
+    elastic slip. `ramp` states F.
 
     Args:
         tool: the tool, which gives the signed distance.
@@ -30,7 +36,7 @@ class Law(NormalLaw):
         theta: half-width of the ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip g_s at which a point begins to slide, length; not used by stick.
         shift: reduction of the signed distances, length, shape () or (n,).
-        pulls: True if points in contact never separate.
+        pulls: True if points in contact never separate and can carry tension.
         shear_limit: function of pressure and mu that returns the shear stress at which points slide and its derivative,
             see `Contact.shear_limit`; None for Coulomb's mu p.
     """
@@ -70,7 +76,7 @@ class Law(NormalLaw):
         return super()._with(_constants=None, **other)
 
     def _given(self) -> tuple:
-        """Return the constants of the law as arguments of the functions in C, stored for repeated calls."""
+        """Return the constants of the law as arguments of the C function `tractions`, stored for repeated calls."""
         if self._constants is None:
             flags = (self.pulls, self.has_friction, self._slides)
             each = [(np.array(value, dtype=float, ndmin=1), np.ndim(value)) for value in (self.k, self.mu)]
@@ -95,13 +101,17 @@ class Law(NormalLaw):
         return False if not self.pulls or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Evaluate the ramp F(d) of eq. (5.13), or max(d + theta, 0) for contact that does not separate.
+        r"""Return the contact ramp F(d), eq. (5.13) of Song (1993), and its derivative.
 
-        F times the penalty k is the normal traction.
+        .. math:: F(d) = \begin{cases} 0 & d \le -\theta \\ (d + \theta)^2 / (4\theta) & |d| < \theta \\
+                  d & d \ge \theta \end{cases}
+
+        F times the penalty k is the normal traction. For a contact that does not separate, F is max(d + theta, 0).
 
         Args:
             d: signed distances from the tool, shape (n,), length.
-            bonded: mask of the points that cannot separate: F = d + theta of either sign.
+            bonded: mask of the points that have been in contact and cannot separate, shape (n,), or False. There F is
+                d + theta, which may be negative (tension).
 
         Returns:
             F, shape (n,), length; dF/dd, shape (n,).
@@ -112,7 +122,11 @@ class Law(NormalLaw):
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
-        """Return the signed distance from the tool at which the normal traction has a given value.
+        r"""Return the signed distance from the tool at which the normal traction has a given value N.
+
+        .. math:: d = \begin{cases} N/k & N > k \theta \\ 2 \sqrt{N \theta / k} - \theta & \text{else} \end{cases}
+
+        For a contact that does not separate, d is N/k - theta.
 
         Args:
             pressure: normal traction, shape (n,), stress.
@@ -130,14 +144,22 @@ class Law(NormalLaw):
 
     @property
     def friction(self) -> np.ndarray:
-        """Ratio T/N at which a point slides under a vanishing pressure, shape () or (n,); infinite with stick."""
+        """Ratio of tangential to normal traction at which a point slides, for vanishing pressure, shape () or (n,).
+
+        It is infinite where the point sticks.
+        """
         sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
         if self.shear_limit is not None:
             mu = self.shear_limit(np.zeros(mu.shape), np.where(sticks, 0.0, mu))[1]
         return np.where(sticks, np.inf, mu)
 
     def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
-        """Return the energy of the normal traction, the integral of N over the distance.
+        r"""Return the energy of the normal traction N, its integral over the signed distance d.
+
+        .. math:: \int_{-\theta}^{d} N \, ds = \begin{cases} k (d + \theta)^3 / (12 \theta) & |d| < \theta \\
+                  k (d^2/2 + \theta^2/6) & d \ge \theta \end{cases}
+
+        It is 0 for open points. For a contact that does not separate, it is k (d + theta)^2/2.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
@@ -172,13 +194,13 @@ class Law(NormalLaw):
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state; not used without friction.
+            old: history variables of the last accepted state; not used without friction and bond.
             sense: sense of sliding in the previous Newton iteration, shape (n,). A point whose sense would reverse
                 sticks for this one iteration; otherwise Newton's method would alternate across the narrow range of
                 stick.
-            expected: distances and slips at which the law is linearised, those predicted by the previous iteration;
-                None: those at x. With values at x, the curvature of tool and motion, times a stiff penalty, would
-                dominate.
+            expected: distances and slips at which the law is linearised, as the previous iteration predicted them.
+                None: the distances and slips at x. These differ from the predicted ones by the curvature of tool and
+                motion, which a stiff penalty multiplies.
 
         Returns:
             Tractions, with their stiffness and the new history variables.
@@ -190,7 +212,10 @@ class Law(NormalLaw):
 
     def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> np.ndarray:
-        """Return all values that the function `tractions` in C computes, flat, shape (12 n,)."""
+        """Return the output of the C function `tractions` at positions x, one array of shape (12 n,).
+
+        It has force (2 n), N, T, sense (n each), stiffness (4 n), distance, slip and tangential stiffness (n each).
+        """
         near, out = self.nearest(x), np.empty(12 * len(x))
         before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
         if old is not None:
@@ -210,16 +235,17 @@ class Law(NormalLaw):
         return out
 
     def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
-        r"""Return the derivative of the circumferential traction with respect to the circumferential motion.
+        r"""Return the derivative of the circumferential traction with respect to the circumferential displacement.
 
         .. math:: \frac{N n_r}{r}
 
-        For a sticking point the stiffness of the elastic slip is added.
+        N is the normal traction and n_r the radial component of the normal of the tool. For a sticking point the
+        stiffness of the elastic slip is added.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
             old: history variables of the last accepted state, or None.
-            radius: radius r of the points, shape (n,), length; infinite in plane strain.
+            radius: deformed radius r of the points, shape (n,), length; infinite in plane strain.
 
         Returns:
             Stiffness, shape (n,), stress/length.
@@ -245,10 +271,11 @@ class Law(NormalLaw):
         return Motion(x, near.distance, near.normal, g, dg)
 
     def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
-        """Return the stiffness at an accepted state towards the next step, in which points that just closed are stiff.
+        """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
-        At the outer edge of the ramp a point has no stiffness. The tangent of the path would let such a point slip
-        where it will stick. Its stiffness is therefore evaluated halfway between the outer edge and distance 0.
+        A point whose gap just closed lies at the outer edge of the ramp, where it has no stiffness. With this stiffness
+        a sticking point would slip along the tangent of the path. Its stiffness is therefore evaluated halfway between
+        the outer edge and distance 0.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
@@ -256,7 +283,7 @@ class Law(NormalLaw):
             arrived: mask of the points whose gap closed in the last step, shape (n,).
 
         Returns:
-            Stiffness, shape (n, 2, 2), stress/length.
+            Derivative of the tractions with respect to the positions, shape (n, 2, 2), stress/length.
         """
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
@@ -283,5 +310,6 @@ class Law(NormalLaw):
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
-    """Return history variables with position x, distance d and elastic slip; a later gap closure is expected at x."""
+    """Return the `ContactHistory` of points at x, shape (n, 2), with distances d and slips, shape (n,); `arrival` is x.
+    """
     return ContactHistory(x, d, slip, x)

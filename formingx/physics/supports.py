@@ -16,10 +16,10 @@ class Constrained(NamedTuple):
     """Constraint of one displacement component to 0, at all nodes of a boundary or at one node.
 
     Attributes:
-        component: number of the component in `NAMES`.
+        component: number of the component: 0 for r (x in three dimensions), 1 for z, 2 for y, 3 for x (`NAMES`).
         on: name of the boundary, or None.
         point: reference position of the node, (r, z), length, or None.
-        driven: True if the component follows the control of the run instead of being 0.
+        driven: True if the component has a prescribed value, a load parameter (control) of the run, instead of 0.
     """
 
     component: int
@@ -36,11 +36,11 @@ class ConstrainedMean(NamedTuple):
     The weight w is 1 or the shear modulus of the layer. The multiplier is a traction in proportion to w.
 
     Attributes:
-        component: number i of the component in `NAMES`.
+        component: number i of the component, see `Constrained`.
         on: name of the boundary.
         by_stiffness: True if w is the shear modulus of the layer, False if w = 1.
-        point: None, for the interface of `Constrained`.
-        driven: False, for the interface of `Constrained`.
+        point: None; `Constrained` has the same attribute.
+        driven: False; `Constrained` has the same attribute.
     """
 
     component: int
@@ -57,8 +57,8 @@ class Support(Part):
         on: name of the supported boundary.
 
     Attributes:
-        resists: names of the components, "r" or "z", in which the stored energy of an elastic support resists a motion
-            of the whole boundary.
+        resists: names of the components, "r" or "z", in which an elastic support resists a rigid translation of its
+            boundary.
     """
 
     resists: tuple[str, ...] = ()
@@ -81,9 +81,7 @@ class Support(Part):
         return None
 
     def all_constraints(self) -> list[Constrained | ConstrainedMean]:
-        """Return the constraints of the support, as if the components in `resists` were constrained too.
-
-        The check for rigid motions uses them.
+        """Return the constraints for the check for rigid motions: `constraints`, and one for each of `resists`.
 
         Returns:
             List of `Constrained` and `ConstrainedMean`.
@@ -96,7 +94,7 @@ class Support(Part):
 
 
 class _OneComponent(Support):
-    """Support that constrains or drives one displacement component of a boundary, given by its name `value`."""
+    """Support that prescribes one displacement component of a boundary; `value` is the name of the component."""
 
     described = ("component",)
 
@@ -213,12 +211,12 @@ class PinnedNode(Support):
 
 
 class PrescribedDisplacement(_OneComponent):
-    """Displacement component of a boundary that equals a control of the run, the travel of the boundary.
+    """Prescribed displacement of a boundary along one axis; its value is a load parameter (control) of the run.
 
     Args:
         on: name of the boundary.
         component: "r" or "z"; in three dimensions "x", "y" or "z".
-        name: name in a process and in columns.
+        name: name of the support in the stages of a `Process` and in the column names of results.
 
     >>> pulled = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.4),
     ...                   supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0),
