@@ -155,23 +155,29 @@ class Approach:
         times = gap_closures(face.law, start, velocity, free, length)
         return times, start + times[:, None] * velocity
 
-    def prepare(self, times: np.ndarray, places: np.ndarray, guessed: np.ndarray | None, length: float,
-                ends: bool) -> None:
+    def prepare(self, times: np.ndarray, places: np.ndarray, length: float, ends: bool,
+                guessed: np.ndarray | None = None, speeds: np.ndarray | None = None) -> None:
         """Prepare the solve of a step: store the predicted positions at which gaps close.
 
         Args:
             times: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
             places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
-            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
             length: arc length of the step (dimensionless).
             ends: True if the run will end the step where the gap of a point closes that then slips wrongly, see
                 `fraction_to_wrong_slip`. A sticking point whose gap closes near the end of the step then carries no
-                friction before the next step.
+                friction before the next step, unless its predicted slip is too large.
+            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
+            speeds: derivatives of the positions by arc length just before the predicted closures, shape (n, c), length;
+                None: unknown.
         """
         face = self.face
         self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (times >= LIMITS.frictionless_from * length)
+            if speeds is not None and at_end.any():
+                tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
+                slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - times[at_end])
+                at_end[at_end] = slip <= LIMITS.largest_slip * face.rule.lengths[at_end]
             face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
         elif ends and self.lags:
             face.expect_arrivals(places)

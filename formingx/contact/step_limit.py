@@ -38,7 +38,7 @@ class EventPrediction(Protocol):
             length: arc length of the step.
 
         Returns:
-            For each active contact the arguments times, places and guessed of `Approach.prepare`; None if the
+            For each active contact the arguments times, places, guessed and speeds of `Approach.prepare`; None if the
             prediction failed.
         """
 
@@ -231,9 +231,9 @@ class StepLimit:
         for k, approach in enumerate(self.present):
             if approach.face.contact.lagged and not (ends and approach.lags):
                 continue                                    # such a contact uses no predicted gap closures
-            times, places, guessed = found[k] if found else (*approach.closures(
-                trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length), None)
-            approach.prepare(times, places, guessed, trial.length, ends)
+            times, places, *predicted = found[k] if found else approach.closures(
+                trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
+            approach.prepare(times, places, trial.length, ends, *predicted)
         return trial.events.bend(trial.length) if trial.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:

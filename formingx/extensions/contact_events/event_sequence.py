@@ -194,22 +194,23 @@ class ContactEventSequence:
                 self.ends = self._closures[-1].time
         return self._closures[k] if self._closures[k].time < length else None
 
-    def closures(self, length: float) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    def closures(self, length: float) -> tuple[list[np.ndarray], ...]:
         """Return the gap closures within an arc length for each face.
 
         Returns:
             Arc lengths at which gaps of locally owned points close; `length` for other points. Their positions at these
             lengths, relative to the tool. Mask of the points that carry a predicted contact force at the end.
+            Derivatives of the positions by arc length before the gaps close; 0 for other points.
         """
         piece = self._piece(length)
         times, positions = [np.full(len(x), length) for x in piece.positions], piece.after(length).positions
+        speeds, sure = [np.zeros_like(x) for x in positions], [np.zeros(len(x), dtype=bool) for x in positions]
         for closure in self._closures:
-            if closure.time < length and closure.rank == self._comm.rank:
-                times[closure.face][closure.point] = closure.time
-                positions[closure.face][closure.point] = closure.place
-        sure = [np.zeros(len(x), dtype=bool) for x in positions]
+            f, i, time = closure.face, closure.point, closure.time
+            if time < length and closure.rank == self._comm.rank:
+                times[f][i], positions[f][i], speeds[f][i] = time, closure.place, self._piece(time).speed[f][i]
         self._points.spread(piece.of(len(self._points.point_ids)).status != ContactStatus.FREE, sure)
-        return times, positions, sure
+        return times, positions, sure, speeds
 
     def positions(self, length: float) -> list[np.ndarray]:
         """Return the positions of locally owned points of each face at an arc length, relative to the tool."""
@@ -252,8 +253,7 @@ class ContactEventSequence:
         x, control = self._tangent[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
-        number = self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM)
-        if not 0 < number <= _SETTINGS.taken_over:
+        if not 0 < self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.taken_over:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False

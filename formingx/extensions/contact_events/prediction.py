@@ -167,7 +167,7 @@ class ContactEventPrediction:
             length: arc length of the step.
 
         Returns:
-            For each active contact the arguments times, places and guessed of `Approach.prepare`; None if the
+            For each active contact the arguments times, places, guessed and speeds of `Approach.prepare`; None if the
             prediction failed.
         """
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
