@@ -388,17 +388,16 @@ def test_trough_without_friction():
     assert np.all(fine < (4e-3, 4e-3, 0.015)) and np.all(coarse > 2.5 * fine)
 
 
-def test_states_between_of_a_sliding_sheet_depend_on_steps():
-    """`Path.at` returns the state of a run that stops there. Other steps change walls by at most 3 %, at the end by 0.
-
-    Where gaps have just closed, the pressure along the normal of the tool depends on the last accepted state.
-    """
-    end, target, column = fx.pressure(1.2), fx.pressure(0.5), "mould_force"
-    path, stopped, fine = (fx.trace(trough(0.1, friction="none"), until=end, progress=False, intermediate=[
-        fx.pressure(p) for p in given]) for given in ([], [0.5], np.linspace(0.05, 0.7, 14).round(2).tolist()))
-    assert path.at(target).measures[column] == pytest.approx(stopped.met(target).measures[column], rel=1e-9)
-    for between in (fx.pressure(0.3), target):
-        np.testing.assert_allclose(path.wall(path.at(between)).ratio, fine.wall(fine.met(between)).ratio, rtol=0.03)
+@pytest.mark.parametrize("value", [0.3, 0.5])
+def test_states_at_targets_of_a_sliding_sheet_depend_on_no_steps(value):
+    """`Path.at`, a run that stops there and a run with many targets before it agree while gaps close on the fillet."""
+    end, target, column = fx.pressure(1.2), fx.pressure(value), "mould_force"
+    before = np.linspace(0.05, value - 0.05, 10).round(3)
+    path, stopped, fine = (fx.trace(trough(0.1, friction="none"), until=until, progress=False, intermediate=[
+        fx.pressure(p) for p in given]) for until, given in ((end, []), (target, []), (end, [*before, value])))
+    assert path.at(target).measures[column] == pytest.approx(stopped.last.measures[column], rel=1e-9)
+    for other in (stopped.wall(), fine.wall(fine.met(target))):
+        np.testing.assert_allclose(path.wall(path.at(target)).ratio, other.ratio, rtol=1e-5)
     np.testing.assert_allclose(path.wall().ratio, fine.wall().ratio, rtol=1e-8)
 
 
@@ -433,18 +432,43 @@ def test_sliding_tractions_have_their_stiffness():
         np.testing.assert_allclose(found.stiffness[:, :, j], quotient, atol=0.02)
 
 
+def tray(friction, **more):
+    """Return the scene of a quarter of a sheet that is pressed into a rounded tray."""
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 3.0, corner=0.3, part="quarter"), size=0.1)
+    tool = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2)
+    return fx.Scene(mesh=sheet, thickness=0.02, materials=fx.NeoHookean(c10=1.0), supports=HELD, loads=[
+        fx.Pressure("top")], contacts=[fx.Contact("bottom", tool, friction, name="mould", **more)])
+
+
+def on_ball(friction):
+    """Return the scene of a quarter of a disc that a pressure holds on a ball which is pushed into it."""
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.1)
+    return fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), supports=HELD, loads=[
+        fx.Pressure("bottom", value=0.02)], contacts=[fx.Contact("top", fx.tools.revolved(
+            fx.tools.sphere(radius=0.5, z=0.0)), friction, direction=(0, 0, -1), name="mould")])
+
+
 def test_tray_without_friction():
     """The tray is filled in less than 500 iterations, and walls do not depend on the number of nodes per step."""
     walls = []
     for nodes in (2, 6):
-        sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 3.0, corner=0.3, part="quarter"), size=0.1)
-        tool = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2)
-        scene = fx.Scene(mesh=sheet, thickness=0.02, materials=fx.NeoHookean(c10=1.0), supports=HELD, loads=[
-            fx.Pressure("top")], contacts=[fx.Contact("bottom", tool, "none", name="mould", nodes_per_step=nodes)])
-        path = fx.trace(scene, until=fx.pressure(1.2), progress=False)
+        path = fx.trace(tray("none", nodes_per_step=nodes), until=fx.pressure(1.2), progress=False)
         assert path.counts.failures == 0 and path.counts.iterations < 500 and path.filling().touching[-1] > 0.99
         walls.append(path.wall().ratio)
     np.testing.assert_allclose(walls[1], walls[0], rtol=1e-7)
+
+
+@pytest.mark.parametrize("make, target, most, error", [
+    (lambda: tray("none"), fx.pressure(0.1), 0.02, 1e-4), (lambda: on_ball("none"), fx.travel(0.3), 0.03, 1e-4),
+    pytest.param(lambda: tray("none"), fx.pressure(0.25), 0.02, 1e-6, marks=pytest.mark.slow),
+    pytest.param(lambda: on_ball(0.3), fx.travel(0.6), 0.03, 5e-4, marks=pytest.mark.slow)],
+    ids=["tray", "ball", "full tray", "rough ball"])
+def test_states_at_targets_agree_with_shorter_steps(make, target, most, error):
+    """Walls and reactions at a target are those of steps several times shorter; with friction, to its error in time."""
+    (wall, force), (fine, exact) = ((path.wall().ratio, path.last.measures["mould_force"]) for path in (
+        fx.trace(make(), until=target, step=step, progress=False) for step in (None, fx.StepControl(largest=most))))
+    np.testing.assert_allclose(wall, fine, rtol=error)
+    assert force == pytest.approx(exact, rel=error)
 
 
 def _drafted():

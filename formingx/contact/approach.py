@@ -36,6 +36,8 @@ class StepLimits:
         pressure_difference: allowed difference between the pressure at the end of the step and the pressure that limits
             friction, over the pressure.
         corrections: largest number of repeated solutions of a step that reduce this difference.
+        difference_at_target: allowed difference between the contact pressure of a state at a target and the pressure
+            with which it was solved, over the pressure.
         rejected_change: change of the pressure in a step, over `pressure_change`, from which on the step is rejected.
         settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
         least_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
@@ -56,6 +58,7 @@ class StepLimits:
     pressure_change: float = 0.2
     pressure_difference: float = 5e-3
     corrections: int = 3
+    difference_at_target: float = 1e-4
     rejected_change: float = 1.4
     settling: int = 2
     least_force: float = 1e-2
@@ -243,6 +246,32 @@ class Approach:
         if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
             return False
         face.expect_arrivals(law.at_pressure(face.history, now))
+        return True
+
+    def renew_pressure(self, new: np.ndarray, control: float) -> bool:
+        """Replace the contact pressure of the last accepted state by the contact pressure of a state at a target.
+
+        This pressure limits lagged friction, and fades the tangential part of a pressure on a sheet that slides.
+
+        Args:
+            new: locally owned unknowns of the state, shape (n,).
+            control: load parameter (control) of the state, dimensionless.
+
+        Returns:
+            True if the pressure was replaced. False if both agree to `StepLimits.difference_at_target` in the
+            area-weighted 1-norm, or no pressure is lagged.
+        """
+        face, law, memory = self.face, self.face.law, self.face.get()
+        if memory is None or not face.contact.lagged or face.contact.sticks:
+            return False
+        old, depth = memory.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
+        history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), arrival=old.position)
+        now = law.pressure(history)
+        sums = np.array([face.rule.area @ np.abs(now - law.pressure_ahead(old)), face.rule.area @ now])
+        change, pressure = self._comm.allreduce(sums, MPI.SUM)
+        if change <= LIMITS.difference_at_target * (pressure + LIMITS.least_force * face.force_scale):
+            return False
+        face.put(memory._replace(history=history))
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:

@@ -304,6 +304,19 @@ class StepLimit:
                 for c in self.present if at_target or c.lags]
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
+    def renew_pressure(self, new: Any) -> bool:
+        """Replace lagged contact pressures by the pressures of a state at a target, and open points in tension.
+
+        The solution with the new pressures depends less on the steps before the target.
+
+        Args:
+            new: the converged state.
+
+        Returns:
+            True if a pressure or a contact status changed, so that the state must be solved for again.
+        """
+        return self.separate(new) or any([c.renew_pressure(new.x[: self._n], new.control) for c in self.present])
+
     def passes_through(self, old: Any, new: Any) -> bool:
         """Return True if a contact point passes through its tool between two states.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
@@ -14,6 +15,8 @@ from .equations import Array, Constraint, Measure
 from .newton import Failure, fixed
 from .state import State
 from .state_solver import StateSolver
+
+log = logging.getLogger("formingx")
 
 Predictor: TypeAlias = Callable[[float], Array | None]
 """Function from a control to a guess of x, locally owned entries, or to None where the tangent gives the better
@@ -272,7 +275,9 @@ class Curve(StateSolver):
         """Put penetrating points of tools in three dimensions into contact, and solve again for the end of a step.
 
         A point is in contact at the position where it met the tool. If the state meets a target, the points of all
-        tools count, and the target is met again. Else the control stays constant, and only tools with friction count.
+        tools count, and the target is met again with renewed contact pressures (`StepLimit.renew_pressure`). Without
+        friction the state then does not depend on the steps before it. If this solution fails, the last one stays. Away
+        from targets the control stays constant, and only tools with friction count.
 
         Args:
             old: accepted state at the start of the step.
@@ -291,9 +296,17 @@ class Curve(StateSolver):
             return states
         equation = fixed(new.control) if bound is None or new.met is None else bound.equation(new.met.value)
         for sweep in range(self.sweeps):
-            if not limit.close_penetrated(new, bound is not None, sweep):
+            late, memory = limit.close_penetrated(new, bound is not None, sweep), self.problem.memory
+            if not late and (bound is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
                 return [new, *rest]
-            new = self.solve_again(new, equation, old)
+            try:
+                new = self.solve_again(new, equation, old)
+            except Failure as failure:
+                if late:
+                    raise
+                log.info("the contact pressure at %s stays that of the last solution: %s", new.met, failure.reason)
+                self.problem.memory = memory
+                return [new, *rest]
         raise Failure("points that come into contact late bring others into their tool again and again", [])
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:

@@ -29,8 +29,7 @@ import numpy as np
 from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
 from .lagged_stick import SMALL_GAP, LaggedStick
 
-_LEAST = 0.1               # lower bound of the pressure that limits friction, over the pressure at the last state
-_MOST = 10.0               # its upper bound, in the same unit
+_MOST = 10.0               # factor, up or down, from the last pressure to the pressure that limits friction
 _SLIDES_ON = 1 + 1e-9      # stored slip of sliding points, over g_s: they continue to slide in spite of round-off
 
 
@@ -124,7 +123,7 @@ class LaggedFriction(LaggedStick):
             depth = now
             if change.any():
                 depth = now + np.einsum("ni,ni->n", self.tool.distances(old.position).normal, change)
-            self._ahead = old, self.k * np.clip(depth, _LEAST * now, _MOST * now)
+            self._ahead = old, self.k * np.clip(depth, now / _MOST, _MOST * now)
         return self._ahead[1]
 
     def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:

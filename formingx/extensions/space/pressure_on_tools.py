@@ -9,11 +9,10 @@ Of the force f of the pressure on a node in contact only
 
 acts. The tangential part fades as the contact pressure grows, so the force is continuous at gap closure.
 
-The contact pressure is taken from the last accepted state, and is 0 at nodes whose gap closed since then. A state in
-which gaps have just closed therefore depends on the step that led to it. In a trough, walls at the same pressure differ
-by up to 3 % between `Path.at` and a run with other intermediate targets. Once the contact pressure is a third of the
-applied pressure, the state does not depend on the steps. The contact pressure of the state itself would make states
-unique, but Newton's method would not converge on coarse fillets.
+Within a step the contact pressure is constant: as a function of the displacement it would keep Newton's method from
+converging on coarse fillets. It is the pressure of the last accepted state, and 0 at nodes whose gap closed since then.
+At a target the state is solved for again with its own contact pressure, until both agree (`StepLimit.renew_pressure`).
+States at targets, and states of `Path.at`, therefore do not depend on the steps before them without friction.
 """
 
 from __future__ import annotations
