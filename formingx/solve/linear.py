@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
+from enum import IntEnum
+
 import numpy as np
 from petsc4py import PETSc
 
 from .equations import Array
 
-_SCALE, _KEEP_SCALING = 77, -1          # ICNTL(8) of MUMPS: automatic choice; the scaling of the last factorisation
+_PETSC = ctypes.CDLL(PETSc.__file__)    # with the functions of PETSc that petsc4py lacks
+
+
+class _Scaling(IntEnum):
+    """Scaling of rows and columns, ICNTL(8) of MUMPS."""
+
+    AUTOMATIC = 77
+    KEPT = -1                           # from the factorisation before
 
 
 def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
@@ -54,14 +64,14 @@ class DirectSolver:
         """
         self.count += 1
         keep = self._keeps and self._scaled and not rescale
-        self._ksp.getPC().getFactorMatrix().setMumpsIcntl(8, _KEEP_SCALING if keep else _SCALE)
+        self._ksp.getPC().getFactorMatrix().setMumpsIcntl(8, _Scaling.KEPT if keep else _Scaling.AUTOMATIC)
         self._ksp.setOperators(self._matrix)
         try:
             self._ksp.setUp()
             self._scaled = self._ksp.getPC().getFailedReason() == 0
         except PETSc.Error:
             self._scaled = False
-        if self._scaled and (not keep or self.scaling == _KEEP_SCALING):
+        if self._scaled and (not keep or self.scaling == _Scaling.KEPT):
             return True
         self._keeps &= not self._scaled  # a MUMPS that cannot keep a scaling has applied none
         self.destroy()                   # PETSc refuses to factorise again with a MUMPS that has failed once
@@ -92,6 +102,34 @@ class DirectSolver:
         given.getDenseArray()[:] = rhs
         self._ksp.getPC().getFactorMatrix().matSolve(given, found)
         return found.getDenseArray().copy()
+
+    def inverse(self, rows: Array) -> Array | None:
+        """Return entries of K^-1 for the matrix K last factorised.
+
+        MUMPS visits only the factors on the way from these rows to the root of its elimination tree.
+
+        Args:
+            rows: numbers of the rows and columns, ascending, shape (k,).
+
+        Returns:
+            The entries, shape (k, k). None on several ranks, or if PETSc has no such function.
+        """
+        get = getattr(_PETSC, "MatMumpsGetInverse", None)
+        if get is None or self._matrix.comm.size > 1:
+            return None
+        n, k = self._matrix.size[0], len(rows)
+        starts = np.zeros(n + 1, dtype=PETSc.IntType)
+        starts[rows + 1] = k
+        entries = PETSc.Mat().createAIJ((n, n), csr=(np.cumsum(starts, dtype=PETSc.IntType),
+                                                     np.tile(rows, k).astype(PETSc.IntType), np.zeros(k * k)))
+        transposed = PETSc.Mat().createTranspose(entries)
+        factors = self._ksp.getPC().getFactorMatrix()
+        failed = get(ctypes.c_void_p(factors.handle), ctypes.c_void_p(transposed.handle))
+        factors.setMumpsIcntl(30, 0)     # PETSc leaves it at entries of the inverse
+        found = entries.getValuesCSR()[2].reshape(k, k).T
+        transposed.destroy()
+        entries.destroy()
+        return None if failed else found
 
     def solve_transposed(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:
         """Solve K^T x = rhs with the last factors of the matrix K; `out` receives x."""

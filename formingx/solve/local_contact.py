@@ -22,12 +22,10 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from .compliance import Border, columns
 from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
 
-Border: TypeAlias = Callable[[Array], Array]
-"""Function that maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; it returns the changes of
-the control, shape (m,)."""
 
 @dataclass(frozen=True)
 class LocalContact:
@@ -218,12 +216,11 @@ class _Points:
         self._own = slice(first, first + counts[self._comm.rank])
         ends = np.cumsum([0, *(len(i) for _, i in self._some)])
         self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]     # slices of the owned points of each contact
-        self._columns = solver.solve_all(unit_forces(problem, contacts, chosen))        # locally owned rows
-        self._steps = border(self._columns)
+        self._columns = columns(solver, unit_forces(problem, contacts, chosen), border)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
-        moved = [self._moved(column, step) for column, step in zip(self._columns.T, self._steps)]
-        self._C = self._gather(np.array(moved).T.reshape(counts[self._comm.rank], len(moved))) * self._scale
+        motions = self._columns.motions(self._moved).reshape(counts[self._comm.rank], len(self._columns.steps))
+        self._C = self._gather(motions) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """Solve the local problem of the points for a Newton update.
@@ -247,8 +244,7 @@ class _Points:
             R = y - y0 + self._C @ added
             miss = np.abs(R).max()
             if miss < accuracy:
-                forces = -self._scale * added
-                return self._columns @ forces, float(self._steps @ forces)
+                return self._columns.update(-self._scale * added)
             if miss > before and halvings:
                 dy, halvings = dy / 2, halvings - 1
                 y = y - dy
@@ -304,7 +300,7 @@ class _Points:
         if y is None:
             return None
         forces = np.einsum("nij,njm->nim", added, y.reshape(len(added), self._c, -1)).reshape(y.shape)
-        return V - self._columns @ (self._scale[:, None] * forces)
+        return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _within(self, added: Array, y: Array) -> Array | None:
         """Return (1 + C S)^-1 y, the motions y of the points, changed by additional stiffnesses S.

@@ -11,6 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import count, positive
+from .compliance import BorderedTangent
 from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
 from .iteration_rules import ActiveSetChanges, ModifiedNewton, Newton
 from .linear import DirectSolver
@@ -322,7 +323,8 @@ class BorderedNewton:
             step = self._correction(x, control, constraint, history)
             share = active.share
             if points and active.changed == len(history) != self.settings.left_alone:
-                step, share = points.correct(self.solver, self.a, step, self._border), 1.0
+                border = BorderedTangent(self.gradient, self.b, self._slope)
+                step, share = points.correct(self.solver, self.a, step, border), 1.0
                 if points.failed == 2 and problem.has_history:
                     raise Failure("contact does not settle: no combination of touching, sticking and sliding is"
                                   " in equilibrium at the points that change", history)
@@ -398,15 +400,6 @@ class BorderedNewton:
         step = (-c - self.gradient.dot(self.a)) / self._slope
         self.a.axpy(step, self.b)
         return step
-
-    def _border(self, V: Array) -> Array:
-        """Map solutions V = K^-1 E to the system of F and c; return the changes of the control, shape (m,).
-
-        V: locally owned rows, shape (n, m), changed in place.
-        """
-        steps = -self.problem.comm.allreduce(self.gradient.array_r @ V) / self._slope
-        V += np.outer(self.b.array_r, steps)
-        return steps
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

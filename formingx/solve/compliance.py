@@ -1,0 +1,175 @@
+"""Response of the linearised equations to forces at a few unknowns: all of it, or its part at these unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from petsc4py import PETSc
+
+from .equations import Array
+from .linear import DirectSolver
+
+Border: TypeAlias = Callable[[Array], Array]
+"""Function that maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; it returns the changes of
+the control, shape (m,)."""
+
+Moved: TypeAlias = Callable[[Array, float], Array]
+"""Linear function of an update of the unknowns, shape (n,), and of the control; it returns motions, shape (k,)."""
+
+@dataclass(frozen=True)
+class Condensation:
+    """Sizes from which solutions are condensed (`CondensedColumns`).
+
+    Attributes:
+        columns: number of right-hand sides from which entries of the inverse cost less than full solutions.
+        rows: number of unknowns from which the difference counts.
+    """
+
+    columns: int = 12
+    rows: int = 10_000
+
+
+CONDENSATION = Condensation()
+
+
+@dataclass(frozen=True)
+class BorderedTangent:
+    r"""Border of the system of F and a constraint c; maps solutions with the tangent K to this system (`Border`).
+
+    .. math:: \Delta\lambda = -\nabla c \cdot V / slope, \quad V + b \, \Delta\lambda
+
+    Attributes:
+        gradient: vector dc/dx.
+        b: vector dx/dcontrol along the path.
+        slope: derivative of c by the control along the path.
+    """
+
+    gradient: PETSc.Vec
+    b: PETSc.Vec
+    slope: float
+
+    def __call__(self, V: Array) -> Array:
+        """Map solutions V = K^-1 E, in place.
+
+        Args:
+            V: the solutions, locally owned rows, shape (n, m).
+
+        Returns:
+            Changes of the control, shape (m,).
+        """
+        steps: Array = -self.b.comm.tompi4py().allreduce(self.gradient.array_r @ V) / self.slope
+        V += np.outer(self.b.array_r, steps)
+        return steps
+
+
+class Columns:
+    """Solutions of the bordered system for right-hand sides E.
+
+    Args:
+        solver: solver with the factors of the tangent K.
+        E: right-hand sides as columns, locally owned rows, shape (n, m).
+        border: function that maps solutions with K to the bordered system.
+
+    Attributes:
+        steps: changes of the control, shape (m,).
+    """
+
+    def __init__(self, solver: DirectSolver, E: Array, border: Border):
+        self._values = solver.solve_all(E)
+        self.steps = border(self._values)
+
+    def motions(self, moved: Moved) -> Array:
+        """Return the motions by the right-hand sides, shape (k, m).
+
+        Args:
+            moved: function that returns k motions.
+        """
+        return np.array([moved(column, step) for column, step in zip(self._values.T, self.steps)]).T
+
+    def update(self, forces: Array) -> tuple[Array, float]:
+        """Return the updates of the unknowns, shape (n,), and of the control.
+
+        Args:
+            forces: factors of the right-hand sides, shape (m,).
+        """
+        return self._values @ forces, float(self.steps @ forces)
+
+    def updates(self, forces: Array) -> Array:
+        """Return updates of the unknowns, shape (n, k).
+
+        Args:
+            forces: factors of the right-hand sides, shape (m, k).
+        """
+        return self._values @ forces
+
+
+class CondensedColumns:
+    """The same solutions, of which only the rows are known at first in which right-hand sides are not zero.
+
+    These rows are entries of K^-1. The changes of the control cost a solution with the transposed K, and each update
+    costs one with K. The motions must follow from these rows and the control alone.
+
+    Args:
+        solver: solver with the factors of the tangent K.
+        E: right-hand sides as columns, shape (n, m).
+        border: border of the system.
+        inverse: the entries of K^-1 in these rows and columns, shape (k, k).
+        rows: numbers of the rows, shape (k,).
+
+    Attributes:
+        steps: changes of the control, shape (m,).
+    """
+
+    def __init__(self, solver: DirectSolver, E: Array, border: BorderedTangent, inverse: Array, rows: Array):
+        self._solver, self._rows, self._E, self._border = solver, rows, E[rows], border
+        self._found = inverse @ self._E
+        adjoint = border.b.duplicate()
+        solver.solve_transposed(border.gradient, adjoint)
+        self.steps = -(adjoint.array_r[rows] @ self._E) / border.slope
+        adjoint.destroy()
+
+    def motions(self, moved: Moved) -> Array:
+        """Return the motions by the right-hand sides, as `Columns.motions`."""
+        x, found = np.zeros(self._border.b.getLocalSize()), []
+        for column in self._found.T:
+            x[self._rows] = column
+            found.append(moved(x, 0.0))
+        return np.array(found).T + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
+
+    def update(self, forces: Array) -> tuple[Array, float]:
+        """Return the updates of the unknowns and of the control, as `Columns.update`."""
+        rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ forces)
+        rhs.array_w[:] = 0.0
+        rhs.array_w[self._rows] = self._E @ forces
+        self._solver.solve(rhs, out)
+        dx = out.array_r + step * self._border.b.array_r
+        rhs.destroy()
+        out.destroy()
+        return dx, step
+
+    def updates(self, forces: Array) -> Array:
+        """Return updates of the unknowns, as `Columns.updates`."""
+        return np.array([self.update(column)[0] for column in forces.T]).T
+
+
+def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | CondensedColumns:
+    """Return the solutions for right-hand sides that are zero in most rows, condensed if this costs less.
+
+    Args:
+        solver: solver with the factors of the tangent K.
+        E: right-hand sides as columns, locally owned rows, shape (n, m).
+        border: function that maps solutions with K to the bordered system; a `BorderedTangent` if the solutions may be
+            condensed.
+
+    Returns:
+        The solutions.
+    """
+    if isinstance(border, BorderedTangent) and len(E) >= CONDENSATION.rows and E.shape[1] >= CONDENSATION.columns:
+        rows = np.flatnonzero(E.any(axis=1))
+        inverse = solver.inverse(rows)
+        if inverse is not None:
+            return CondensedColumns(solver, E, border, inverse, rows)
+    return Columns(solver, E, border)
