@@ -1,4 +1,4 @@
-"""Sheets in space that slide with friction: exact derivatives, a capstan, and plugs and cups of axisymmetric solids."""
+"""Sheets in three dimensions that slide with friction: derivatives, a capstan, plugs and cups of solid bodies."""
 
 import numpy as np
 import pytest

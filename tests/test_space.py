@@ -318,7 +318,7 @@ def test_hollows_and_turned_bodies_of_a_file(tmp_path):
         solid_of(tmp_path / "turned.stl", outer, block((1, 0.5, 2), (2, 1.5, 3), inward=True))
 
 
-def test_axes_of_a_sheet_in_space_are_x_and_y(tmp_path):
+def test_axes_of_a_sheet_in_three_dimensions_are_x_and_y(tmp_path):
     """Messages about functions of position, and columns of a temperature file, have the names x and y."""
     warm = fx.NeoHookean(c10=fx.of_temperature(lambda T: 1.0 + 0 * T))
     broken = lambda x, y: np.where(x > 0.3, np.nan, 1.0)  # noqa: E731
@@ -504,19 +504,19 @@ def test_moulds_from_files_fill(make, tmp_path):
 @pytest.mark.parametrize("make, words", [
     (lambda: disc(temperature=50.0, contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(
         radius=1.0, z=0.0)), fx.table({20.0: 0.2, 100.0: 0.3}))]), "friction does not depend on the temperature yet"),
-    (lambda: trough(friction="none", separates=False), "separates = False: in space a sheet that slides lets go"),
-    (lambda: trough(friction=0.3, separates=False), "separates = False: in space a sheet that slides lets go"),
+    (lambda: trough(friction="none", separates=False), "a sheet in three dimensions that slides separates"),
+    (lambda: trough(friction=0.3, separates=False), "a sheet in three dimensions that slides separates"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.revolved(fx.tools.plane(-1.0).reversed()), "none",
                                        present_area=True)]), "present_area = True: is for sections"),
-    (lambda: disc(model=fx.MixedPressure()), "a sheet in space is a Membrane"),
+    (lambda: disc(model=fx.MixedPressure()), "a sheet in three dimensions is a Membrane"),
     (lambda: disc(on="rim"), "a pressure on its 'bottom' or its 'top'"),
     (lambda: disc(thickness=None), "needs a thickness"),
     (lambda: disc(loads=[fx.CentrifugalLoad(1.0)]), "spins about the axis"),
     (lambda: disc(supports=[*HELD, fx.PinnedNode(0.0, 0.0)]), "at its boundaries, not at nodes"),
     (lambda: fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=MATERIALS[0],
                       supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "y")]), "a section has no component 'y'"),
-    (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in space those of"),
-    (lambda: disc(material=MATERIALS[3], contacts=[plug_above(True)]), "separates = True: in space a sheet that relax"),
+    (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in three dimensions takes"),
+    (lambda: disc(material=MATERIALS[3], contacts=[plug_above(True)]), "three dimensions that relaxes sticks"),
     (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
      "in three dimensions has no profile"),
     (lambda: fx.trace(disc(), until=fx.pole_height(0.1), progress=False), r"take displacement\(..., at="),

@@ -268,7 +268,8 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
     """
     at = pair("displacement: at", at)
     if not isinstance(component, str) or component not in ("r", "z", "x", "y"):
-        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
+        raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z' (in three dimensions"
+                         " 'x', 'y' or 'z')")
 
     def bind(problem):
         axes = problem.scene.kinematics.axes

@@ -127,8 +127,8 @@ class Membrane(Model):
         if scene.expansion:
             raise InputError("Scene: expansion: a membrane keeps its volume: use a solid model, MixedPressure()")
         if self.wrinkles is not None and scene.kinematics.components == 2:
-            raise InputError("Scene: Membrane(wrinkles=...): is for a sheet in space; a section has no wrinkles along"
-                             " the hoop: use a solid model")
+            raise InputError("Scene: Membrane(wrinkles=...): is for a sheet in three dimensions; a section has no"
+                             " wrinkles along the hoop: use a solid model")
         if scene.contacts and scene.kinematics.components == 2:
             raise InputError(f"Scene: {scene.contacts[0]!r}: a membrane has no contact yet: use a solid model,"
                              f" MixedPressure() for one")

@@ -239,5 +239,5 @@ class PrescribedDisplacement(_OneComponent):
 def _component(name: str, value: str) -> int:
     """Return the number in `NAMES` of a component given by its name `value`; `name` begins the error message."""
     if not isinstance(value, str) or value not in NAMES:
-        raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in space 'x', 'y' or 'z')")
+        raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in three dimensions 'x', 'y' or 'z')")
     return NAMES.index(value)

@@ -30,8 +30,8 @@ def check_start(scene: Any, contact: Contact) -> None:
     contact.friction_at(None if scene.temperature is None else scene.temperature.on(contact.on))
     mesh, near = scene.mesh, 1e-6 * max(scene.extent)
     if scene.kinematics.components != contact.tool.components:
-        raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in space those of"
-                         f" fx.tools.solid, box, revolved or extruded")
+        raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in three dimensions"
+                         f" takes fx.tools.solid, box, revolved or extruded")
     if contact.tool.components == 3:
         scene.kinematics.scene_checks.check_contact(scene, contact)
         return

@@ -119,7 +119,7 @@ class Scene:
         self.kinematics = kinematics if kinematics is not None else ThreeD() if in_space else Axisymmetric()
         if not isinstance(self.kinematics, Kinematics) or (self.kinematics.components == 3) != in_space:
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
-                             f" in space ThreeD()")
+                             f" in three dimensions ThreeD()")
         if preformed is None and not self._has_constants_of_mesh():
             self.mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
             if self.mesh is not mesh:
@@ -142,7 +142,8 @@ class Scene:
             self.thickness = self.kinematics.scene_checks.thicknesses(self, thickness)
             self.kinematics.scene_checks.refuse(self, heat)
         elif thickness is not None:
-            raise InputError(f"Scene: thickness = {thickness!r}: is for a sheet in space; a section has one already")
+            raise InputError(f"Scene: thickness = {thickness!r}: is for a sheet in three dimensions; a section has one"
+                             f" already")
         self._check_names()
         self._check_materials()
         self._check_boundaries()

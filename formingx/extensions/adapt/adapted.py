@@ -109,7 +109,8 @@ def of_columns(mesh: Mesh) -> Columns:
     """
     columns = mesh.columns
     if columns is None:
-        raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in space, by sheet")
+        raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in three dimensions,"
+                         " by sheet")
     moved = moved_nodes(mesh)
     if moved > 1e-9:
         raise InputError(f"adapted: nodes of the mesh were moved by {moved:.3g} of its size since it was made: make it"

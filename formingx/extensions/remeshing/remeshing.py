@@ -127,7 +127,7 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
     elif not scene.model.solid:
         reason = "a membrane"
     elif scene.kinematics.components > 2:
-        reason = "a sheet in space"
+        reason = "a sheet in three dimensions"
     elif len(scene.mesh.layers) > 1:
         reason = "several layers"
     elif any(isinstance(constant, OfMesh) for material in scene.materials.values()

@@ -82,7 +82,7 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
         InputError: heights are given, a trim that the part does not pass, or a density that is not positive.
     """
     if len(tuple(heights)):
-        raise InputError("part: heights: in space use path.wall().section(point, normal)")
+        raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
     share = np.ones(len(wall.wall))
     if trim is not None:
         level, z = finite("part: trim", trim), wall.now[:, 2]

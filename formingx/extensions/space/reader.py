@@ -120,5 +120,5 @@ def shell_model(path: Path, file: Any, state: State | None = None) -> None:
         InputError: the body is a section.
     """
     if path.scene.kinematics.components != 3:
-        raise InputError("shell_model: is for a sheet in space; of a section use to_stl, or deformed_mesh()")
+        raise InputError("shell_model: is for a sheet in three dimensions; of a section use to_stl, or deformed_mesh()")
     show.shell_model(path, file, state)

@@ -36,10 +36,10 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     """
     mesh = scene.mesh
     if not isinstance(mesh, Sheet):
-        raise InputError("Scene: mesh: one in space must come from fx.mesh.sheet")
+        raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet")
     if given is None:
-        raise InputError("Scene: a sheet in space needs a thickness=...: a length, a function of (x, y), or {layer: "
-                         "...}")
+        raise InputError("Scene: a sheet in three dimensions needs a thickness=...: a length, a function of (x, y), or"
+                         " {layer: ...}")
     each = given if isinstance(given, Mapping) else dict.fromkeys(mesh.layers, given)
     for name in each:
         known("Scene: thickness: layer", name, mesh.layers)
@@ -97,19 +97,22 @@ def refuse(scene: Any, heat: Any) -> None:
             pinned node.
     """
     if scene.model.solid:
-        raise InputError(f"Scene: model = {scene.model!r}: a sheet in space is a Membrane(): solids in space are not"
-                         f" available yet")
+        raise InputError(f"Scene: model = {scene.model!r}: a sheet in three dimensions is a Membrane(): solids in three"
+                         f" dimensions are not available yet")
     if heat is not None:
-        raise InputError("Scene: heat: is not available in space yet: give a temperature=... that stays as it is")
+        raise InputError("Scene: heat: is not available in three dimensions yet: give a temperature=... that stays as"
+                         " it is")
     for load in scene.loads:
         if isinstance(load, CentrifugalLoad):
-            raise InputError(f"Scene: {load!r}: it spins about the axis of a round body, which a sheet in space has"
-                             " not")
+            raise InputError(f"Scene: {load!r}: it spins about the axis of an axisymmetric body, which a sheet in"
+                             " three dimensions has not")
         if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
-            raise InputError(f"Scene: {load!r}: a sheet in space takes a pressure on its 'bottom' or its 'top'")
+            raise InputError(f"Scene: {load!r}: a sheet in three dimensions takes a pressure on its 'bottom' or its"
+                             " 'top'")
     for support in scene.supports:
         if isinstance(support, PinnedNode):
-            raise InputError(f"Scene: {support!r}: a sheet in space is held at its boundaries, not at nodes")
+            raise InputError(f"Scene: {support!r}: a sheet in three dimensions is supported at its boundaries, not at"
+                             " nodes")
 
 
 def check_contact(scene: Any, contact: Any) -> None:
@@ -125,25 +128,26 @@ def check_contact(scene: Any, contact: Any) -> None:
     """
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in ("bottom", "top"):
-        raise InputError(f"{contact!r}: a sheet in space touches with its 'bottom' or its 'top'")
+        raise InputError(f"{contact!r}: a sheet in three dimensions touches with its 'bottom' or its 'top'")
     if contact.friction_by_temperature:
-        raise InputError(f"{contact!r}: in space friction does not depend on the temperature yet: must be 'stick',"
-                         f" 'none' or one coefficient")
+        raise InputError(f"{contact!r}: in three dimensions friction does not depend on the temperature yet: must be"
+                         f" 'stick', 'none' or one coefficient")
     if not contact.sticks and not contact.separates:
-        raise InputError(f"{contact!r}: separates = False: in space a sheet that slides lets go of what it pulls at:"
-                         f" must be 'stick', or without separates=False")
+        raise InputError(f"{contact!r}: separates = False: a sheet in three dimensions that slides separates where it"
+                         f" is in tension: must be 'stick', or without separates=False")
     if not contact.sticks and not isinstance(tool, Swept):
         raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
                          f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
     relaxes = any(material.internal or material.integral for material in scene.materials.values())
     if contact.sticks and contact.separates and relaxes:
-        raise InputError(f"{contact!r}: separates = True: in space a sheet that relaxes is held where it touches, until"
-                         f" a stage leaves the tool out (inactive=[...]): must be 'stick', with separates left out")
+        raise InputError(f"{contact!r}: separates = True: a sheet in three dimensions that relaxes sticks where it"
+                         f" touches, until a stage leaves the tool out (inactive=[...]): must be 'stick', with"
+                         f" separates left out")
     if contact.present_area:
-        raise InputError(f"{contact!r}: present_area = True: is for sections: in space the penalty is per area at rest:"
-                         f" leave it out")
+        raise InputError(f"{contact!r}: present_area = True: is for sections: in three dimensions the penalty is per"
+                         f" reference area: leave it out")
     if contact.points != "nodes":
-        raise InputError(f"{contact!r}: points = {contact.points!r}: in space contact acts at 'nodes'")
+        raise InputError(f"{contact!r}: points = {contact.points!r}: in three dimensions contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
     if tool.sized and np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
         raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
