@@ -471,6 +471,16 @@ def test_states_at_targets_agree_with_shorter_steps(make, target, most, error):
     assert force == pytest.approx(exact, rel=error)
 
 
+@pytest.mark.parametrize("size, friction, told", [
+    (0.15, "none", False), (0.3, "none", True), (0.3, 0.3, True), (0.3, "stick", False)])
+def test_fillets_smaller_than_triangles_are_found(size, friction, told, caplog):
+    """A check and a run warn of a fillet below the median edge of the triangles, where the sheet slides."""
+    scene = trough(size, friction=friction)
+    fx.trace(scene, until=fx.pressure(0.01), progress=False)
+    for text in (str(fx.check(scene)), caplog.text):
+        assert ("it has a fillet of radius 0.2, and half of the edges of the triangles are longer" in text) == told
+
+
 def _drafted():
     tool = fx.tools.box(half=(1.0, 1.5), depth=0.8, corner=0.4, fillet=0.15, draft=3.0)
     return (tool, fx.mesh.rectangle(2.0, 3.0, corner=0.4, part="quarter"),

@@ -7,7 +7,10 @@ import numpy as np
 
 from ...findings import Finding, register
 from ...physics.supports import NAMES, Symmetry
+from ...ranks import gathered
 from ...scene.contact_checks import OTHER_UNIT
+from ...tools.pieces import Arc
+from .solid_tool import Swept
 from .triangulated import Triangulated
 
 _SHARE = 1e-3              # share of the sheet's area in compression from which on a finding is made
@@ -54,3 +57,34 @@ def too_large(body: Any) -> Iterator[Finding]:
             if ratio > OTHER_UNIT:
                 yield Finding("warning", repr(contact), f"the tool is {ratio:.3g} times as wide as the sheet: is its"
                               f" file in another unit of length? Give solid a scale=...")
+
+
+@register("start")
+def coarse_fillets(body: Any) -> Iterator[Finding]:
+    """Find concave fillets of tools on which a sheet slides, with a radius below the length of its edges; collective.
+
+    Half of the edges are longer than the radius. Such triangles are chords of about a radian, and the direction of the
+    pressure jumps from node to node. Newton's method may diverge, or the sheet snaps between positions on the chords.
+
+    Args:
+        body: the examined body, whose `scene` has the contacts.
+
+    Yields:
+        A finding for each tool with such a fillet.
+    """
+    scene = body.scene
+    tools = [contact for contact in scene.contacts if isinstance(contact.tool, Swept) and not contact.sticks]
+    if scene.kinematics.components != 3 or not tools:
+        return
+    mesh = scene.mesh
+    corners = mesh.domain.geometry.x[mesh.domain.geometry.dofmap]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    length = float(np.median(gathered(mesh.comm, edges.ravel())))
+    for contact in tools:
+        profile = contact.tool.profile
+        radius = min((piece.radius for piece in profile.pieces if isinstance(piece, Arc) and piece.radius > 0
+                      and profile.signed_distance(piece.centre[None])[0] < 0), default=np.inf)
+        if radius < length:
+            yield Finding("warning", repr(contact), f"it has a fillet of radius {radius:.4g}, and half of the"
+                          f" edges of the triangles are longer than {length:.4g}: a sheet that slides may not converge."
+                          f" Use triangles of size {radius:.4g} or less, or adapt_mesh=True.")
