@@ -109,7 +109,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
         record.continue_from(start.record)
     elif start is not None:
         record.segments[-1].states.append(start)
-    return Path(record, timed=timed, columns=columns)
+    return Path(record, timed=timed, columns=columns, other=start if isinstance(start, Path) else None)
 
 
 def write_checkpoints(path: Path, checkpoint: Any) -> None:

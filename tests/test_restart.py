@@ -15,6 +15,7 @@ from conftest import ROOT, run_script, treloar
 from test_contact import cup
 
 import formingx as fx
+from formingx.measures import columns
 from formingx.results.files import checkpoint, checkpoint_data
 
 SCENES = {"hinged": (treloar, fx.pole_stretch(3.0)), "stick": (lambda: cup("stick"), fx.pressure(8.0)),
@@ -438,3 +439,15 @@ def test_interrupted_before_its_first_state(monkeypatch, run):
         {"trace": lambda: fx.trace(scene, until=fx.pole_height(0.1)), "solve": lambda: fx.solve(scene, to=0.1),
          "process": lambda: fx.Process(scene).run([fx.Stage("up", control=scene.driven,
                                                             until=fx.pressure(0.1))])}[run]()
+
+
+def test_a_continued_run_evaluates_states_with_the_objects_of_its_start(monkeypatch):
+    """The columns of a path serve for a path that continues it, unless other columns are recorded."""
+    start, made = fx.trace(treloar(), until=fx.pressure(0.0), progress=False), []
+    standard = columns.standard
+    monkeypatch.setattr(columns, "standard", lambda *args: made.append(1) or standard(*args))
+    path = fx.trace(start.scene, until=fx.pole_stretch(1.2), start=start, progress=False)
+    assert not made and path.columns == start.columns and path["pole_stretch"][-1] == pytest.approx(1.2)
+    other = fx.trace(start.scene, until=fx.pole_stretch(1.2), start=start, record={"height": fx.pole_height(1.0)},
+                     progress=False)
+    assert made and other.last.measures["height"] == pytest.approx(path["pole_height"][-1], rel=1e-12)

@@ -288,6 +288,11 @@ class Formulation(BodyModel):
         _compat.compile_ahead(self.comm, [form for form in forms if form is not None])
 
     @cached_property
+    def displacement_dofmaps(self) -> list[Any]:
+        """Degrees of freedom of the cells, for each displacement component (DOLFINx `DofMap`)."""
+        return [self.space.sub(0).sub(i).dofmap for i in range(self.scene.kinematics.components)]
+
+    @cached_property
     def tangent(self) -> Any:
         """Derivative of the residual with respect to the unknowns, a bilinear form."""
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))

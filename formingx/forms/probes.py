@@ -35,7 +35,7 @@ class Probe:
         forms = problem.forms
         place = locate(forms.domain, forms.nearest(points), forms.length)
         self._components = forms.scene.kinematics.components
-        self._subs = [forms.space.sub(0).sub(i).dofmap for i in range(self._components)]
+        self._subs = forms.displacement_dofmaps
         self._problem, self.points = problem, points
         self.earlier_displacement = np.zeros((len(points), self._components))
         self._mine, self._cells, self._reference = place

@@ -172,10 +172,11 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     pressed = any(item.quantity == "pressure" for item in scene.drivable)
     change = forms.J - 1
     mass, error = change * forms.weight * forms.dx, change**2 * forms.weight * forms.dx
-    forms.compile_ahead(swept_volume(problem) if pressed else None, forms.energy, mass, error, forms.dissipation,
+    swept = swept_volume(problem) if pressed else None
+    forms.compile_ahead(swept, forms.energy, mass, error, forms.dissipation,
                         forms.damage_energy)
     if pressed:
-        found["enclosed_volume"] = bind_volume(problem)
+        found["enclosed_volume"] = bind_volume(problem, swept)
     if forms.energy is not None:
         found["strain_energy"] = _Scalar(problem, forms.energy, lambda v: v * energy)
     found["mass_error"] = _Scalar(problem, mass, lambda v: v / volume)

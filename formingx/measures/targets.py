@@ -329,31 +329,33 @@ def bind_pole_stretch(problem: Any) -> Bound:
     return Linear(problem, row, so_far, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
 
 
-def bind_volume(problem: Any) -> Bound:
+def bind_volume(problem: Any, form: Any = None) -> Bound:
     """Return the volume swept by the face under the controlled pressure as an output quantity.
 
     `enclosed_volume` defines the volume. It belongs to the whole part, also where a half or a quarter is modelled.
 
     Args:
         problem: the `Problem`.
+        form: form of this volume (`swept_volume`), if it is at hand.
 
     Returns:
         The quantity, length^3; in plane strain per unit depth, length^2.
     """
-    return OfWholePart(_volume(problem), problem.scene.symmetry_factor)
+    return OfWholePart(_volume(problem, form), problem.scene.symmetry_factor)
 
 
-def _volume(problem: Any) -> Bound:
+def _volume(problem: Any, form: Any = None) -> Bound:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
 
-    On a remeshed body it includes the volume that the face swept on earlier meshes.
+    On a remeshed body it includes the volume that the face swept on earlier meshes. form: as in `bind_volume`.
     """
     so_far = 0.0
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
         with old.state_context(state):
             so_far = _volume(old).value(old.x, state.control)
-    return Form(problem, swept_volume(problem), _unit_of_volume(problem.forms), so_far)
+    form = swept_volume(problem) if form is None else form
+    return Form(problem, form, _unit_of_volume(problem.forms), so_far)
 
 
 def _unit_of_volume(forms: Any) -> float:

@@ -53,16 +53,18 @@ class States:
         record: the solver's record of the run (`formingx.solve.record.Record`).
         timed: True if the process time is a column.
         columns: {name: quantity} of further columns that the user asked for (`formingx.trace(record=)`).
-        views: {id of a problem: objects that evaluate its states}, shared with another path.
+        other: path that shares the objects that evaluate its states, if it has the same columns; or None.
 
     Attributes:
         record: the solver's record of the run.
     """
 
     def __init__(self, record: Record, timed: bool = False, columns: Mapping[str, Any] | None = None,
-                 views: dict[int, _View] | None = None):
+                 other: States | None = None):
         self.record, self._timed, self._columns = record, timed, {} if columns is None else columns
-        self._views = {} if views is None else views         # by id(problem)
+        self._views: dict[int, _View] = {}                  # by id(problem)
+        if other is not None and (other._timed, other._columns) == (timed, self._columns):
+            self._views = other._views
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
         record.judge = lambda state: self._view(record.segments[-1]).admissibility.of(state)
@@ -422,7 +424,7 @@ class States:
         segment = self.segment(state)
         record = Record(segment.problem, segment.curve)
         record.segments, record.counts = [segment], self.counts
-        return type(self)(record, self._timed, self._columns, self._views)
+        return type(self)(record, self._timed, self._columns, self)
 
     @property
     def admissibility(self) -> AdmissibilityCheck:
