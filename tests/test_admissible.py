@@ -52,6 +52,17 @@ def test_values_are_those_of_the_deformation_gradient(space):
         assert found[quantity][:, : len(inside)] == pytest.approx(expected, abs=1e-12)
 
 
+def test_values_follow_the_fields():
+    """The values of the last fields are stored; other fields have other values."""
+    problem = ring()
+    body = displaced(problem, lambda X: (0 * X[0], 0 * X[0]))
+    before = body.quantities()
+    assert body.quantities() is before and body.holds()
+    displaced(problem, lambda X: (0 * X[0], -2 * X[1]))
+    after = body.quantities()
+    assert not body.holds() and np.all(after["in-plane determinant"] < 0 < before["in-plane determinant"])
+
+
 def smallest_J(problem):
     """det F where the energy looks."""
     problem.fill(problem.x, problem.forms.w.x.array[:problem.n_owned])

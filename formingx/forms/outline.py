@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from typing import Any
 
@@ -151,8 +152,14 @@ def edge_points(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
     Returns:
         Points from start to end, shape (m, parts + 1, 2), length.
     """
+    return np.einsum("pk,mki->mpi", _shapes(parts), edges)
+
+
+@functools.cache
+def _shapes(parts: int) -> np.ndarray:
+    """Return the shape functions of start, end and middle of an edge at equal intervals, shape (parts + 1, 3)."""
     s = np.linspace(0, 1, parts + 1)
-    return np.einsum("pk,mki->mpi", np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)]), edges)
+    return np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
 
 
 def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:

@@ -177,10 +177,9 @@ class AdmissibilityCheck:
             state: the state.
             own: True to examine the face of the contact alone, with the limit of a warning.
         """
-        points, length = edge_points(edges), _lengths(edges)
-        for contact, face in zip(self._problem.contacts, self._faces):
-            if not contact.present:
-                continue
+        present = [pair for pair in zip(self._problem.contacts, self._faces) if pair[0].present]
+        points, length = (edge_points(edges), _lengths(edges)) if present else (edges, edges)
+        for contact, face in present:
             depth = _depths(contact, points, state)
             allowed = CUT * contact.thickness if own else _LIMITS.depth * np.maximum(contact.thickness, length)
             share = np.where(face | (not own), depth.max(1) / allowed, 0.0)
