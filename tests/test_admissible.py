@@ -60,7 +60,8 @@ def test_values_follow_the_fields():
     assert body.quantities() is before and body.holds()
     displaced(problem, lambda X: (0 * X[0], -2 * X[1]))
     after = body.quantities()
-    assert not body.holds() and np.all(after["in-plane determinant"] < 0 < before["in-plane determinant"])
+    assert not body.holds()
+    assert after["in-plane determinant"].max() < 0 < before["in-plane determinant"].min()
 
 
 def smallest_J(problem):
