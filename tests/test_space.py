@@ -471,6 +471,20 @@ def test_states_at_targets_agree_with_shorter_steps(make, target, most, error):
     assert force == pytest.approx(exact, rel=error)
 
 
+@pytest.mark.parametrize("move, direction, told", [
+    ({}, None, False), ({"z": -0.1}, (0, 0, 1), False), ({"x": 0.1}, None, True), ({"y": -0.1}, None, True),
+    ({}, (1, 0, 0), True), ({"x": 3.0}, None, False)])
+def test_tools_across_a_plane_of_symmetry_are_found(move, direction, told):
+    """A check finds a ball that lies across a plane of symmetry off its centre, or leaves it; not a ball beside it."""
+    ball = fx.tools.revolved(fx.tools.sphere(radius=0.4, z=0.5)).moved(**move)
+    scene = disc(contacts=[fx.Contact("top", ball.moved(z=0.5), direction=direction)])
+    found = [f for f in fx.check(scene).findings if "not symmetric about the plane" in f.text]
+    assert bool(found) == told
+    if move and told:
+        axis, = move
+        assert f"the plane {axis} = 0 of Symmetry('{axis}0', '{axis}')" in found[0].text
+
+
 @pytest.mark.parametrize("size, friction, told", [
     (0.15, "none", False), (0.3, "none", True), (0.3, 0.3, True), (0.3, "stick", False)])
 def test_fillets_smaller_than_triangles_are_found(size, friction, told, caplog):

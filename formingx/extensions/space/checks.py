@@ -88,3 +88,36 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
             yield Finding("warning", repr(contact), f"it has a fillet of radius {radius:.4g}, and half of the"
                           f" edges of the triangles are longer than {length:.4g}: a sheet that slides may not converge."
                           f" Use triangles of size {radius:.4g} or less, or adapt_mesh=True.")
+
+
+@register("start")
+def across_planes(body: Any) -> Iterator[Finding]:
+    """Find swept tools that lie across a plane of symmetry and are not symmetric about it; collective.
+
+    Args:
+        body: the examined body, whose `scene` has the contacts.
+
+    Yields:
+        A finding for each such tool and plane.
+    """
+    scene = body.scene
+    if scene.kinematics.components != 3:
+        return
+    mesh = scene.mesh
+    nodes = gathered(mesh.comm, mesh.domain.geometry.x)
+    size = float(np.ptp(nodes, axis=0).max())
+    for support in (s for s in scene.supports if isinstance(s, Symmetry)):
+        axis = "xyz".index(NAMES[support.component])
+        plane = float(mesh.nodes_of(support.on)[0, axis])
+        for contact in (c for c in scene.contacts if isinstance(c.tool, Swept)):
+            low, high = contact.tool.bounds
+            if axis > 1 or not low[axis] + 1e-6 * size < plane < high[axis] - 1e-6 * size:
+                continue
+            points = np.concatenate([nodes + [0.0, 0.0, z] for z in np.linspace(low[2], high[2], 9)])
+            image = points.copy()
+            image[:, axis] = 2 * plane - points[:, axis]
+            away = np.abs(np.subtract(*map(contact.tool.signed_distance, (points, image)))).max()
+            if away > 1e-6 * size or contact.direction and contact.direction[axis]:
+                yield Finding("warning", repr(contact), f"the tool is not symmetric about the plane {'xy'[axis]} ="
+                              f" {plane:.4g} of {support!r}: the run forms the part of a tool that is mirrored there."
+                              f" Move the tool, or model the whole sheet.")
