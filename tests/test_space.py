@@ -12,10 +12,13 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.__main__ import main
+from formingx.contact.step_limit import StepLimit
 from formingx.extensions.space.part import _positive_share
 from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
+from formingx.solve.arc_length import Curve
+from formingx.solve.newton import Failure
 
 MATERIALS = [fx.NeoHookean(c10=2.0), fx.MooneyRivlin(c10=1.5, c01=0.4), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
              fx.Viscoelastic(fx.NeoHookean(c10=0.5), [(1.0, 1.0)])]
@@ -399,6 +402,30 @@ def test_states_at_targets_of_a_sliding_sheet_depend_on_no_steps(value):
     for other in (stopped.wall(), fine.wall(fine.met(target))):
         np.testing.assert_allclose(path.wall(path.at(target)).ratio, other.ratio, rtol=1e-5)
     np.testing.assert_allclose(path.wall().ratio, fine.wall().ratio, rtol=1e-8)
+
+
+def test_a_target_whose_second_solution_fails_keeps_the_first(monkeypatch):
+    """If Newton's method fails with the renewed contact pressure, the state at the target is the one before."""
+    def run():
+        path = fx.trace(trough(0.1, friction="none"), until=fx.pressure(0.3), progress=False)
+        return path.wall().ratio
+    renewed, renew, solve, fails = run(), StepLimit.renew_pressure, Curve.solve_again, []
+
+    def remember(limit, new):
+        fails[:] = [1] if (found := renew(limit, new)) else []
+        return found
+
+    def failing(*args):
+        if fails:
+            fails.clear()
+            raise Failure("on purpose", [])
+        return solve(*args)
+    monkeypatch.setattr(StepLimit, "renew_pressure", remember)
+    monkeypatch.setattr(Curve, "solve_again", failing)
+    kept = run()
+    monkeypatch.setattr(StepLimit, "renew_pressure", lambda limit, new: False)
+    np.testing.assert_array_equal(kept, run())
+    assert np.abs(kept / renewed - 1).max() > 0.02
 
 
 def test_an_adapted_trough_without_friction():
