@@ -34,7 +34,9 @@ class WorstValue(NamedTuple):
 
 
 class Admissible:
-    r"""Hoop stretch and in-plane determinant of a body at two sets of quadrature points and at edge midpoints.
+    r"""Admissibility check of a deformed body: its hoop stretches and in-plane determinants must be positive.
+
+    They are evaluated at the quadrature points of the energy, at those of the next degree, and at edge midpoints.
 
     .. math::
         \lambda_\theta = 1 + u_r / R, \qquad
@@ -45,7 +47,7 @@ class Admissible:
     only. The constructor computes all arrays that do not depend on the state.
 
     Args:
-        forms: a `Formulation`; its `w` is the examined field.
+        forms: a `Formulation`; its field `w` has the displacement that is checked.
 
     Attributes:
         dofs: unknowns of each displacement component in the locally owned cells, list of arrays of shape (cells, n).
@@ -79,7 +81,7 @@ class Admissible:
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
     def least(self) -> WorstValue:
-        """Return the smallest hoop stretch or in-plane determinant of the current fields; collective.
+        """Return the smallest of all hoop stretches and in-plane determinants for the current field; collective.
 
         Returns:
             The smallest value with its reference position; the first value that is not finite, if there is one.
@@ -93,7 +95,7 @@ class Admissible:
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
     def furthest_volume_ratio(self) -> WorstValue | None:
-        """Return the volume ratio J with the largest |ln J| of the current fields; collective.
+        """Return the volume ratio J with the largest |ln J| for the current field; collective.
 
         Returns:
             The volume ratio with its reference position; None for a membrane.
@@ -115,7 +117,7 @@ class Admissible:
             distance: elements with a quadrature point nearer to one of the positions are left out, length.
 
         Returns:
-            Volume-weighted root mean square for the current fields (dimensionless); 0 if no element is left.
+            Volume-weighted root mean square for the current field (dimensionless); 0 if no element is left.
         """
         X, n = self._X[:, : self._n], self._n
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
@@ -129,21 +131,21 @@ class Admissible:
         """Return the extreme volume ratios at the quadrature points of the energy; collective.
 
         Returns:
-            Smallest and largest J of the current fields (dimensionless).
+            Smallest and largest J for the current field (dimensionless).
         """
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
         found = self._forms.comm.allgather((J.min(initial=np.inf), J.max(initial=-np.inf)))
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
-        """Check that no point lies beyond the axis and that elements are not inverted; collective.
+        """Check that no point has crossed the axis and that no element is inverted; collective.
 
         In-plane determinants are checked at the quadrature points of the energy only. Between them a sharp edge may
         invert a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `least` finds
         such points.
 
         Returns:
-            True if all checked values of the current fields are positive on all ranks.
+            True if all checked hoop stretches and determinants of the current field are positive on all ranks.
         """
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
@@ -151,7 +153,7 @@ class Admissible:
         return all(self._forms.comm.allgather(mine))
 
     def inside_out(self) -> tuple[int, int, tuple[float, float]]:
-        """Count the inverted elements of a solid for the current fields; collective.
+        """Count the inverted elements of a solid for the current field; collective.
 
         Returns:
             Number of elements with a point where J <= 0, number of all elements, reference position (R, Z) of the
@@ -166,10 +168,11 @@ class Admissible:
         return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
 
     def quantities(self) -> dict[str, np.ndarray]:
-        """Return the checked quantities at the points of the locally owned cells.
+        """Return hoop stretches and in-plane determinants at the checked points of the locally owned cells.
 
         Returns:
-            Mapping from the name of a quantity to its values, shape (cells, points).
+            {"in-plane determinant": values, "hoop stretch": values}, shape (cells, points) each. A membrane has no
+            determinant, plane strain no hoop stretch.
         """
         w, size = self._forms.w.x.array, self._forms.length
         if np.array_equal(w, self._known[0]):               # checks of a state follow each other

@@ -10,7 +10,10 @@ import ufl
 
 
 class BodyModel(ABC):
-    """Fields, boundaries and integrals of one kind of body; the base of `Formulation`."""
+    """Interface of the fields, boundaries and integrals of a body (solid, membrane or sheet in three dimensions).
+
+    `Formulation` derives from it.
+    """
 
     @abstractmethod
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -26,7 +29,7 @@ class BodyModel(ABC):
 
     @abstractmethod
     def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints that a support imposes.
+        """Return the constraints that a support imposes on the displacement field.
 
         Args:
             support: the `Support`.
@@ -37,7 +40,7 @@ class BodyModel(ABC):
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of the mesh of the fields that represent points of the body.
+        """Map points of the body to the mesh on which the fields live.
 
         For a solid they are the points themselves, for a membrane the points of the mid-surface at the same R.
 
@@ -53,19 +56,20 @@ class BodyModel(ABC):
         """Return the integral of a density over the reference volume of some layers.
 
         Args:
-            density: density per reference volume (UFL scalar).
+            density: density per reference volume (UFL scalar), such as an energy density.
             layers: names of the layers.
-            metadata: quadrature options of the measure.
+            metadata: metadata of the UFL measure, such as the quadrature degree; None: the scene's quadrature.
 
         Returns:
-            The integral (UFL).
+            The integral (UFL form), density times length^3; in plane strain per unit depth.
         """
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the heights in a layer of points that are given on the mesh of the fields.
+        """Return the heights at which functions of the position are evaluated in a layer.
 
-        For a solid they are Z, for a membrane the heights halfway between the faces of the layer.
+        For a solid they are the heights Z of the points. For a membrane, whose mesh is the mid-surface of all layers,
+        they are the heights halfway between the faces of the layer.
 
         Args:
             layer: name of the layer.
@@ -73,7 +77,7 @@ class BodyModel(ABC):
             Z: heights of the points on the mesh of the fields, shape (n,), length.
 
         Returns:
-            Z in the layer, shape (n,), length.
+            Heights in the layer, shape (n,), length.
         """
 
     @abstractmethod
@@ -86,7 +90,7 @@ class BodyModel(ABC):
 
     @abstractmethod
     def _groups(self) -> list[tuple[Any, list[str]]]:
-        """Return a list of (material, layers), one for each form of the energy."""
+        """Return a list of (material, names of its layers), one for each term of the energy."""
 
     @abstractmethod
     def _weight(self) -> Any:
@@ -98,7 +102,7 @@ class BodyModel(ABC):
 
     @abstractmethod
     def _energy(self, density: Any) -> Any:
-        """Return the integral of an energy density over the body, over stress times volume (UFL form).
+        """Return the integral of an energy density over the body, divided by stress times volume (UFL form).
 
         density: function of (`MaterialTerms`, deformation gradient) that returns the density of a material (stress).
         """

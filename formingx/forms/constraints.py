@@ -15,13 +15,13 @@ from ..physics.supports import Constrained
 
 
 class Entry(NamedTuple):
-    """Unknowns that one item of the scene can constrain.
+    """Unknowns that one constraint of a support prescribes.
 
     Attributes:
-        item: number of the item in `Scene.items`; -1 for unknowns that appear in no equation.
+        item: number of the support in `Scene.items`; -1 for unknowns that appear in no equation and stay 0.
         bc: the DirichletBC.
         dofs: local numbers of the unknowns with ghosts, shape (n,).
-        driven: True if the unknowns follow the control.
+        driven: True if the unknowns are proportional to a load parameter (control) instead of 0.
     """
 
     item: int
@@ -31,15 +31,15 @@ class Entry(NamedTuple):
 
 
 class Active(NamedTuple):
-    """Constraints that are active while some items are inactive.
+    """Constraints of the supports that are active in one stage of a process.
 
     Attributes:
         bcs: list of the DirichletBCs.
         dofs: local numbers of the n constrained unknowns with ghosts, ascending, shape (n,).
         owned: mask of the locally owned unknowns in `dofs`, shape (n,).
-        driver: number of the item that moves each unknown, or -1, shape (n,).
-        rows: row of each constrained mean of the scene, locally owned entries; 0 if the mean is inactive.
-        present: True for each of these means that is active.
+        driver: number in `Scene.items` of the support that moves each unknown; -1 for fixed unknowns, shape (n,).
+        rows: for each constrained mean its row of the constraint matrix, locally owned entries; 0 if it is inactive.
+        present: for each constrained mean True if it is active.
     """
 
     bcs: list[Any]
@@ -51,7 +51,7 @@ class Active(NamedTuple):
 
 
 class Constraints:
-    """All constraints that the supports of a scene can impose.
+    """All constraints that the supports of a model declaration (`Scene`) can impose.
 
     Args:
         forms: the `Formulation`.
@@ -59,7 +59,8 @@ class Constraints:
 
     Attributes:
         entries: list of `Entry`, the constrained unknowns.
-        means: constrained means, list of (number of the item, row); a row has the locally owned entries, shape (n,).
+        means: means that are constrained (`ConstrainedMean`), list of (number of the support in `Scene.items`, row of
+            the constraint matrix). A row has the locally owned entries, shape (n,).
 
     Raises:
         InputError: a support at a position where the mesh has no node.
@@ -83,14 +84,14 @@ class Constraints:
 
     @property
     def can_move(self) -> bool:
-        """True if some constrained unknowns can follow the control."""
+        """True if a support prescribes displacements that a load parameter (control) changes."""
         return any(entry.driven for entry in self.entries)
 
     def driven_by(self, item: int) -> np.ndarray:
-        """Return the unknowns that an item of the scene moves.
+        """Return the unknowns that a support with a prescribed displacement moves.
 
         Args:
-            item: number of the item in `Scene.items`.
+            item: number of the support in `Scene.items`.
 
         Returns:
             Local numbers of the locally owned unknowns, ascending, shape (n,).
@@ -99,13 +100,14 @@ class Constraints:
         return dofs[dofs < self._n]
 
     def active(self, inactive: set[int]) -> Active:
-        """Return the active constraints for a set of inactive items.
+        """Return the constraints that are active while some supports are inactive.
 
         Args:
-            inactive: numbers of the inactive items in `Scene.items`.
+            inactive: numbers of the inactive supports, loads and contacts in `Scene.items`.
 
         Returns:
-            The constraints of all other items. Where two supports meet, a driven one takes precedence.
+            The constraints of all other supports. An unknown of two supports follows a prescribed displacement, if one
+            of them has it.
         """
         entries = [entry for entry in self.entries if entry.item not in inactive]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
@@ -121,9 +123,9 @@ class Constraints:
         return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)
 
     def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
-        """Return the local numbers of the unknowns that a constraint of a support concerns, shape (n,).
+        """Return the local numbers of the unknowns that a constraint prescribes, with ghosts, shape (n,).
 
-        sub: subspace of the displacement component. item: the constraint, on a boundary or at a node.
+        support: the `Support`, for the message. sub: subspace of the displacement component. item: the constraint.
 
         Raises:
             InputError: the mesh has no node at the given point.

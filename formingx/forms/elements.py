@@ -24,11 +24,11 @@ class Body(NamedTuple):
         moved: deformed quadrature points, shape (m, k, 2), length.
         J: det F at the quadrature points, shape (m, k).
         I1: tr F^T F at the quadrature points, shape (m, k).
-        section: in-plane part of F, shape (m, k, 2, 2).
+        section: in-plane part of F at the quadrature points, shape (m, k, 2, 2).
         layers: tag of the layer of each element, shape (m,).
         outline: deformed nodes around each element, shape (m, 6, 2), length.
         quality: `shape_quality` of the deformed corner triangle of each element, shape (m,).
-        initial_quality: the same in the reference configuration, shape (m,).
+        initial_quality: `shape_quality` of the reference corner triangle of each element, shape (m,).
     """
 
     points: np.ndarray
@@ -43,11 +43,11 @@ class Body(NamedTuple):
 
 
 def body(problem: Any, x: Any, control: float) -> Body | None:
-    """Evaluate the elements of a solid in a state; collective.
+    """Evaluate deformation and shape of all elements of a solid in a state; collective.
 
     Args:
         problem: the `Problem`.
-        x: unknowns of the state.
+        x: unknowns of the state (PETSc vector).
         control: load parameter (control) of the state, dimensionless.
 
     Returns:

@@ -1,8 +1,8 @@
 """Forms of a scene: common base class of solids and membranes.
 
-Unknowns are dimensionless: displacement over `length` (the largest extent of the mesh) and pressure over `stress` (the
-largest shear modulus). The energy is divided by stress times reference volume. A run therefore does not depend on the
-user's units, and the solver works with numbers of order one.
+Unknowns are dimensionless: displacements are divided by `length` (the largest extent of the mesh), pressures by
+`stress` (the largest shear modulus), the energy by stress times reference volume. A run therefore does not depend on
+the user's units, and the solver works with numbers of order one.
 """
 
 from __future__ import annotations
@@ -33,10 +33,12 @@ from .temperature import Temperature
 
 
 class Formulation(BodyModel):
-    """Forms of a scene.
+    """Fields and variational forms (UFL) of a model declaration (`Scene`), without contact.
+
+    Displacements are divided by `length`, pressures by `stress`, and the residual by stress times volume.
 
     Attributes:
-        scene: the `Scene`.
+        scene: the model declaration (`Scene`).
         mesh: `Mesh` of the fields.
         domain: `dolfinx.mesh.Mesh` of the fields.
         comm: MPI communicator.
@@ -50,21 +52,21 @@ class Formulation(BodyModel):
         X: reference position (UFL, length, shape (2,)).
         F: deformation gradient (UFL, shape (3, 3)).
         elastic_F: F without thermal expansion (UFL, shape (3, 3)).
-        J: det `elastic_F` over `ratio_before` (UFL scalar).
+        J: det `elastic_F` divided by `ratio_before` (UFL scalar).
         ratio_before: det F of the deformation transferred from another mesh (`Preformed`), else 1.
         dx: measure of the domain.
         weight: reference volume per measure `dx` (UFL scalar).
-        control: `Constant` of the dimensionless control.
+        control: `Constant` of the dimensionless load parameter (control).
         time: process time, a function of the control (UFL scalar, time).
-        scales: for every item of the scene, its value (pressure, travel, ...) in the user's units over its amplitude
-            (`StepData`); the last entry, 1, belongs to the time.
-        control_scale: scale of the only controlled item, or L.
+        scales: unit of each load, support and contact: its value (pressure, travel, ...) in the user's units divided by
+            its amplitude (`StepData`). The last entry, 1, belongs to the time.
+        control_scale: entry of `scales` for the only load, support or contact with a control; else L.
         terms: the `MaterialTerms` of each material of the scene.
-        histories: arguments of the forms besides fields, control and time (`History`).
-        potential: potential of a step over stress times volume (UFL, rank 0).
-        energy: stored energy over stress times volume (UFL, rank 0), or None; without histories the potential.
-        dissipation: dissipated power over stress times volume (UFL, rank 0), or None.
-        damage_energy: energy dissipated by damage over stress times volume (UFL, rank 0), or None.
+        histories: history variables of materials and temperature (`History`), on which the forms depend.
+        potential: incremental potential of a step, divided by stress times volume (UFL, rank 0).
+        energy: stored energy divided by stress times volume (UFL, rank 0), or None; without histories the potential.
+        dissipation: dissipated power divided by stress times volume (UFL, rank 0), or None.
+        damage_energy: energy dissipated by damage, divided by stress times volume (UFL, rank 0), or None.
         load_values: list of (load, its value at the present stage and control (UFL, the user's units)).
         residual: dpotential/dw minus the external virtual work (UFL, rank 1).
         control_derivative: derivative of `residual` with respect to the control, through the loads, or None.
@@ -144,7 +146,7 @@ class Formulation(BodyModel):
                                                for e in (self.potential, self.energy))
 
     def refresh(self) -> None:
-        """Update the coefficients that depend on changed fields or on time."""
+        """Update the integrals over past states (K-BKZ materials) after a change of fields or time."""
         for past in self._pasts:
             past.refresh()
 
@@ -155,7 +157,7 @@ class Formulation(BodyModel):
             factor: weight (UFL scalar).
 
         Returns:
-            Integral (UFL) of the factor times the dissipated power per reference volume.
+            Integral (UFL, rank 0) of the factor times the dissipated power per reference volume (stress/time).
         """
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
                    for terms in self.terms if terms.internal)
@@ -178,15 +180,15 @@ class Formulation(BodyModel):
             terms: the material in the forms (`MaterialTerms`).
 
         Returns:
-            Temperatures now, and in the previous step if there is one, shape (1 or 2, cells, q).
+            Temperatures at the last accepted state and, if it is known, at the state before, shape (1 or 2, cells, q).
         """
         return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 
     def take_temperature(self) -> None:
-        """Update the constants to a changed temperature; scales are kept; collective.
+        """Update the material constants to a changed temperature, with unchanged `length` and `stress`; collective.
 
         Raises:
-            InputError: a constant has no value at a temperature.
+            InputError: a material constant has no value at a temperature.
         """
         following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
         together(self.comm, [entry.take_temperature for entry in following])
@@ -211,7 +213,7 @@ class Formulation(BodyModel):
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:
-        """Return the probe of the displacement at reference points.
+        """Return an object that evaluates the displacement at reference points (`Probe`).
 
         Args:
             problem: the `Problem`.
@@ -223,13 +225,13 @@ class Formulation(BodyModel):
         return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
 
     def mean_row(self, constraint: Any) -> Any:
-        """Return the linear form of a constrained mean.
+        """Return the linear form that gives the mean of a displacement component over a boundary.
 
         Args:
-            constraint: the `ConstrainedMean`.
+            constraint: the `ConstrainedMean`, with boundary, component and weight of the mean.
 
         Returns:
-            Mean of a displacement component (dimensionless) over a boundary (UFL, rank 1).
+            Mean of the dimensionless displacement component (UFL, rank 1).
         """
         raise NotImplementedError
 
@@ -242,9 +244,9 @@ class Formulation(BodyModel):
         return []
 
     def set_stiff(self) -> None:
-        """Set `w` to fields with a regular tangent, near the reference configuration.
+        """Set `w` to fields near the reference configuration at which the tangent is regular.
 
-        A path computes its first direction there if the body in the reference configuration has no stiffness.
+        If the tangent is singular in the reference configuration, the path takes its first direction from these fields.
         """
         self.w.x.array[:] = 0
 
@@ -298,7 +300,7 @@ class Formulation(BodyModel):
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
 
     def path_forms(self) -> list[Any]:
-        """Return the forms that every path compiles.
+        """Return the forms that every run compiles, so that they can be compiled together.
 
         Returns:
             List of UFL forms; None for a derivative that the scene does not have.
@@ -308,13 +310,13 @@ class Formulation(BodyModel):
                 *areas.values()]
 
     def integral(self, form: Any) -> float:
-        """Compute an integral over all ranks; the form is compiled for this one use.
+        """Compile a form of rank 0 and return its value over all ranks.
 
         Args:
             form: UFL form of rank 0.
 
         Returns:
-            Value of the integral.
+            Value of the form, in its own unit.
         """
         return float(self.comm.allreduce(fem.assemble_scalar(self.compile(form)), MPI.SUM))
 
@@ -335,10 +337,10 @@ class Formulation(BodyModel):
         return self.constant(self.length) * ufl.split(self.test_function())[0]
 
     def metric_row(self) -> Any:
-        """Return the linear form of the lumped mass of the displacement, over the volume.
+        r"""Return the linear form :math:`\frac{1}{V} \int \sum_i v_i \, dV`, a lumped mass matrix of the displacement.
 
         Returns:
-            Linear form (UFL, rank 1, dimensionless).
+            Linear form (UFL, rank 1, dimensionless) in the test functions v_i of the displacement components.
         """
         v = ufl.split(self.test_function())[0]
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
@@ -359,13 +361,13 @@ class Formulation(BodyModel):
         return ufl.derivative(ufl.derivative(potential * dx, self.w, self.test_function()), self.w)
 
     def thickness(self, boundary: str) -> float:
-        """Return the mean thickness of the body above a boundary.
+        """Return the mean thickness of the body behind a boundary.
 
         Args:
             boundary: name of the boundary.
 
         Returns:
-            Volume of the body over the area of the boundary, length.
+            Reference volume of the body divided by the reference area of the boundary, length.
         """
         return self.volume / self.integral(self.area(boundary))
 
@@ -382,7 +384,7 @@ class Formulation(BodyModel):
 
     @property
     def clock(self) -> float:
-        """Process time at control 0, from the step data or from a run that chooses its time steps."""
+        """Process time at control 0, which a run that chooses its own time steps sets before each step."""
         return float(self._time[0].value)
 
     @clock.setter
@@ -390,7 +392,7 @@ class Formulation(BodyModel):
         self._time[0].value = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a control, for the present step data.
+        """Return the process time at a value of the control, for the present step data (`StepData`).
 
         Args:
             control: load parameter (control), dimensionless.
@@ -407,10 +409,10 @@ class Formulation(BodyModel):
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
-        """Set loads, elastic supports and process time from step data.
+        """Set loads, elastic supports and process time as functions of the control.
 
         Args:
-            setting: the `StepData`.
+            setting: amplitudes of the loads and of the time, and inactive items of the scene (`StepData`).
         """
         for support, present in self.elastic_supports:
             present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))

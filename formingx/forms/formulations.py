@@ -15,13 +15,13 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 
 def formulate(scene: Any) -> Formulation:
-    """Return the forms of a scene.
+    """Build the variational forms of a model declaration (`Scene`).
 
     Args:
         scene: the `Scene`.
 
     Returns:
-        The `Formulation` of the scene's kinematics if it defines one, else of the scene's model.
+        A `Formulation`; its class is `Kinematics.formulation` if the kinematics define it, else that of the body model.
     """
     if (formulation := scene.kinematics.formulation) is not None:
         return formulation(scene)

@@ -20,7 +20,7 @@ class FreeStretch:
     .. math::
         F = J_T^{1/3} F_e
 
-    The stretch is 1 in layers without expansion.
+    J_T is the volume ratio of the free thermal expansion. The stretch is 1 in layers without expansion.
 
     Args:
         forms: the `Formulation`.
@@ -42,7 +42,7 @@ class FreeStretch:
         self.stretch = self._coefficient.at_time(forms.time)
 
     def take_temperature(self) -> None:
-        """Update the stretch to a changed temperature."""
+        """Update the stretch to a changed temperature of the body."""
         self._coefficient.take(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:

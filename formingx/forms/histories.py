@@ -10,11 +10,13 @@ from .history import ConstitutiveHistory, History, Start
 
 
 class Histories:
-    """Part of `Problem` that updates its history variables; see `formingx.solve.equations`.
+    """Base class of `Problem` that stores and updates the history variables of materials, contacts and temperature.
+
+    `formingx.solve.equations` describes the members that the solver calls.
 
     Attributes:
         forms: the `Formulation`.
-        histories: history variables of the contacts, then of the materials, then of the temperature.
+        histories: list of `History`: contacts first, then materials, then the temperature.
     """
 
     forms: Any
@@ -28,11 +30,11 @@ class Histories:
 
     @property
     def control(self) -> float:
-        """Present control of the forms."""
+        """Present value of the load parameter (control) in the forms, dimensionless."""
         raise NotImplementedError
 
     def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
-        """Set the fields and the control of the forms.
+        """Set the fields and the load parameter (control) of the forms.
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
@@ -46,7 +48,7 @@ class Histories:
 
     @property
     def materials(self) -> list[ConstitutiveHistory]:
-        """History variables of the materials, one entry for each material that has them."""
+        """History of each material with internal variables or past states (`ConstitutiveHistory`)."""
         return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
 
     @property
@@ -56,18 +58,18 @@ class Histories:
 
     @property
     def relaxes(self) -> bool:
-        """True if the residual depends on time, through rate-dependent materials, contact or heat."""
+        """True if the body is rate-dependent, through a material or through its temperature."""
         return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
                    for history in self.forms.histories)
 
     @property
     def time(self) -> float:
-        """Process time at the present control of the forms."""
+        """Process time at the present load parameter (control)."""
         return self.forms.time_at(self.control)
 
     @property
     def clock(self) -> float:
-        """Process time at control 0, from the step data or from a run that chooses its time steps."""
+        """Process time at control 0, which a run that chooses its own time steps sets before each step."""
         return self.forms.clock
 
     @clock.setter
@@ -79,7 +81,7 @@ class Histories:
 
     @property
     def memory(self) -> list[Any]:
-        """History variables of the last accepted state, one entry for each history."""
+        """History variables of the last accepted state: the result of `History.get` for each of `histories`."""
         return [history.get() for history in self.histories]
 
     @memory.setter
@@ -99,14 +101,14 @@ class Histories:
         self._predicted = None, []
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Compute the history variables of materials and temperature at the end of a step, and store them.
+        """Update the history variables of materials and temperature to the end of a step that is not yet accepted.
 
-        If `advance` then accepts the same x, it uses the stored values. Afterwards the history variables are those at
-        the end of the step: the caller must restore the earlier ones.
+        The result is stored, and `advance` uses it if it accepts the same x. The caller must restore the earlier
+        history variables.
 
         Args:
             start: state at the beginning of the step.
-            x: unknowns at its end, locally owned entries, shape (n,).
+            x: unknowns at the end of the step, locally owned entries, shape (n,).
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:

@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Start(Protocol):
-    """State at the beginning of a step; a `State` is one.
+    """Interface of the state at the beginning of a step; the accepted states of a path have it.
 
     Attributes:
         x: unknowns, locally owned entries, shape (n,).
@@ -21,31 +21,32 @@ class Start(Protocol):
 
 
 class History(Protocol):
-    """History variables of one part of a scene: a material, a contact or the temperature.
+    """Interface of the history variables of a material, a contact or the temperature.
 
-    Contacts come first, then materials. The temperature comes last, since it takes the heat that they dissipate. Calls:
+    Contacts are updated first, then materials, then the temperature, which receives the heat that they dissipate. A
+    run uses the methods as follows:
 
-    - `start` sets the reference configuration.
-    - `get`, `advance` and `put` try a step: they store, update and restore the variables.
+    - `start` sets the values of the reference configuration.
+    - `get` stores the values, `advance` updates them to the end of a trial step, and `put` restores the stored ones.
     - `advance` alone accepts a state.
-    - `get` and `put` go to another accepted state and return.
+    - `get` and `put` also change to another accepted state and back.
     - `save` and `load` write to and read from a file, on any number of ranks.
-    - `transfer` transfers the variables to a problem of the same body on another mesh.
+    - `transfer` transfers the values to a problem of the same body on another mesh.
 
     The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any
     ranks.
     """
 
     def start(self) -> None:
-        """Set the history variables of the reference configuration."""
+        """Set the history variables to their values in the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to the current state of the forms, where the next step begins.
+        """Update the history variables to a state at the end of a step; the forms must be set to this state.
 
         Args:
             x: unknowns of the state, locally owned entries, shape (n,).
             control: load parameter (control) of the state, dimensionless.
-            start: state at the beginning of the step that ends now, or None.
+            start: state at the beginning of the step, or None.
         """
 
     def get(self) -> Any:
@@ -82,7 +83,7 @@ class History(Protocol):
             Values that `put` accepts.
 
         Raises:
-            InputError: the data do not match this scene.
+            InputError: the data belong to another mesh, material or boundary.
         """
 
     def transfer(self, source: Any, memory: Any, x: np.ndarray, control: float,
@@ -90,9 +91,10 @@ class History(Protocol):
         """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 
         Args:
-            source: history of the same part in the other problem, which is set to the state of `memory`.
-            memory: history variables of `source` in that state.
-            x: unknowns of this problem, to which its forms are set, locally owned entries, shape (n,).
+            source: history of the same material, contact or temperature in the other problem. That problem must be set
+                to the state to transfer.
+            memory: history variables of `source` in this state.
+            x: unknowns of the state in this problem, to which its forms are set, locally owned entries, shape (n,).
             control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
 
@@ -103,16 +105,16 @@ class History(Protocol):
 
 @runtime_checkable
 class ConstitutiveHistory(History, Protocol):
-    """History of one material of the body.
+    """Interface of the history variables of one material of the body.
 
     Attributes:
-        rate_dependent: False if the history depends on the strain alone.
+        rate_dependent: True if the stress depends on time; False if it depends on past strains alone.
     """
 
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Reset the variables that store the motion in the last step (`Material.of_motion`).
+        """Reset the internal variables that describe the motion in the last step (`Material.of_motion`).
 
-        The next step is then integrated without this motion.
+        The time integration of the next step then assumes no earlier motion.
         """

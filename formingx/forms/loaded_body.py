@@ -13,12 +13,12 @@ from ..errors import InputError, known
 
 
 class Face(NamedTuple):
-    """Boundary of the body.
+    """Boundary of the body on which a load or an elastic support acts.
 
     Attributes:
         normal: outward normal in the reference configuration (UFL, shape (2,)).
-        measure: measure of the reference boundary.
-        weight: reference area per length of the boundary (UFL scalar).
+        measure: UFL measure of the reference boundary.
+        weight: reference area per length of the boundary (UFL scalar): 2 pi R if axisymmetric, in plane strain 1.
     """
 
     normal: Any
@@ -26,19 +26,19 @@ class Face(NamedTuple):
     weight: Any
 
     def integral(self, integrand: Any) -> Any:
-        """Return an integral over the reference area.
+        """Return an integral over the reference area of the boundary; per unit depth in plane strain.
 
         Args:
             integrand: value per reference area (UFL scalar).
 
         Returns:
-            The integral (UFL).
+            The integral (UFL form).
         """
         return integrand * self.weight * self.measure
 
 
 class LoadedBody:
-    """Solid or membrane of a scene as `Load.virtual_work` and `Support.stored_energy` use it.
+    """Body as the argument of `Load.virtual_work` and `Support.stored_energy`: its fields and integrals.
 
     Attributes:
         u: displacement (UFL, length, shape (2,): components r, z).
@@ -65,7 +65,7 @@ class LoadedBody:
             layer: name of a layer; None for all layers.
 
         Returns:
-            The integral (UFL).
+            The integral (UFL form).
         """
         layers = self._forms.mesh.layers
         if layer is not None:
@@ -73,7 +73,7 @@ class LoadedBody:
         return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:
-        """Return a boundary of the body.
+        """Return a boundary of the body, for the integrals of a load or an elastic support.
 
         Args:
             on: name of the boundary; for a membrane its lower or its upper face.
@@ -97,13 +97,13 @@ class LoadedBody:
         return self._forms.constant(value)
 
     def thickness(self, boundary: str) -> float:
-        """Return the mean thickness of the body above a boundary.
+        """Return the mean thickness of the body behind a boundary.
 
         Args:
             boundary: name of the boundary.
 
         Returns:
-            Volume of the body over the area of the boundary, length.
+            Reference volume of the body divided by the reference area of the boundary, length.
         """
         return self._forms.thickness(boundary)
 
@@ -145,16 +145,19 @@ class LoadedBody:
         return form
 
     def unit(self, load: Any) -> float:
-        """Return the value of a load that scales its amplitude.
+        r"""Return the unit of a load: its value divided by its dimensionless amplitude.
 
-        In the reference configuration, the nodal forces of a load of this value add up to stress times volume over
-        length.
+        In the reference configuration, the nodal forces :math:`f_i` of a unit load add up to
+
+        .. math:: \sum_i |f_i| = \frac{\mu V}{L}
+
+        with the largest shear modulus mu (`stress`), the volume V and the largest extent L (`length`).
 
         Args:
             load: the `Load`.
 
         Returns:
-            The value, in the user's units.
+            The unit, in the user's units.
 
         Raises:
             InputError: the nodal forces of a unit load vanish or are not finite.
