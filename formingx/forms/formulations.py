@@ -21,7 +21,7 @@ def formulate(scene: Any) -> Formulation:
         scene: the `Scene`.
 
     Returns:
-        A `Formulation`; its class is `Kinematics.formulation` if the kinematics define it, else that of the body model.
+        A `Formulation`; its class is `Kinematics.formulation` if it is set, else it belongs to the body model.
     """
     if (formulation := scene.kinematics.formulation) is not None:
         return formulation(scene)
