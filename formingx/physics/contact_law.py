@@ -219,7 +219,7 @@ class ContactLaw:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
         A point whose gap has just closed lies at the outer edge of the contact ramp, where the stiffness is 0. A law
-        may return its stiffness further inside the ramp instead. By default the stiffness is that of `tractions`.
+        may return its stiffness further inside the ramp instead. The default is the stiffness of `tractions`.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.

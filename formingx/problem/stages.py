@@ -190,7 +190,7 @@ class Stages(Vectors):
             unbalanced.destroy()
 
     def _take(self, stage: _Stage) -> None:
-        """Set the loads of the forms, the active contacts and the constraints of the matrix to those of `stage`."""
+        """Set the loads of the forms, the active contacts and the constraints of the matrix from `stage`."""
         before, self._stage = self._stage, stage
         if before is stage:
             return
