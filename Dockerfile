@@ -4,7 +4,6 @@ FROM debian:${SUITE}-slim
 ARG PACKAGES="\
     ffmpeg \
     furo \
-    python3-adios4dolfinx \
     python3-dolfinx \
     python3-ezdxf \
     python3-gmsh \
