@@ -45,7 +45,7 @@ def main():
                        {"wall": fx.spline(KNOTS, start=WALL, low=0.1, high=0.39)}, step=fx.StepControl(target=8))
     first = design.run()
     end = PART * first.profile.reference_length[-1]
-    answer = design.fit(even=True, within=(0.0, end), runs=2 if args.quick else args.runs, good=2e-3,
+    answer = design.fit(even=True, within=(0.0, end), max_runs=2 if args.quick else args.runs, min_change=2e-3,
                         start=first)
     before, after = (run.wall[run.profile.reference_length < PART * run.profile.reference_length[-1]]
                      for run in (answer.before, answer.best))

@@ -38,7 +38,7 @@ def search(model, elements, knots, stretch, of):
     """Return the answer of one case; `of` is "h0" or "c"."""
     design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
                        {"profile": fx.spline(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
-    return design.fit(even=True, volume=None, runs=6, good=2e-4)
+    return design.fit(even=True, volume=None, max_runs=6, min_change=2e-4)
 
 
 def numbers(answer, name):

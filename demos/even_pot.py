@@ -59,7 +59,7 @@ def main():
     elements, runs, search = ((12, 1), 2, 2) if args.quick else ((24, 1), args.runs, args.search)
     design = fx.Design(lambda **values: pot(**values, elements=elements),
                        {**PLUG, "heat": fx.spline(KNOTS, start=HEAT[0], low=HEAT[1], high=HEAT[2])}, step=STEP)
-    answer = design.fit(even=True, within=(0.0, PART), volume=None, runs=runs, good=2e-3)
+    answer = design.fit(even=True, within=(0.0, PART), volume=None, max_runs=runs, min_change=2e-3)
     say(str(answer))
     heats = {f"heat_{k}": HEAT for k in range(KNOTS)}
     bounds = {**PLUG, **heats}

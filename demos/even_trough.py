@@ -40,7 +40,8 @@ def search(of, elements, knots, runs):
     """Return the answer for "h0" or "C"."""
     design = fx.Design(lambda profile: trough(profile, of, elements),
                        {"profile": fx.spline(knots, start=0.0, low=-6.0, high=6.0)}, step=fx.StepControl(target=8))
-    return design.fit(even=True, volume="kept" if of == "h0" else None, within=(0.0, COUNTED), runs=runs, good=2e-3)
+    return design.fit(even=True, volume="kept" if of == "h0" else None, within=(0.0, COUNTED), max_runs=runs,
+                      min_change=2e-3)
 
 
 def places(answer):

@@ -103,7 +103,7 @@ def test_a_membrane_with_a_programmed_wall():
 def test_an_even_wall():
     """In at most 4 runs the wall is even; the thickness at the pole is then the wall times the stretch squared."""
     answer = fx.Design(programmed, {"h": fx.spline(6, start=0.0, low=-2, high=2, smooth=True)}).fit(even=True,
-                                                                                                    good=1e-3)
+                                                                                                    min_change=1e-3)
     assert answer.paths <= 4 and answer.cv[0] > 0.03 and answer.cv[1] < 1e-3
     assert np.exp(answer.values["h"](0.0)) / 50 == pytest.approx(1.2**2 * answer.best.wall.mean(), rel=2e-3)
     assert answer.best.volume == pytest.approx(answer.before.volume, rel=1e-5)
@@ -160,11 +160,11 @@ def test_what_is_not_reached_is_said():
     lines = {line.get_label(): line.get_ydata() for line in answer.plot_wall().lines}
     assert np.all(lines["wanted"] == 1.0)
     wanted = 1.01 * design.run().wall.mean()
-    near = design.fit(wall=wanted, volume=None, runs=3)
+    near = design.fit(wall=wanted, volume=None, max_runs=3)
     assert near.target_wall.mean() == pytest.approx(wanted) and near.best.wall.mean() == pytest.approx(wanted, rel=1e-3)
-    held = design.fit(wall=1.2 * design.run().wall.mean(), runs=3)
+    held = design.fit(wall=1.2 * design.run().wall.mean(), max_runs=3)
     assert "It is stopped by the volume, which is held at" in str(held)
-    assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, runs=4))
+    assert "the volume that was asked for, 99, was not reached" in str(design.fit(even=True, volume=99.0, max_runs=4))
     answer = design.minimum_weight(min_wall=1.0)
     assert "minimum wall that was asked for, 1, was not reached" in str(answer)
     assert answer.best.vector.min() > 0.2                              # as thick as may be, not as light
@@ -328,7 +328,7 @@ def test_report_says_how_sure(tmp_path):
 def test_minimum_weight():
     """The smallest wall equals the required minimum, no wall is much larger, and the volume decreases."""
     design = fx.Design(programmed, {"h": fx.spline(4, start=0.0, low=-1, high=1)})
-    answer = design.minimum_weight(min_wall=0.012, runs=10)
+    answer = design.minimum_weight(min_wall=0.012, max_runs=10)
     assert answer.best.wall.min() == pytest.approx(0.012, rel=2e-3)
     assert answer.best.volume < 0.95 * answer.before.volume
     assert answer.best.wall.max() < 0.0125
@@ -337,7 +337,7 @@ def test_minimum_weight():
 def test_report(tmp_path):
     """Reports of a search and of a run are single files with pictures, bounds and parameters without effect."""
     design = fx.Design(lambda h, idle: programmed(h), {"h": fx.spline(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})
-    answer = design.fit(even=True, runs=3)
+    answer = design.fit(even=True, max_runs=3)
     assert answer.attainable() <= answer.cv[1] + 1e-6
     text = answer.report(tmp_path / "answer.html", "Even <cap>", deviations={"h": 0.01}).read_text()
     for word in ("Even &lt;cap&gt;", "unevenness", "At bounds: h[", "lowest", "Without effect on the wall: idle"):

@@ -20,7 +20,7 @@ from formingx.results.evaluate.part import _strips
 from formingx.solve import branches, path_following, predictor, snap_through
 from formingx.solve.arc_length import Curve
 from formingx.solve.newton import Failure
-from formingx.solve.progress import Aim
+from formingx.solve.progress import RunTargets
 from formingx.solve.state import State
 
 
@@ -195,10 +195,10 @@ def test_a_jump_does_not_pass_its_target():
 
         def __init__(self):
             pass
-    aim = Aim(SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())])
+    targets = RunTargets(SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())])
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
-    assert aim.short_of_targets(near, 0.1) == pytest.approx(0.01)
-    assert aim.short_of_targets(near, 1e-3) == pytest.approx(1e-3)
+    assert targets.short_of_targets(near, 0.1) == pytest.approx(0.01)
+    assert targets.short_of_targets(near, 1e-3) == pytest.approx(1e-3)
 
 
 def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():

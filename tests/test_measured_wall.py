@@ -54,7 +54,7 @@ def test_a_fit_finds_what_the_wall_tells(truth):
     """Without noise the true values; with noise these, within the intervals, and a covariance by hand."""
     design = fx.Design(cap, RANGES)
     first = design.run()
-    exact = design.fit(wall=noisy(truth), start=first, good=1e-7)
+    exact = design.fit(wall=noisy(truth), start=first, min_change=1e-7)
     assert exact.values == pytest.approx(TRUE, rel=2e-3) and exact.best.volume > 1.05 * first.volume
     part = noisy(truth, 0.01, seed=4)
     answer = design.fit(wall=part, start=first)
@@ -73,11 +73,11 @@ def test_a_fit_finds_what_the_wall_tells(truth):
 def test_what_the_wall_does_not_tell(truth):
     """Blown to a height, stiffness has no effect; two thicknesses that only their sum changes cannot be told apart."""
     part = noisy(truth, 0.01)
-    sure = fx.Design(cap, RANGES | {"scale": (1.0, 0.5, 2.0)}).fit(wall=part, start=TRUE, runs=1).confidence
+    sure = fx.Design(cap, RANGES | {"scale": (1.0, 0.5, 2.0)}).fit(wall=part, start=TRUE, max_runs=1).confidence
     assert sure.undetermined == ["scale"] and "does not tell scale" in str(sure)
     apart = fx.Design(lambda sheet, film, height: cap(sheet + film, height), {
         "sheet": (0.45, 0.1, 0.8), "film": (0.1, 0.05, 0.2), "height": (7.0, 4.0, 9.0)}).fit(
-            wall=part, runs=1).confidence
+            wall=part, max_runs=1).confidence
     (a, b, correlation), = apart.indistinguishable
     assert {a, b} == {"sheet", "film"} and correlation == pytest.approx(-1, abs=1e-6)
 
@@ -114,8 +114,8 @@ def test_bad_points_and_fits(truth):
         fx.MeasuredWall(wall=[1.0, 1.0], points=[0.0, 9.0])
     design, two = fx.Design(cap, RANGES), fx.MeasuredWall(wall=[0.3, 0.4], length=[0.0, 9.0])
     with pytest.raises(fx.InputError, match="2 measured walls for 2 parameters"):
-        design.fit(wall=two, runs=1).confidence.intervals()
+        design.fit(wall=two, max_runs=1).confidence.intervals()
     with pytest.raises(fx.InputError, match="within is for a wanted wall"):
         design.fit(wall=two, within=(0, 5))
     with pytest.raises(fx.InputError, match="needs a fit to a MeasuredWall"):
-        print(design.fit(wall=0.4, runs=1).confidence)
+        print(design.fit(wall=0.4, max_runs=1).confidence)

@@ -34,7 +34,7 @@ _POSITIONS = 400           # number of examined positions of a moving tool
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
 
 
-class Aim(NamedTuple):
+class PrescribedValue(NamedTuple):
     """Pressure or travel that a run aims at, or a constant pressure of the scene.
 
     Attributes:
@@ -63,7 +63,7 @@ class Body(Triangles):
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
         natural: largest shear modulus x thickness / length, the magnitude of pressures that deform a sheet, stress.
-        aims: list of `Aim`: target pressures and travels, and the largest values of the stages' tables.
+        prescribed: list of `PrescribedValue`: target pressures and travels, and largest values of the stages' tables.
         goals: True if there are targets or stages.
         targets: all targets of the run and of its stages.
         highest: largest value of each table that a controlled quantity follows, as a `Target` (`Stage.highest`).
@@ -75,18 +75,19 @@ class Body(Triangles):
         self._units = units.per_depth() if scene.kinematics.dimension_of_volume == 2 else units
         self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
         self.natural = max(self.moduli.values()) * self.thickness / self.length
-        self.aims = [aim for target in targets for aim in self._aim(target, scene.driven)]
+        self.prescribed = [entry for target in targets for entry in self._values_of(target, scene.driven)]
         self.goals = bool(targets or stages)
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
         self.highest = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
             control = None if stage.control is None else scene.items[scene.number(stage.label, stage.control)]
             for target in (*stage.intermediate, stage.until):
-                self.aims += [] if target is None else self._aim(target, control)
+                self.prescribed += [] if target is None else self._values_of(target, control)
             for name, table in stage.tables:
                 item = scene.items[scene.number(stage.label, name)]
                 value = float(table[np.argmax(np.abs(table[:, 1])), 1])
-                self.aims.append(Aim(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
+                self.prescribed.append(
+                    PrescribedValue(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
 
     def format(self, value: float, kind: str, digits: int = 4) -> str:
         """Return a number with its unit as text.
@@ -98,8 +99,8 @@ class Body(Triangles):
         """
         return f"{value:.{digits}g} {self._units.of(kind)}".rstrip()
 
-    def _aim(self, target: Target, control: Any) -> list[Aim]:
-        """Return the `Aim` of a target in a list; an empty list for a target that is no pressure and no travel.
+    def _values_of(self, target: Target, control: Any) -> list[PrescribedValue]:
+        """Return the value of a target in a list; an empty list for a target that is no pressure and no travel.
 
         Args:
             target: the target.
@@ -110,13 +111,13 @@ class Body(Triangles):
             return []
         items = [t for t in self.scene.items if t.driven and t.quantity == quantity]
         item = next((t for t in items if name and t.name == name), control if not name and control in items else None)
-        return [Aim(item, quantity, target.value, str(target))]
+        return [PrescribedValue(item, quantity, target.value, str(target))]
 
-    def pressures(self) -> list[Aim]:
-        """Return all pressures of the run as `Aim` objects: constants, targets, and largest values of tables."""
-        fixed = [Aim(load, "pressure", load.value, repr(load)) for load in self.scene.loads
+    def pressures(self) -> list[PrescribedValue]:
+        """Return all pressures of the run: constants, targets, and largest values of tables."""
+        fixed = [PrescribedValue(load, "pressure", load.value, repr(load)) for load in self.scene.loads
                  if load.quantity == "pressure" and not load.driven]
-        return [*fixed, *(aim for aim in self.aims if aim.quantity == "pressure")]
+        return [*fixed, *(entry for entry in self.prescribed if entry.quantity == "pressure")]
 
     @cached_property
     def pressurised_faces(self) -> list[PressurisedFace]:
@@ -287,13 +288,14 @@ def _open_moulds(body: Body) -> Found:
             continue
         tool = face.tools[0].tool
         depth = float((tool.surface()[0] - open_at.mean(0)).dot(_pressure_direction(face, open_at)).max())
-        aims = [aim for aim in body.pressures() if peak is not None and abs(aim.value) > _ABOVE_PEAK * peak.pressure]
+        excessive = [entry for entry in body.pressures()
+                     if peak is not None and abs(entry.value) > _ABOVE_PEAK * peak.pressure]
         deep = not body.goals and depth > _MOULD_DEPTH * np.ptp(points, axis=0).max()
-        if aims or deep:
+        if excessive or deep:
             reason = "a sheet bears little alone"
-            if aims and peak:
+            if excessive and peak:
                 limit = body.format(peak.pressure, "pressure")
-                reason = f"{aims[0].text} is more than the {limit} that the sheet bears alone"
+                reason = f"{excessive[0].text} is more than the {limit} that the sheet bears alone"
             yield Finding("warning", repr(face.tools[0]),
                           f"the mould is open: straight ahead of (R, Z) = ({open_at[0, 0]:.4g},"
                           f" {open_at[0, 1]:.4g}) it has no surface, and {reason}: the body would be"
@@ -339,11 +341,11 @@ def _tool_paths(body: Body) -> Found:
         if body.scene.together(i)[0] != i:
             continue
         contacts = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
-        aims = [aim.value for aim in body.aims if aim.item is tool]
-        if any(value < 0 for value in aims):                 # the tool is retracted, or pulls
-            if aims[0] < 0 and tool.separates and tool is not body.scene.driven:     # otherwise refused by `trace`
+        travels = [entry.value for entry in body.prescribed if entry.item is tool]
+        if any(value < 0 for value in travels):              # the tool is retracted, or pulls
+            if travels[0] < 0 and tool.separates and tool is not body.scene.driven:     # otherwise refused by `trace`
                 yield Finding("warning", repr(tool),
-                              f"its first travel is {body.format(aims[0], 'travel')}: below 0 it moves away from"
+                              f"its first travel is {body.format(travels[0], 'travel')}: below 0 it moves away from"
                               f" {tool.on!r}. A tool comes in along direction ="
                               f" ({', '.join(f'{m:g}' for m in tool.direction)}) with a travel above 0")
             continue
@@ -351,12 +353,12 @@ def _tool_paths(body: Body) -> Found:
         size = float(max(body.scene.extent))
         faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in contacts]
         start = _gap(faces, tool.direction, 0.0)
-        travel_range = max([*aims, 0.0]) or 3 * size + 2 * max(start, 0.0)
+        travel_range = max([*travels, 0.0]) or 3 * size + 2 * max(start, 0.0)
         gaps = np.array([_gap(faces, tool.direction, travel) for travel in np.linspace(0, travel_range, _POSITIONS)])
         tolerance = 0.5 * min(body.edge.min(), body.thickness)
         if gaps.min() <= tolerance and (start > tolerance or gaps[1] <= gaps[0]) or not travel_range > 0:
             continue
-        if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= tolerance or not others or not aims):
+        if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= tolerance or not others or not travels):
             yield Finding("warning", repr(tool),
                           f"it moves away from the body: over a travel of {body.format(travel_range, 'travel')} its gap"
                           f" to {tool.on!r} grows from {body.format(max(0.0, start), 'travel')} to"

@@ -223,14 +223,14 @@ def limits_passed(problem: Equations, states: Sequence[State]) -> str:
     return f" {many} passed, at {shown[0][0]} {', '.join(f'{value:.6g}' for _, value in shown)}."
 
 
-def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagnosis: Diagnosis,
+def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, diagnosis: Diagnosis,
                 hint: str) -> ConvergenceError:
     """Return the error of a run that ends before its target.
 
     Args:
         record: record of the run (`Record`).
         states: states of the run since its stage began.
-        aim: the open targets (`Aim`).
+        targets: the targets of the run (`RunTargets`).
         why: the failure, a sentence.
         diagnosis: diagnosis of the failure.
         hint: advice as text, used if the diagnosis has none.
@@ -238,11 +238,11 @@ def not_reached(record: Any, states: Sequence[State], aim: Any, why: str, diagno
     Returns:
         The error, with the diagnosis.
     """
-    best = int(np.argmin([abs(value - aim.until.value) for value in aim.values]))
+    best = int(np.argmin([abs(value - targets.until.value) for value in targets.values]))
     at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
     return ConvergenceError(
-        f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{aim.until} was not reached: {why} The nearest"
-        f" value was {aim.values[best]:.6g}{at}.{limits_passed(record.equations, states)} The last good state is"
+        f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{targets.until} was not reached: {why} The nearest"
+        f" value was {targets.values[best]:.6g}{at}.{limits_passed(record.equations, states)} The last good state is"
         f" {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
         diagnosis=diagnosis)
 

@@ -103,7 +103,7 @@ class Flow(Run):
     def _next_event(self, time: float) -> float:
         """Return the first time after `time` that must be met exactly: a corner or the end of the amplitude, or a
         target."""
-        times = [*self._times, *(t.value for t, _ in self.aim.open if t.name == "process_time")]
+        times = [*self._times, *(t.value for t, _ in self.targets.open if t.name == "process_time")]
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _at(self, old: State, time: float) -> State:
@@ -189,7 +189,7 @@ class Flow(Run):
     def _met_before(self, old: State, new: State) -> State:
         """Return the first state in time between two states that meets an open target, or `new` if there is none."""
         problem, best = self.problem, new
-        for target, bound in self.aim.open:
+        for target, bound in self.targets.open:
             if target.name == "process_time":
                 new.met = target if abs(target.value - new.time) <= SAME_TIME * max(abs(new.time), 1e-300) else new.met
                 continue

@@ -23,7 +23,7 @@ from .branches import warn_of_branches
 from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
-from .progress import Aim, Progress
+from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
 from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separated, snap_through, snaps, was_passed
 from .state import State
@@ -71,7 +71,7 @@ class Run:
         self._limit_rule = at_limit_point or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
-        self.aim = Aim(self.curve, targets, requested)
+        self.targets = RunTargets(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
         self._ahead = self.settings.snap_through.ahead      # change of the control in a snap-through
         self._no_rest_at = np.nan                           # control at which a snap-through found no equilibrium
@@ -93,39 +93,39 @@ class Run:
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}
         self._first = len(record.states)
-        self._progress = Progress(self.problem.comm, f"{self._label}to {self.aim.until}", progress)
+        self._progress = Progress(self.problem.comm, f"{self._label}to {self.targets.until}", progress)
         try:
             if start is None:
                 kept = self._continue(may_turn)
             else:
-                self._accept(self.aim.facing(start, first=not record.states))
+                self._accept(self.targets.facing(start, first=not record.states))
             self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._falls)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
             else:
                 self.step = replace(self._step)
-            self.aim.close_met(record.last)
+            self.targets.close_met(record.last)
             self._complete_step()
-            while self.aim.is_open():
+            while self.targets.is_open():
                 if max_steps is not None and record.counts.steps - before >= max_steps:
-                    self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.aim.pace(max_steps))
+                    self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.targets.pace(max_steps))
                 self._check_progress()
                 states = self.states
                 for state in self._next(states[-1]):
                     self._accept(state)
-                    self._stop_if(self.aim.jumped_past(state))
+                    self._stop_if(self.targets.jumped_past(state))
                     if state.kind == "limit point" and self._limit_rule == "stop":
                         record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._limit_rule == "snap_through":
                         break                           # the next step starts from this state
-                    if not self.aim.is_open() and state.met is self.aim.until:
+                    if not self.targets.is_open() and state.met is self.targets.until:
                         break
                 self._complete_step()
                 warn_of_branches(record, self.states[len(states) - 1:])
                 if record.ended:
                     break
-                self._stop_if(self.aim.turned_back())
-                self._progress.show(self.aim.gained(), len(self.states), self.step.length)
+                self._stop_if(self.targets.turned_back())
+                self._progress.show(self.targets.gained(), len(self.states), self.step.length)
         except BaseException:
             record.counts.seconds += self._elapsed()
             raise
@@ -138,9 +138,9 @@ class Run:
         return self.problem.shown(0.0)[0]
 
     @property
-    def _aims_at_control(self) -> bool:
+    def _target_is_control(self) -> bool:
         """True if the last target is a value of the control, not a process time under another control."""
-        return self.aim.until.name != "process_time" or bool(self.problem.setting.rate[-1])
+        return self.targets.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
     def _may_jump(self) -> bool:
@@ -164,7 +164,7 @@ class Run:
     @property
     def _falls(self) -> bool:
         """True if the controlled quantity decreases towards 0, as a pressure that is released."""
-        return self.aim.of_control and abs(self.aim.until.value) < abs(self.aim.values[0])
+        return self.targets.of_control and abs(self.targets.until.value) < abs(self.targets.values[0])
 
     @property
     def states(self) -> list[State]:
@@ -179,18 +179,18 @@ class Run:
         """
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
-        aim, bound = self.aim, self.aim.measure
+        targets, bound = self.targets, self.targets.measure
         pressure = isinstance(bound, Amplitude) and bound.of_load
-        if may_turn and last.stepping.get("until") != [*aim.until[:2]] and not pressure:
+        if may_turn and last.stepping.get("until") != [*targets.until[:2]] and not pressure:
             with self.problem.state_context(last):
-                facing = aim.facing(replace(last))
+                facing = targets.facing(replace(last))
             self._turned = [facing] if facing.slope != last.slope else []
         self._first -= 1 if self._turned else number
         for state in self.states:
             with self.problem.state_context(state):
-                aim.look(state)
+                targets.look(state)
         met = [s.met[:2] for s in self.states if s.met]
-        aim.open = [(target, bound) for target, bound in aim.open if target[:2] not in met]
+        targets.open = [(target, bound) for target, bound in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
         self._ahead, no_rest_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
         self._no_rest_at = np.nan if no_rest_at is None else no_rest_at
@@ -205,7 +205,7 @@ class Run:
         """Complete a step in the record, with the data with which the run continues."""
         self.record.counts.seconds += self._elapsed()
         no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
-        self.record.complete_step(self.step, self.aim.until, given=self._step and asdict(self._step),
+        self.record.complete_step(self.step, self.targets.until, given=self._step and asdict(self._step),
                                   accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
 
     def _next(self, old: State) -> list[State]:
@@ -223,7 +223,7 @@ class Run:
         while True:
             length = min(self.step.length, most)
             length = limit.length(self._trial._replace(length=length)) if limit else length
-            target, bound, reach = self.aim.within_reach(old, length)
+            target, bound, reach = self.targets.within_reach(old, length)
             if length < self.step.length:
                 self._limited("gap closure", length)
             try:
@@ -355,7 +355,7 @@ class Run:
             self._ahead = ahead
             try:
                 change = self._sense * max(ahead, length * abs(old.slope))
-                change = 1 - old.control if fading else self.aim.short_of_targets(old, change)
+                change = 1 - old.control if fading else self.targets.short_of_targets(old, change)
                 new = snap_through(self.curve, old, change, length > 0 and not fading, settings, self._solutions(old),
                                    lambda: self._progress.limited("a jump", self.step.length), onward, self.states)
                 break
@@ -366,7 +366,7 @@ class Run:
         else:
             raise failure
         self._ahead = min(10 * self._ahead, settings.furthest)
-        new = self.curve.close_penetrated(old, [replace(new, met=self.aim.met_by(new))], self.aim.open)[0]
+        new = self.curve.close_penetrated(old, [replace(new, met=self.targets.met_by(new))], self.targets.open)[0]
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
@@ -387,7 +387,7 @@ class Run:
         if absurd is not None:
             value = self.problem.shown(control)[1]
             self._give_up(f"the {self._driven} has come to {value:.4g}, beyond any process: {absurd}")
-        self._stop_if(self.aim.stalled())
+        self._stop_if(self.targets.stalled())
 
     def _stop_if(self, why: str) -> None:
         """Give up the run with the reason `why`, unless it is ""."""
@@ -405,7 +405,7 @@ class Run:
             if (limit.control - old.control) * old.slope < 0:   # on the piece of path that a jump has skipped
                 raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
-        for target, bound in self.aim.open:
+        for target, bound in self.targets.open:
             if target is new.met:
                 continue
             a, b = (self.curve.value(bound, s.x, s.control) - target.value for s in (old, new))
@@ -417,7 +417,7 @@ class Run:
                 state.met = target
                 found.append(state)
         found.sort(key=lambda state: self.curve.progress(old, state))
-        return self.curve.close_penetrated(old, [*found, new], self.aim.open)
+        return self.curve.close_penetrated(old, [*found, new], self.targets.open)
 
     def _accept(self, state: State) -> None:
         """Accept a state and close the targets that it meets."""
@@ -431,7 +431,7 @@ class Run:
                 *self.problem.shown(state.control), inadmissible), hint="")
         if self.problem.has_kinks:
             self.curve.look_ahead(state)
-        self.aim.accept(state)
+        self.targets.accept(state)
         record.counts.iterations += self.curve.spent()
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
@@ -439,9 +439,9 @@ class Run:
         """Raise the `ConvergenceError` of a run that ends before its target, for the reason `why`, with a diagnosis."""
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
-                         self.aim.until.value if self.aim.of_control and self._aims_at_control else None)
+                         self.targets.until.value if self.targets.of_control and self._target_is_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
-        raise not_reached(self.record, self.states, self.aim, f"{why}.", found, hint)
+        raise not_reached(self.record, self.states, self.targets, f"{why}.", found, hint)
 
 
 class _OtherState(Failure):

@@ -182,7 +182,7 @@ class Execution:
         run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, requested)
         start = None if control is None else self._resumed(control)
         run.follow(self._max_steps, self._progress, start)
-        return run.aim.open
+        return run.targets.open
 
     def _change(self, begun: bool) -> None:
         """Run piece 0 of the present stage: change the active items while unbalanced forces decrease to 0.

@@ -18,7 +18,7 @@ from .state import State
 log = logging.getLogger("formingx")
 
 
-class Aim:
+class RunTargets:
     """Targets of a run: which are still open, and how near the run is to the last one, which ends it.
 
     Args:
@@ -107,7 +107,7 @@ class Aim:
         """
         best: tuple[Target | None, Measure | None, float] = (None, None, length)
         for target, bound in self.open:
-            left, rate = self._curve.aim(bound, target.value, old)
+            left, rate = self._curve.target_residual(bound, target.value, old)
             if left * rate < 0 and -left / rate < best[2]:
                 best = (target, bound, -left / rate)
         return best
@@ -121,7 +121,7 @@ class Aim:
                 the control: such a target may be reached in both directions.
         """
         if self.until.signed or not first:
-            left, rate = self._curve.aim(self.measure, self.until.value, start)
+            left, rate = self._curve.target_residual(self.measure, self.until.value, start)
             if left * rate > 0:
                 start.direction, start.slope = -start.direction, -start.slope
                 start.orientation = -start.orientation
@@ -180,12 +180,12 @@ class Aim:
         Args:
             max_steps: the number of allowed steps.
         """
-        aim, (before, now) = self.until.value, self.values[-2:]
-        if not (aim - now) * (now - before) > 0:
+        target, (before, now) = self.until.value, self.values[-2:]
+        if not (target - now) * (now - before) > 0:
             return f"max_steps = {max_steps} were used up, and the last step led away from the target"
         return (f"max_steps = {max_steps} were used up at {100 * self.gained():.3g} % of the way to the target, without"
-                f" trouble: the last step gained {now - before:.4g} of the {aim - now:.4g} that are left, so about"
-                f" {int(np.ceil((aim - now) / (now - before)))} more steps are needed at that pace")
+                f" trouble: the last step gained {now - before:.4g} of the {target - now:.4g} that are left, so about"
+                f" {int(np.ceil((target - now) / (now - before)))} more steps are needed at that pace")
 
 
 class Progress:

@@ -241,7 +241,7 @@ class StateSolver:
         self._b.array_w[:] = x
         return float(bound.value(self._b, control))
 
-    def aim(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
+    def target_residual(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
         """Return the residual of the constraint "quantity = target" at a state, and its derivative by arc length.
 
         The derivative is used since values a step ahead along the tangent mean nothing for a stiff quantity, such as a

@@ -10,9 +10,9 @@ import numpy as np
 from ...errors import InputError
 from ...values.intervals import t_intervals
 
-_OPEN = 0.25
+_UNDETERMINED = 0.25
 """Standard error over the range of a parameter above which the wall leaves it undetermined."""
-_ALIKE = 0.9
+_INDISTINGUISHABLE = 0.9
 """Correlation above which two undetermined parameters cannot be told apart."""
 
 
@@ -68,7 +68,7 @@ class Confidence:
 
         Their standard error exceeds a quarter of their range.
         """
-        return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _OPEN * size]
+        return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _UNDETERMINED * size]
 
     @property
     def indistinguishable(self) -> list[tuple[str, str, float]]:
@@ -76,9 +76,9 @@ class Confidence:
 
         The absolute value of the correlation exceeds 0.9.
         """
-        n, C, open_ = len(self.names), self.correlation, self.undetermined
+        n, C, undetermined = len(self.names), self.correlation, self.undetermined
         return [(self.names[i], self.names[j], float(C[i, j])) for i in range(n) for j in range(i)
-                if abs(C[i, j]) > _ALIKE and {self.names[i], self.names[j]} <= {*open_}]
+                if abs(C[i, j]) > _INDISTINGUISHABLE and {self.names[i], self.names[j]} <= {*undetermined}]
 
     def __str__(self) -> str:
         lines = [f"{'':16}{'value':>10}{'error':>10}{'95 % from':>12}{'to':>10}"]

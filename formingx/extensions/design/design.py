@@ -17,9 +17,9 @@ from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
-from .aim import SEARCH, MeasuredWallTarget, WallTarget, mask_of_range, missed_target
-from .answer import Answer
+from .objective import SETTINGS, MeasuredWallObjective, WallObjective, mask_of_range, missed_target
 from .parameters import Parameters
+from .result import DesignResult
 from .run import DesignRun
 
 log = logging.getLogger("formingx")
@@ -66,7 +66,7 @@ class Design:
         except TypeError as error:
             raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
                              f" cannot be called with these: {error}") from None
-        self._step, self._tolerances, self._most = step, tolerances, max_steps
+        self._step, self._tolerances, self._max_steps = step, tolerances, max_steps
         self.paths = 0                                       # number of runs so far
 
     def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
@@ -107,14 +107,14 @@ class Design:
         scene = copy.copy(scene)                             # the script's scene is left as it is
         scene.one_by_one = True
         self.paths += 1
-        options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._most,
+        options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._max_steps,
                                    "progress": False}
         path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
         return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
 
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
-            volume: str | float | None = "kept", runs: int = 10, good: float = 1e-4,
-            start: Mapping[str, Any] | DesignRun | None = None) -> Answer:
+            volume: str | float | None = "kept", max_runs: int = 10, min_change: float = 1e-4,
+            start: Mapping[str, Any] | DesignRun | None = None) -> DesignResult:
         """Search for the parameters that give an even, a wanted or a measured wall thickness.
 
         A Gauss-Newton method with bounds proposes each step; a run checks it. The reference length of a node is its
@@ -122,13 +122,13 @@ class Design:
 
         Args:
             wall: wanted thickness, length: a number, or a function of the reference length. With a `MeasuredWall` the
-                parameters are fitted to it (see `Answer.confidence`).
+                parameters are fitted to it (see `DesignResult.confidence`).
             even: True for the most even wall, with the lowest standard deviation over mean.
             within: lowest and highest reference length of the nodes that count, length; default all.
             volume: "kept": the reference volume of the first run is prescribed, but free with a measured wall.
                 A number prescribes the reference volume, length^3; None leaves it free.
-            runs: maximum number of runs.
-            good: the search ends if the predicted relative change of the wall (root mean square) is smaller.
+            max_runs: maximum number of runs.
+            min_change: the search ends if the predicted relative change of the wall (root mean square) is smaller.
             start: {parameter: start value}, or a run of this design.
 
         Returns:
@@ -142,7 +142,7 @@ class Design:
             raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
         if even and wall is not None:
             raise InputError("fit: wall and even=True are both given: must be one of them")
-        most, good = count("fit: runs", runs), positive("fit: good", good)
+        max_runs, min_change = count("fit: max_runs", max_runs), positive("fit: min_change", min_change)
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
@@ -150,28 +150,28 @@ class Design:
         if measured and within is not None:
             raise InputError("fit: within is for a wanted wall: leave points of a measured one out of it")
         prescribed = None if volume is None or measured and volume == "kept" else (
-            first.volume * (1 - SEARCH.volume_margin) if volume == "kept" else positive("fit: volume", volume))
-        target = (MeasuredWallTarget(first, wall, prescribed) if measured
-                  else WallTarget(first, wall, within, prescribed))
-        return self._search(first, target, most, good)
+            first.volume * (1 - SETTINGS.volume_margin) if volume == "kept" else positive("fit: volume", volume))
+        objective = (MeasuredWallObjective(first, wall, prescribed) if measured
+                     else WallObjective(first, wall, within, prescribed))
+        return self._search(first, objective, max_runs, min_change)
 
-    def _search(self, first: DesignRun, target: WallTarget, most: int, good: float) -> Answer:
+    def _search(self, first: DesignRun, objective: WallObjective, max_runs: int, min_change: float) -> DesignResult:
         """Search with Gauss-Newton steps from the best run, which are halved if a run is worse or fails.
 
         Args:
             first: first run of the search.
-            target: least-squares target of the search.
-            most: maximum number of runs.
-            good: the search ends if the predicted relative change of the wall (root mean square) is smaller.
+            objective: least-squares objective of the search.
+            max_runs: maximum number of runs.
+            min_change: the search ends if the predicted relative change of the wall (root mean square) is smaller.
         """
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
-        best, taken, predicted, before = first, [first], first.wall, 1.0
-        notes: list[str] = []
-        reason = f"runs = {most} were used up"
-        while len(taken) + len(notes) < most:
+        best, runs, predicted, gained_before = first, [first], first.wall, 1.0
+        failed: list[str] = []
+        reason = f"max_runs = {max_runs} were used up"
+        while len(runs) + len(failed) < max_runs:
             try:
-                residual, jacobian = target.residual(best)
+                residual, jacobian = objective.residual(best)
             except InputError as error:
                 if best is first:
                     raise
@@ -180,41 +180,42 @@ class Design:
             if not np.any(np.abs(jacobian * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
             # keeps parameters without effect
-            damping = target.damping * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
+            damping = objective.damping * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
             step = lsq_linear(np.vstack([jacobian * size, damping]), np.append(-residual, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size
-            gain = np.sqrt(np.mean((jacobian @ step) ** 2))
-            better = 1 - np.sum((residual + jacobian @ step) ** 2) / np.sum(residual**2)
-            if gain < good or better < SEARCH.min_improvement:
-                reason = f"the next step would change the wall by {gain:.1e}" if gain < good else (
-                    f"the next step, within the bounds, would be {100 * max(better, 0.0):.1f} % better")
+            change = np.sqrt(np.mean((jacobian @ step) ** 2))
+            improvement = 1 - np.sum((residual + jacobian @ step) ** 2) / np.sum(residual**2)
+            if change < min_change or improvement < SETTINGS.min_improvement:
+                reason = f"the next step would change the wall by {change:.1e}" if change < min_change else (
+                    f"the next step, within the bounds, would be {100 * max(improvement, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= SEARCH.shortest_step and len(taken) + len(notes) < most:
+            while share >= SETTINGS.shortest_step and len(runs) + len(failed) < max_runs:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
-                    taken.append(new)
-                    if target.cost(new) < target.cost(best):
+                    runs.append(new)
+                    if objective.cost(new) < objective.cost(best):
                         break
                 except (InputError, ConvergenceError) as error:
-                    notes.append(str(error).splitlines()[0])
+                    failed.append(str(error).splitlines()[0])
                 share, new = share / 2, None
             if new is None:
-                reason = "no shorter step brings an improvement" if share < SEARCH.shortest_step else reason
+                reason = "no shorter step brings an improvement" if share < SETTINGS.shortest_step else reason
                 break
             predicted = best.wall + share * (best.derivative("wall")[1] @ step)
-            gained = 1 - target.cost(new) / target.cost(best)
+            gained = 1 - objective.cost(new) / objective.cost(best)
             best = new
-            if max(gained, before) < SEARCH.min_improvement:     # a single small improvement may precede a larger one
+            if max(gained, gained_before) < SETTINGS.min_improvement:    # a small improvement may precede a larger one
                 reason = f"the last run was {100 * gained:.1f} % better"
                 break
-            before = gained
-            log.info("design: run %d, cost %.3g", len(taken), target.cost(best))
-        missed = [missed_target("volume", target.volume, best.volume), target.shortfall(best)]
-        return Answer(first, best, taken, notes, target.inside, reason, predicted, "\n".join(filter(None, missed)),
-                      target.target_wall, target.measured)
+            gained_before = gained
+            log.info("design: run %d, cost %.3g", len(runs), objective.cost(best))
+        missed = [missed_target("volume", objective.volume, best.volume), objective.shortfall(best)]
+        return DesignResult(first, best, runs, failed, objective.inside, reason, predicted,
+                            "\n".join(filter(None, missed)), objective.target_wall, objective.measured)
 
-    def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None, runs: int = 15) -> Answer:
+    def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None,
+                       max_runs: int = 15) -> DesignResult:
         """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.
 
         Successive linear programs minimise the linearised volume within a trust region, which shrinks if a run is worse
@@ -224,7 +225,7 @@ class Design:
         Args:
             min_wall: minimum wall thickness, length.
             within: lowest and highest reference length of the nodes that count, length, as in `fit`; default all.
-            runs: maximum number of runs.
+            max_runs: maximum number of runs.
 
         Returns:
             First and best run of the search, and the reason for its end.
@@ -234,18 +235,19 @@ class Design:
             ConvergenceError: the first run fails.
         """
         from scipy.optimize import linprog
-        least, most = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: runs", runs)
+        min_wall, max_runs = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: max_runs", max_runs)
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
         inside = mask_of_range(first, within)
-        unit = min(least, first.wall[inside].min())
-        best, taken, predicted, reach, reason = first, [first], first.wall, 0.25, f"runs = {most} were used up"
-        notes: list[str] = []
+        unit = min(min_wall, first.wall[inside].min())
+        best, runs, predicted, trust_radius = first, [first], first.wall, 0.25
+        failed: list[str] = []
+        reason = f"max_runs = {max_runs} were used up"
 
         def cost(run: DesignRun) -> float:
             """Return the volume of a run over the first run's, plus a penalty for a wall below the minimum."""
-            return run.volume / first.volume + 10 * max(least - run.wall[inside].min(), 0.0) / unit
-        while len(taken) + len(notes) < most:
+            return run.volume / first.volume + 10 * max(min_wall - run.wall[inside].min(), 0.0) / unit
+        while len(runs) + len(failed) < max_runs:
             try:
                 wall, jacobian = best.derivative("wall")
             except InputError as error:
@@ -253,14 +255,14 @@ class Design:
                     raise
                 reason = str(error)
                 break
-            grows = best.derivative("volume")[1][0] / first.volume
+            volume_slope = best.derivative("volume")[1][0] / first.volume
             n = len(size)
             # a slack variable for the missing wall makes the program feasible
             rows = np.column_stack([-jacobian[inside] * size, -np.full(inside.sum(), unit)])
-            room = [(max((a - v) / s, -reach), min((b - v) / s, reach))
-                    for a, b, v, s in zip(low, high, best.vector, size)]
-            found = linprog(np.append(grows * size, 10.0), A_ub=rows, b_ub=wall[inside] - least,
-                            bounds=[*room, (0, None)])
+            bounds = [(max((a - v) / s, -trust_radius), min((b - v) / s, trust_radius))
+                      for a, b, v, s in zip(low, high, best.vector, size)]
+            found = linprog(np.append(volume_slope * size, 10.0), A_ub=rows, b_ub=wall[inside] - min_wall,
+                            bounds=[*bounds, (0, None)])
             step = found.x[:n] * size
             gain = cost(best) - (best.volume / first.volume + found.fun)
             if gain < 1e-5:
@@ -268,16 +270,16 @@ class Design:
                 break
             try:
                 new = self._run(np.clip(best.vector + step, low, high))
-                taken.append(new)
+                runs.append(new)
                 if cost(new) < cost(best):
-                    predicted, best, reach = wall + jacobian @ step, new, min(2 * reach, 1.0)
+                    predicted, best, trust_radius = wall + jacobian @ step, new, min(2 * trust_radius, 1.0)
                     continue
             except (InputError, ConvergenceError) as error:
-                notes.append(str(error).splitlines()[0])
-            reach /= 4
-            if reach < 1e-4:
+                failed.append(str(error).splitlines()[0])
+            trust_radius /= 4
+            if trust_radius < 1e-4:
                 reason = "no shorter step brings an improvement"
                 break
         thinnest = best.wall[inside].min()
-        return Answer(first, best, taken, notes, inside, reason, predicted,
-                      missed_target("minimum wall", least, min(thinnest, least)))
+        return DesignResult(first, best, runs, failed, inside, reason, predicted,
+                            missed_target("minimum wall", min_wall, min(thinnest, min_wall)))

@@ -84,8 +84,8 @@ class PerturbedRun:
     def __init__(self, scene: Any, end: Any, base: Problem, name: str):
         self.name, self.end = name, end
         self.path: Any = None
-        own, others = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
-        if own.shape != others.shape or not np.array_equal(own, others) or len(scene.items) != len(base.scene.items):
+        cells, base_cells = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
+        if not np.array_equal(cells, base_cells) or len(scene.items) != len(base.scene.items):
             raise InputError(f"Design: {name} changes the elements of the mesh, or the number of loads, supports or"
                              f" contacts: there are derivatives only by what moves nodes or changes numbers")
         self.problem = Problem(scene)
@@ -161,7 +161,7 @@ class PerturbedRun:
         self.problem.destroy()
 
 
-def settle(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
+def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
     """Solve for the states of the perturbed runs near a state of the base run; collective.
 
@@ -210,34 +210,34 @@ def settle(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation
         return run.constraint(equations[k]) - residual
     size = _norm(problem, state.x) + abs(state.control)
     tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else _TOLERANCES.tolerance
-    todo, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
+    active, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
     for iteration in range(_TOLERANCES.iterations):
-        rows = np.column_stack([perturbed[k].residual(base_residual) for k in todo])
-        left = np.array([constraint(k) for k in todo])
-        if len(todo) > 1:
+        rows = np.column_stack([perturbed[k].residual(base_residual) for k in active])
+        violations = np.array([constraint(k) for k in active])
+        if len(active) > 1:
             dx = -newton.solver.solve_all(rows)
         else:
-            run = perturbed[todo[0]]
+            run = perturbed[active[0]]
             newton.solver.solve(run.F, run.gradient)
             dx = -run.gradient.array_r[:, None]
-        steps = -(left + problem.comm.allreduce(g @ dx)) / slope
+        steps = -(violations + problem.comm.allreduce(g @ dx)) / slope
         dx += np.outer(b, steps)
-        good = True
-        for j, k in enumerate(todo):
+        converged = True
+        for column, k in enumerate(active):
             run = perturbed[k]
-            correction = _norm(problem, dx[:, j]) + abs(steps[j])
+            correction = _norm(problem, dx[:, column]) + abs(steps[column])
             if iteration != 1:                               # iteration 1 checks one perturbed run, and updates none
-                run.x, run.control = run.x + dx[:, j], run.control + steps[j]
-            away = _norm(problem, run.x - state.x) + abs(run.control - state.control)
-            far = correction > max(_TOLERANCES.last_tolerance * away, 10 * _TOLERANCES.round_off * size)
-            if not np.isfinite(correction) or iteration == _TOLERANCES.iterations - 1 and far:
+                run.x, run.control = run.x + dx[:, column], run.control + steps[column]
+            distance = _norm(problem, run.x - state.x) + abs(run.control - state.control)
+            failed = correction > max(_TOLERANCES.last_tolerance * distance, 10 * _TOLERANCES.round_off * size)
+            if not np.isfinite(correction) or iteration == _TOLERANCES.iterations - 1 and failed:
                 raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
-            good &= correction <= max(tolerance * away, _TOLERANCES.round_off * size)
-        if good:
+            converged &= correction <= max(tolerance * distance, _TOLERANCES.round_off * size)
+        if converged:
             break
         # the error is now of second order: if the most corrected run has converged, so have the others
-        todo = [int(np.argmax(first))] if iteration == 0 else list(range(len(perturbed)))
+        active = [int(np.argmax(first))] if iteration == 0 else list(range(len(perturbed)))
     return base_residual
 
 

@@ -17,11 +17,11 @@ from .scatter import covariance_of
 from .scatter import deviations as deviations_of
 
 
-def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
+def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """Write the report of a search for design parameters as an HTML page (rank 0 writes).
 
     Args:
-        answer: result of the search.
+        result: result of the search.
         file: path of the HTML file.
         title: heading of the page.
         deviations: standard deviations of the parameters, see `DesignRun.spread`, or None.
@@ -30,37 +30,37 @@ def of_answer(answer: Any, file: Any, title: str, deviations: Any, units: Units)
     Returns:
         Path of the file.
     """
-    units = _units_of(answer.best, units)
-    before, best, (a, b) = answer.before, answer.best, answer.cv
+    units = _units_of(result.best, units)
+    before, best, (a, b) = result.before, result.best, result.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
-    attainable, met, absent = answer.attainable(), answer.at_bounds(), answer.without_effect()
-    walls = [run.wall[answer.inside] for run in (before, best)]
-    deviation = abs(answer.predicted - best.wall)[answer.inside].max() / walls[1].mean()
+    attainable, met, absent = result.attainable(), result.at_bounds(), result.without_effect()
+    walls = [run.wall[result.inside] for run in (before, best)]
+    deviation = abs(result.predicted - best.wall)[result.inside].max() / walls[1].mean()
     cards = [(f"{a:.3g} → {b:.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "minimum wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
-             (str(answer.paths), "runs were taken")]
-    notes = [("bad", text) for text in [answer.missed, *(f.text for f in alarming(best.path.findings()))]]
-    notes += [("", f"A run failed: {text}") for text in answer.failed]
+             (str(result.paths), "runs were taken")]
+    notes = [("bad", text) for text in [result.missed, *(f.text for f in alarming(best.path.findings()))]]
+    notes += [("", f"A run failed: {text}") for text in result.failed]
     notes += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     notes += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
-    how = [f"Why it ended: {answer.reason}.",
+    summary = [f"Why it ended: {result.reason}.",
            f"The run before the best predicted its wall to {100 * deviation:.2g} %.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
-    rows = [[str(k), *(page.number(v) for v in (run.wall[answer.inside].std() / run.wall[answer.inside].mean(),
-             run.wall[answer.inside].min(), run.wall[answer.inside].mean(), run.volume))]
-            for k, run in enumerate(answer.runs, 1)]
+    rows = [[str(k), *(page.number(v) for v in (run.wall[result.inside].std() / run.wall[result.inside].mean(),
+             run.wall[result.inside].min(), run.wall[result.inside].mean(), run.volume))]
+            for k, run in enumerate(result.runs, 1)]
     runs = page.table(["run", "unevenness", units.label("wall", "minimum wall"), units.label("wall", "mean wall"),
                        units.label("volume")], rows)
 
     def pictures() -> list[str]:
         """Return HTML elements with the pictures of the part, the walls, the profiles and the effects."""
         return [_sections([before, best], ["before", "after"], units),
-                _walls(answer, spread, deviations, units), _profiles(before, best), _heat_map(effects, units)]
-    tail = [*_uncertainties(best, deviations, units), "<h2>Runs of the search</h2>", runs]
-    return _write(file, title or "Report of a design", how, cards, notes, pictures,
-                  _effects(best, effects, units, before), tail, best.path.problem.comm)
+                _walls(result, spread, deviations, units), _profiles(before, best), _heat_map(effects, units)]
+    sections = [*_uncertainties(best, deviations, units), "<h2>Runs of the search</h2>", runs]
+    return _write(file, title or "Report of a design", summary, cards, notes, pictures,
+                  _effects(best, effects, units, before), sections, best.path.problem.comm)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
@@ -99,30 +99,31 @@ def _units_of(run: Any, units: Units) -> Units:
     return units.per_depth() if run.path.scene.kinematics.dimension_of_volume == 2 else units
 
 
-def _write(file: Any, title: str, how: list[str], cards: list, notes: list, pictures: Any, table: str, tail: list[str],
-           comm: Any) -> FilePath:
+def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, pictures: Any, table: str,
+           sections: list[str], comm: Any) -> FilePath:
     """Write the page of a report on rank 0, and return its path.
 
     Args:
         file: path of the HTML file.
         title: heading of the page.
-        how: sentences below the heading.
+        summary: sentences below the heading.
         cards: (value, its description) of each large number.
         notes: (kind, text) of each note; the kind "bad" is a warning.
         pictures: function that returns HTML elements.
         table: HTML table of the parameters and their effects.
-        tail: further HTML elements.
+        sections: further HTML elements.
         comm: MPI communicator.
     """
     def make() -> None:
         """Draw the pictures and write the file."""
-        body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(how))}</p>"]
+        body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(summary))}</p>"]
         body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>"
                  for kind, text in notes if text]
         body.append("<div class=cards>" + "".join(
             f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(what)}</span></div>"
             for value, what in cards) + "</div>")
-        body += [*pictures(), "<h2>Parameters and their effects</h2>", table, *tail, "<h2>Made with</h2>", page.table(
+        body += [*pictures(), "<h2>Parameters and their effects</h2>", table, *sections, "<h2>Made with</h2>"]
+        body += [page.table(
             ["", ""], [["date", datetime.datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")],
                        *([k, str(v)] for k, v in files.versions().items())])]
         files.replace(file, lambda stream: stream.write(page.page(title, body)))
@@ -174,17 +175,17 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
     axes.legend()
 
 
-def _walls(answer: Any, spread: Any, deviations: Any, units: Units) -> str:
+def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
     """Return an HTML figure of the walls of a search: of the first and the best run, predicted and wanted."""
     drawing, axes = figure(1, width=9, height=4)
-    s = answer.best.profile.reference_length
-    axes.plot(s, answer.before.wall, color="0.6", label="before")
-    axes.plot(s, answer.predicted, "--", color="C1", linewidth=1, label="predicted by the run before the best")
-    if answer.target_wall is not None:
-        axes.plot(s[answer.inside], answer.target_wall, "k--", linewidth=1, label="wanted")
-    if not np.all(answer.inside):
-        axes.axvspan(*s[answer.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
-    _line(axes, answer.best, "C0", "after", spread, deviations, units)
+    s = result.best.profile.reference_length
+    axes.plot(s, result.before.wall, color="0.6", label="before")
+    axes.plot(s, result.predicted, "--", color="C1", linewidth=1, label="predicted by the run before the best")
+    if result.target_wall is not None:
+        axes.plot(s[result.inside], result.target_wall, "k--", linewidth=1, label="wanted")
+    if not np.all(result.inside):
+        axes.axvspan(*s[result.inside][[0, -1]], color="0.96", zorder=0, label="what counts")
+    _line(axes, result.best, "C0", "after", spread, deviations, units)
     return "<h2>The wall</h2>" + page.figure(drawing, "Wall over the reference length, before and after.")
 
 
@@ -255,13 +256,13 @@ def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
         before: first run of a search, for a column with its values, or None.
     """
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
-    thin, grows = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
+    thin, volume_change = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),
             units.label("wall", "minimum wall"), units.label("wall", "largest change"), units.label("volume")]
     most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
     rows = [[name, *([page.number(before.vector[k])] if before else []),
              *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),
-             *(f"{v:.3g}" for v in (tenth[:, k].mean(), tenth[thin, k], most[k], grows[k]))]
+             *(f"{v:.3g}" for v in (tenth[:, k].mean(), tenth[thin, k], most[k], volume_change[k]))]
             for k, name in enumerate(p.names)]
     return page.table(head, rows) + ("<p class=lead>Changes that a tenth of the range of a parameter makes, to first"
                                      " order: of the mean and of the minimum wall, the largest anywhere, of the volume."

@@ -19,8 +19,8 @@ from ...solve.newton import Failure, Tolerances
 from ...solve.record import Record
 from ...units import NONE, Units
 from . import scatter
-from .carry import carry
 from .parameters import Parameters
+from .perturbed_paths import trace_perturbed
 from .perturbed_runs import PerturbedRun, PerturbedRunFailure
 from .scatter import Band
 
@@ -146,19 +146,20 @@ class DesignRun:
         """
         contact, reason = bool(self.path.problem.contacts), ""
         for size in _CONTACT_CHANGES if contact else (_SMOOTH_CHANGE,):
-            made = []
+            perturbed_runs = []
             for k, step in enumerate(size * self.parameters.size):
-                ways = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
-                made.append(([self._perturbed_run(k, way * step) for way in ways], ways[0] * step * len(ways)))
+                signs = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)
+                runs = [self._perturbed_run(k, sign * step) for sign in signs]
+                perturbed_runs.append((runs, signs[0] * step * len(signs)))
             try:
-                carry(self.path, self._end, [perturbed for runs, _ in made for perturbed in runs])
+                trace_perturbed(self.path, self._end, [perturbed for runs, _ in perturbed_runs for perturbed in runs])
             except PerturbedRunFailure as failure:
                 reason = failure.reason
             except Failure as failure:
                 reason = failure.reason
                 break
             else:
-                return made
+                return perturbed_runs
         raise InputError(f"Design: this run has no derivative: {reason}")
 
     def _perturbed_run(self, k: int, step: float) -> PerturbedRun:
@@ -274,17 +275,17 @@ class DesignRun:
             return self.path[measure][-1:]
         found = measure(self.path) if callable(measure) else None
         try:
-            whole = np.atleast_1d(np.asarray(found, dtype=float))
+            values = np.atleast_1d(np.asarray(found, dtype=float))
         except (TypeError, ValueError):
-            whole = np.array(np.nan)
-        if not np.all(np.isfinite(whole)):
+            values = np.array(np.nan)
+        if not np.all(np.isfinite(values)):
             raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
                              f" path, or a function of it that gives finite numbers")
         short = _path_of(self.path.last, Record(self.path.problem, self.path.record.curve))
-        if not np.allclose(whole, measure(short), rtol=1e-9, atol=0):
+        if not np.allclose(values, measure(short), rtol=1e-9, atol=0):
             raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
                              " earlier states too, whose derivatives are not kept")
-        return whole
+        return values
 
     def _perturbed_value(self, perturbed: PerturbedRun, measure: Any) -> Any:
         """Return the values of an output quantity in a perturbed run, shape (m,) or a number.
@@ -297,9 +298,10 @@ class DesignRun:
             return _volume(perturbed.problem)
         state = perturbed.state(self.path.last)
         if measure == "wall":
-            own, others = (problem.scene.mesh.domain.geometry.x for problem in (self.path.problem, perturbed.problem))
-            same = self.path.problem.comm.allreduce(np.array_equal(own, others), MPI.LAND)
-            return (self._profiles if same else Profiles(perturbed.problem)).of(state).thickness
+            nodes, perturbed_nodes = (problem.scene.mesh.domain.geometry.x
+                                      for problem in (self.path.problem, perturbed.problem))
+            same_nodes = self.path.problem.comm.allreduce(np.array_equal(nodes, perturbed_nodes), MPI.LAND)
+            return (self._profiles if same_nodes else Profiles(perturbed.problem)).of(state).thickness
         if perturbed.path is None:
             perturbed.path = _path_of(state, Record(perturbed.problem, Curve(perturbed.problem, self._tolerances)))
         return perturbed.path[measure] if isinstance(measure, str) else np.asarray(measure(perturbed.path), dtype=float)

@@ -103,19 +103,21 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
     for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
         if isinstance(part, Mapping):
             for name, size in part.items():
-                mine = [k for k, entry in enumerate(parameters.names) if entry == name or entry.startswith(f"{name}[")]
-                if not mine:
+                numbers = [k for k, entry in enumerate(parameters.names)
+                           if entry == name or entry.startswith(f"{name}[")]
+                if not numbers:
                     raise _unknown(caller, name, parameters)
-                found[mine, mine] += non_negative(f"{caller}: {name}", size) ** 2
+                found[numbers, numbers] += non_negative(f"{caller}: {name}", size) ** 2
         elif hasattr(part, "covariance") and hasattr(part, "constants"):
             names = list(part.constants)
             for name in names:
                 if name not in parameters.names:
                     raise _unknown(caller, name, parameters)
-            open_ = [name for name, row in zip(names, part.covariance) if not np.all(np.isfinite(row))]
-            if open_:
-                raise InputError(f"{caller}: the tests of this fit leave {', '.join(open_)} open: no deviation is"
-                                 f" known; fit it to more points than it has constants, or a law with fewer constants")
+            undetermined = [name for name, row in zip(names, part.covariance) if not np.all(np.isfinite(row))]
+            if undetermined:
+                raise InputError(f"{caller}: the tests of this fit leave {', '.join(undetermined)} open: no deviation"
+                                 f" is known; fit it to more points than it has constants, or a law with fewer"
+                                 f" constants")
             numbers = [parameters.names.index(name) for name in names]
             found[np.ix_(numbers, numbers)] += part.covariance
         else:

@@ -32,7 +32,7 @@ def unevenness(wall: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Answer:
+class DesignResult:
     """Result of a search for design parameters (`Design.fit`, `Design.minimum_weight`); its text is a report.
 
     Walls are thicknesses at the k nodes of the bottom face.
@@ -203,5 +203,5 @@ class Answer:
             InputError: the best run has no derivative.
             OSError: the file cannot be written.
         """
-        from .report import of_answer
-        return of_answer(self, file, title, deviations, units or NONE)
+        from .report import of_search
+        return of_search(self, file, title, deviations, units or NONE)

@@ -1,4 +1,4 @@
-"""Least-squares targets of a search for a wall thickness, and the reasons why a search missed them."""
+"""Least-squares objectives of a search for a wall thickness, and the reasons why a search missed them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .run import DesignRun
 
 
 @dataclass(frozen=True)
-class Search:
+class SearchSettings:
     """Weights, damping and stopping criteria of the searches for design parameters.
 
     Attributes:
@@ -40,7 +40,7 @@ class Search:
     shortest_step: float = 1 / 64
 
 
-SEARCH = Search()
+SETTINGS = SearchSettings()
 
 
 def missed_target(what: str, requested: float | None, found: float) -> str:
@@ -54,13 +54,13 @@ def missed_target(what: str, requested: float | None, found: float) -> str:
     Returns:
         Text with the target and the value found; "" if they agree to 0.5 %, or there is no target.
     """
-    if requested is None or abs(found / requested - 1) < SEARCH.tolerance:
+    if requested is None or abs(found / requested - 1) < SETTINGS.tolerance:
         return ""
     return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
 
 
-class WallTarget:
-    """Least-squares target of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
+class WallObjective:
+    """Least-squares objective of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
 
     The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
     length of a node is its distance from the axis along the middle line of the undeformed body.
@@ -83,7 +83,7 @@ class WallTarget:
     """
 
     measured: Any = None
-    damping = SEARCH.damping
+    damping = SETTINGS.damping
 
     def __init__(self, run: DesignRun, wall: Any, within: tuple[float, float] | None, volume: float | None):
         self.inside, self.volume = mask_of_range(run, within), volume
@@ -128,10 +128,10 @@ class WallTarget:
             slopes: their derivatives by the n parameters, shape (m, n).
         """
         if self.volume is not None:
-            grows = run.derivative("volume")[1][0] / self.volume
-            weight = SEARCH.volume_weight * np.sqrt(len(residual))
+            volume_slope = run.derivative("volume")[1][0] / self.volume
+            weight = SETTINGS.volume_weight * np.sqrt(len(residual))
             residual = np.append(residual, weight * (run.volume / self.volume - 1))
-            slopes = np.vstack([slopes, weight * grows])
+            slopes = np.vstack([slopes, weight * volume_slope])
         return residual, slopes
 
     def cost(self, run: DesignRun) -> float:
@@ -164,7 +164,7 @@ class WallTarget:
         wall = run.wall[self.inside]
         deviation = wall / self.target_wall - 1
         worst = int(np.argmax(np.abs(deviation)))
-        if abs(deviation[worst]) < SEARCH.wall_tolerance:
+        if abs(deviation[worst]) < SETTINGS.wall_tolerance:
             return ""
         s = run.profile.reference_length[self.inside]
         return (f"the wanted wall was not reached: wanted {_range(self.target_wall)}, reached {_range(wall)}; the"
@@ -183,25 +183,25 @@ class WallTarget:
         p = run.parameters
         low, high = (p.low - run.vector) / p.size - 1e-12, (p.high - run.vector) / p.size + 1e-12
         m = len(self.target_wall) if self.target_wall is not None else len(residual)
-        far = np.full(len(p.size), np.inf)
-        now, step = _deviation(residual, jacobian * p.size, m, low, high)
-        free = _deviation(residual[:m], jacobian[:m] * p.size, m, low, high)[0] if self.volume is not None else now
-        unbounded = _deviation(residual, jacobian * p.size, m, -far, far)[0]
-        met = np.minimum(step - low, high - step) <= 1e-6 * (high - low)
-        names = ", ".join(name for name, at_bound in zip(p.names, met) if at_bound)
-        stops = []
-        if free < SEARCH.limiting_share * now and self.volume is not None:
-            stops.append(f"the volume, which is held at {self.volume:.5g} (volume=None would leave {100 * free:.2g} %"
-                         f" of deviation on the mean)")
-        if unbounded < SEARCH.limiting_share * now and names:
-            stops.append(f"bounds: {names} (wider ones would leave {100 * unbounded:.2g} %)")
-        if stops:
-            return f"It is stopped by {'; '.join(stops)}; now it is {100 * now:.2g} %"
-        return f"These parameters bring it no nearer: by the derivatives {100 * now:.2g} % is left on the mean"
+        infinite = np.full(len(p.size), np.inf)
+        present, step = _deviation(residual, jacobian * p.size, m, low, high)
+        free = _deviation(residual[:m], jacobian[:m] * p.size, m, low, high)[0] if self.volume is not None else present
+        unbounded = _deviation(residual, jacobian * p.size, m, -infinite, infinite)[0]
+        at_bounds = np.minimum(step - low, high - step) <= 1e-6 * (high - low)
+        names = ", ".join(name for name, at_bound in zip(p.names, at_bounds) if at_bound)
+        limits = []
+        if free < SETTINGS.limiting_share * present and self.volume is not None:
+            limits.append(f"the volume, which is held at {self.volume:.5g} (volume=None would leave {100 * free:.2g} %"
+                          f" of deviation on the mean)")
+        if unbounded < SETTINGS.limiting_share * present and names:
+            limits.append(f"bounds: {names} (wider ones would leave {100 * unbounded:.2g} %)")
+        if limits:
+            return f"It is stopped by {'; '.join(limits)}; now it is {100 * present:.2g} %"
+        return f"These parameters bring it no nearer: by the derivatives {100 * present:.2g} % is left on the mean"
 
 
-class MeasuredWallTarget(WallTarget):
-    """Least-squares target of a search whose runs are fitted to a measured wall, and possibly to a prescribed volume.
+class MeasuredWallObjective(WallObjective):
+    """Least-squares objective of a search: a measured wall thickness, and possibly a prescribed volume.
 
     The residuals are the relative deviations of the wall at the measured points of the part.
 
@@ -211,7 +211,7 @@ class MeasuredWallTarget(WallTarget):
         volume: prescribed reference volume, length^3, or None.
     """
 
-    damping = SEARCH.damping_measured
+    damping = SETTINGS.damping_measured
 
     def __init__(self, run: DesignRun, measured: Any, volume: float | None):
         super().__init__(run, None, None, volume)

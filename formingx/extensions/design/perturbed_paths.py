@@ -28,10 +28,10 @@ from ...solve.newton import Failure, fixed
 from ...solve.pieces import driving, end_of, next_knot, straight
 from ...solve.stage import Plan, plan
 from ...solve.state import State
-from .perturbed_runs import PerturbedRun, settle
+from .perturbed_runs import PerturbedRun, solve_perturbed
 
 
-def carry(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
+def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
     """Solve for all perturbed runs at the last state of the base run; collective.
 
     Args:
@@ -42,10 +42,10 @@ def carry(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
     Raises:
         Failure: the base run has no derivative; the text of the failure is the reason.
     """
-    _StateTransfer(path, end, perturbed).run()
+    _PerturbedPaths(path, end, perturbed).run()
 
 
-class _StateTransfer:
+class _PerturbedPaths:
     """Transfer of the perturbed runs along the base run.
 
     Args:
@@ -69,10 +69,10 @@ class _StateTransfer:
         self._single = isinstance(end, Target)
         self._plans = [] if self._single else [plan(self.problem.scene, stage) for stage in end]
         self._end = end
-        self._until: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
+        self._targets: dict[tuple[int, int], tuple[Any, list[Any]]] = {}
         for run in perturbed:
             run.plans = [] if self._single else [plan(run.problem.scene, stage) for stage in run.end]
-            if [_kind(p) for p in run.plans] != [_kind(p) for p in self._plans]:
+            if [_fixed_properties(p) for p in run.plans] != [_fixed_properties(p) for p in self._plans]:
                 raise Failure(f"parameter {run.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
@@ -101,7 +101,7 @@ class _StateTransfer:
             elif state.kind == "start":
                 self._solved = state
             elif last or history:
-                self._settle(state, before, last)
+                self._solve_at(state, before, last)
             if history:
                 for run in self.runs:
                     run.problem.advance(run.x, run.control)
@@ -119,7 +119,7 @@ class _StateTransfer:
         if np.any(state.x):
             with self.problem.state_context(replace(state, memory=state.before)):
                 constraint = fixed(state.control)
-                settle(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
+                solve_perturbed(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
 
     def _begin_stage(self, setting: StepData) -> None:
         """Begin a stage, or a piece of a stage between two rows of its tables, in each perturbed run.
@@ -129,18 +129,18 @@ class _StateTransfer:
         """
         for run in self.runs:
             problem, p = run.problem, run.plans[setting.stage]
-            now = problem.setting
+            current = problem.setting
             started = run.x is not None
-            amplitudes = [0.0] * len(now.base) if not started else [
-                *now.amplitudes(run.control)[:-1], problem.time_at(run.control)]
+            amplitudes = [0.0] * len(current.base) if not started else [
+                *current.amplitudes(run.control)[:-1], problem.time_at(run.control)]
             x = run.x if started else np.zeros(problem.x.getLocalSize())
             if started:
-                for number in set(now.inactive) - set(setting.inactive):
+                for number in set(current.inactive) - set(setting.inactive):
                     problem.bring_in(number, x, run.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
-                time = now.base[-1] + now.rate[-1] * run.control if started else 0.0
+                time = current.base[-1] + current.rate[-1] * run.control if started else 0.0
                 piece_end = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
                 base, rate = straight(amplitudes, problem.scales, p.tables, time, piece_end)
                 run.piece_end, control = piece_end, 0.0
@@ -149,7 +149,7 @@ class _StateTransfer:
             problem.enter(replace(setting, base=base, rate=rate), x, control)
             run.control = control
 
-    def _settle(self, state: State, before: State, last: bool) -> None:
+    def _solve_at(self, state: State, before: State, last: bool) -> None:
         """Solve for the perturbed runs at an accepted state of the base run.
 
         Args:
@@ -160,13 +160,13 @@ class _StateTransfer:
         with self.problem.state_context(replace(state, memory=state.before)):
             self._closing = []
             for number, face in enumerate(self.problem.contacts):
-                self._closing.append(self._arrivals(number, face, state, before))
+                self._closing.append(self._close_gaps(number, face, state, before))
             self._keep_open(state)
             for run in self.runs:                              # the perturbed runs keep the events of the base run
                 run.x = state.x + (run.x - self._solved.x)
                 run.control = state.control + (run.control - self._solved.control)
             equation, equations = self._equations(state, last)
-            residual = settle(self.curve, state, self.runs, equation, equations)
+            residual = solve_perturbed(self.curve, state, self.runs, equation, equations)
             for run in self.runs if state is self.path.last else []:
                 run.balance(residual)
             self._solved = state
@@ -184,7 +184,7 @@ class _StateTransfer:
                 for perturbed in others:
                     perturbed.keep_open(free | closing)
 
-    def _arrivals(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
+    def _close_gaps(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Move the points of the perturbed runs whose gap closes within a step to their positions of gap closure.
 
         Args:
@@ -197,9 +197,9 @@ class _StateTransfer:
             Mask of the points whose gap closes at the end of the step, shape (n,).
         """
         history, law, n = face.history, face.law, self.problem.n_owned
-        zero = np.zeros(len(face.points), dtype=bool)
+        none = np.zeros(len(face.points), dtype=bool)
         if history is None or not law.has_friction or not face.present:
-            return zero
+            return none
         distance = law.distance(face.positions(state.x[:n], state.control))
         arrived = (history.distance <= -law.theta) & (distance > -law.theta)
         closing = arrived & (np.isnan(history.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
@@ -211,8 +211,8 @@ class _StateTransfer:
         for run in self.runs:
             perturbed, arrival = run.problem.contacts[number], history.arrival.copy()
             if len(inside):
-                guess = perturbed.positions(run.x[:n], run.control)[inside] + history.arrival[inside] - start[inside]
-                arrival[inside] = _moved_to(perturbed.law.part(inside), guess, velocity[inside], gap)
+                position = perturbed.positions(run.x[:n], run.control)[inside] + history.arrival[inside] - start[inside]
+                arrival[inside] = _projected(perturbed.law.part(inside), position, velocity[inside], gap)
             perturbed.expect_arrivals(arrival)
         return closing
 
@@ -238,7 +238,7 @@ class _StateTransfer:
                                               slip=np.where(free, base.history.slip, memory.history.slip))
                 if len(closing):
                     history = history._replace(position=history.position.copy())
-                    history.position[closing] = _moved_to(
+                    history.position[closing] = _projected(
                         perturbed.law.part(closing), perturbed.positions(run.x[:n], run.control)[closing],
                         self._velocity[number][closing], base.history.distance[closing])
                 perturbed.put(memory._replace(history=history, arrived=base.arrived))
@@ -259,8 +259,8 @@ class _StateTransfer:
         setting = self.problem.setting
         if not last:
             timed = setting.rate[-1] and self.problem.relaxes
-            hold = fixed(state.control)
-            return (hold, [hold] * len(self.runs)) if timed else self._gaps()
+            constraint = fixed(state.control)
+            return (constraint, [constraint] * len(self.runs)) if timed else self._gap_constraints()
         if setting.piece == 0 and not self._single:          # the stage change ends at control 1
             return fixed(1.0), [fixed(1.0)] * len(self.runs)
         key = (setting.stage, setting.piece)
@@ -270,18 +270,18 @@ class _StateTransfer:
                                                 / run.problem.setting.rate[-1]) for run in self.runs]
         if p is not None and p.in_flow:
             raise Failure("there is none yet for a stage that follows or holds a measure", [])
-        if key not in self._until:
+        if key not in self._targets:
             targets = [(self.problem, self._end if p is None else p.stage.until),
                        *((run.problem, run.end if p is None else run.plans[setting.stage].stage.until)
                          for run in self.runs)]
             base, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
-            self._until[key] = base, others
+            self._targets[key] = base, others
         target = self._end if p is None else p.stage.until
         if state.met is None or state.met[:2] != target[:2]:
             raise Failure(f"it did not reach its target {target}", [])
-        return self._until[key]
+        return self._targets[key]
 
-    def _gaps(self) -> tuple[Any, list[Any]]:
+    def _gap_constraints(self) -> tuple[Any, list[Any]]:
         """Return constraints by which a gap that closes at the end of the step is closed in each run.
 
         Returns:
@@ -292,39 +292,39 @@ class _StateTransfer:
             size = np.where(closing, abs(face.rule.area), 0.0)
             most = self.problem.comm.allgather(float(size.max(initial=0.0)))
             if max(most) > 0:
-                mine = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
-                return _gap(self.problem, face, mine, True), [
-                    _gap(run.problem, run.problem.contacts[number], mine, False) for run in self.runs]
+                point = int(np.argmax(size)) if int(np.argmax(most)) == self.problem.comm.rank else None
+                return _gap_constraint(self.problem, face, point, True), [
+                    _gap_constraint(run.problem, run.problem.contacts[number], point, False) for run in self.runs]
         return None, []
 
 
-def _gap(problem: Any, face: Any, point: int | None, sloped: bool) -> Any:
+def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: bool) -> Any:
     """Return the signed distance of a contact point from its tool as a constraint, a function (x, control, gradient).
 
     Args:
         problem: problem of the run.
         face: contact face of the point.
         point: local number of the point on the rank that owns it, None on other ranks.
-        sloped: True if the function also computes its gradient and its derivative by the control.
+        with_gradient: True if the function also computes its gradient and its derivative by the control.
     """
-    mine = np.array([] if point is None else [point], dtype=int)
-    law = face.law.part(mine)
+    local = np.array([] if point is None else [point], dtype=int)
+    law = face.law.part(local)
 
-    def c(x: Any, control: float, gradient: Any) -> tuple[float, float]:
+    def gap(x: Any, control: float, gradient: Any) -> tuple[float, float]:
         """Return the distance and its derivative by the control; set the vector `gradient` to its derivative by x."""
-        near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[mine])
-        found, rate = float(near.distance.sum()), 0.0
-        if sloped:
+        near = law.nearest(face.positions(x.array_r[: problem.n_owned], control)[local])
+        distance, rate = float(near.distance.sum()), 0.0
+        if with_gradient:
             forces, values = np.zeros_like(face.points), np.zeros(problem.n_owned)
-            forces[mine] = near.normal
-            rate = float((near.normal * face.moved(np.zeros(len(x.array_r)), 1.0)[mine]).sum())
+            forces[local] = near.normal
+            rate = float((near.normal * face.moved(np.zeros(len(x.array_r)), 1.0)[local]).sum())
             face.add(values, problem.forms.length * forces)
             problem.fill(gradient, values)
-        return (found, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([found, rate])))
-    return c
+        return (distance, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([distance, rate])))
+    return gap
 
 
-def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
+def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
     """Return the properties of a stage that no parameter may change.
 
     Returns:
@@ -333,7 +333,7 @@ def _kind(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 
 
-def _moved_to(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
+def _projected(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
     """Move points along their velocities until they have given signed distances from a tool, to first order.
 
     Args:
@@ -347,6 +347,6 @@ def _moved_to(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) ->
     """
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
-    sure = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
-    time = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=sure)
+    towards = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)
+    time = np.divide(gap - near.distance, rate, out=np.zeros(len(x)), where=towards)
     return x + time[:, None] * velocity
