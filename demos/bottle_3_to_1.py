@@ -57,7 +57,7 @@ def main():
         if name == "gent":
             full = path["enclosed_volume"][-1]
             for part_full in FILLED:
-                section(sections, path.profile(path.at(fx.enclosed_volume(part_full * full))), -1, "0.75")
+                section(sections, path.profile(path.state_at(fx.enclosed_volume(part_full * full))), -1, "0.75")
             section(sections, path.profile(path.states[0]), -1, "0.5")
             for side in (1, -1):
                 section(sections, profile, side, "C0")

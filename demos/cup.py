@@ -36,7 +36,7 @@ def key_numbers(path, mould):
     angles = corner.start + corner.sweep * np.linspace(0, 1, 41)
     fillet = corner.centre + corner.radius * np.column_stack([np.cos(angles), np.sin(angles)])
     ramp = path.problem.contacts[0].law.theta
-    touch = path.at(fx.displacement(DEPTH - ramp, at=(0.0, THICKNESS)))
+    touch = path.state_at(fx.displacement(DEPTH - ramp, at=(0.0, THICKNESS)))
     return {
         **at_pressures(path, PRESSURES, "psi"),
         "first_contact_pressure_psi": touch.measures["pressure"],

@@ -93,12 +93,12 @@ def plate_numbers(sheet, path):
     top = path["pressure"].max()
     membrane = membrane_limit_point(radius=sheet[0], thickness=sheet[1], c10=sheet[2], c01=sheet[3])
     return {
-        "pole_height_in": {p: path.at(fx.pressure(float(p))).measures["pole_height"] if float(p) < top else None
+        "pole_height_in": {p: path.state_at(fx.pressure(float(p))).measures["pole_height"] if float(p) < top else None
                            for p in PRESSURES},
         "limit_pressure_psi": limit["pressure"] if limit else None,
         "limit_pole_height_in": limit["pole_height"] if limit else None,
         "membrane_limit_pressure_psi": membrane[1].pressure if membrane else None,
-        "pole_height_in_at_0.001_psi": path.at(fx.pressure(1e-3)).measures["pole_height"]}
+        "pole_height_in_at_0.001_psi": path.state_at(fx.pressure(1e-3)).measures["pole_height"]}
 
 
 def findings(paths, numbers):
@@ -106,8 +106,9 @@ def findings(paths, numbers):
     thickness = {k: n["pole_thickness_ratio_at_height"]["1.5"] for k, n in numbers.items() if k in CASES}
     uneven = {}
     for name in ("case4", "case5"):
-        ratio = paths[name].profile(paths[name].at(fx.pressure(SAME_LOAD))).thickness_ratio
-        uneven[name] = {"pole_height_over_r0": paths[name].at(fx.pressure(SAME_LOAD)).measures["pole_height"] / 3.5,
+        state = paths[name].state_at(fx.pressure(SAME_LOAD))
+        ratio = paths[name].profile(state).thickness_ratio
+        uneven[name] = {"pole_height_over_r0": state.measures["pole_height"] / 3.5,
                         "pole_thickness_ratio": ratio[0], "rim_over_pole_thickness": ratio[-1] / ratio[0]}
     a, b = numbers["A"], numbers["B"]
     return {
@@ -186,7 +187,7 @@ def draw(paths, out, quick):
         c10, c01 = PLATES[name][2:]
         path.plot("pole_height", "pressure", left, color=color, label=f"{name}: c10 = {c10:g}, c01 = {c01:g} psi")
         left.plot(26, THESIS[name]["26"], "^", color=color, markeredgecolor="k", label=f"thesis (text), {name}")
-        state = path.at(fx.pressure(26.0)) if name == "B" else path.limit_points[0]
+        state = path.state_at(fx.pressure(26.0)) if name == "B" else path.limit_points[0]
         label = f"{name} at {state.measures['pressure']:.4g} psi" + (" (its maximum)" if name == "A" else "")
         plots.outline(path.profile(state), right, color=color, label=label)
     left.set(xlabel="pressure, psi", ylabel="pole height, in", xlim=(0, 32), ylim=(0, None))
@@ -210,7 +211,7 @@ def main():
     for name, sheet in PLATES.items():
         paths[name] = inflate(sheet, elements, fx.pole_height(12.0))
         numbers[name] = plate_numbers(sheet, paths[name])
-    rising, falling = (paths["A"].at(fx.pressure(25.0), after=s) for s in (None, paths["A"].limit_points[0]))
+    rising, falling = (paths["A"].state_at(fx.pressure(25.0), after=s) for s in (None, paths["A"].limit_points[0]))
     numbers["A"]["pole_height_in_at_25_psi"] = {"rising": rising.measures["pole_height"],
                                                 "falling": falling.measures["pole_height"]}
     found = findings(paths, numbers)

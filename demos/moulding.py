@@ -48,7 +48,7 @@ def bisected(path, k: int, beyond) -> float:
     before, after = (path.states[i].measures["pressure"] for i in (k, k + 1))
     for _ in range(8):
         middle = (before + after) / 2
-        before, after = ((before, middle) if beyond(path.at(fx.pressure(middle), after=path.states[k])) else
+        before, after = ((before, middle) if beyond(path.state_at(fx.pressure(middle), after=path.states[k])) else
                          (middle, after))
     return after
 

@@ -122,7 +122,7 @@ def vm218(elements, out):
     states = [membrane_inflation(s, **PLATE) for s in 1 + np.geomspace(1e-3, 2.3, 60)]
     heights, pressures = np.array([(state.height, state.pressure) for state in states]).T
     height, pressure = CubicSpline(pressures, heights), CubicSpline(heights, pressures)
-    found = {f"height_at_{p:g}": row(path.at(fx.pressure(p)).measures["pole_height"], theirs, "in") | {
+    found = {f"height_at_{p:g}": row(path.state_at(fx.pressure(p)).measures["pole_height"], theirs, "in") | {
         "membrane": (exact := float(height(p))), "theirs_over_membrane": theirs / exact - 1}
         for theirs, p in VM218 if p in (4.0, 24.0, 38.0)}
     found["graph_pressure_over_membrane"] = {f"{w:g}": p / float(pressure(w)) - 1 for w, p in VM218}

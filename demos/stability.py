@@ -138,8 +138,8 @@ def switched(ratio, kB, fine):
     target = fx.pressure(float(ends[1].last.measures["pressure"]))
     moved = []
     for sense, one in ends.items():
-        state = one.last if sense == 1 or abs(one.last.measures["pressure"] / target.value - 1) < 1e-9 else one.at(
-            target, after=one.states[-2])
+        met = sense == 1 or abs(one.last.measures["pressure"] / target.value - 1) < 1e-9
+        state = one.last if met else one.state_at(target, after=one.states[-2])
         with one.problem.state_context(state) as problem:
             moved.append(probe(problem, np.column_stack([np.full(41, ratio), z])).displacement(problem.x)[:, 0])
     return float(np.abs(moved[0] - moved[1][::-1]).max() / np.abs(moved[0]).max()), loss, ends[1]

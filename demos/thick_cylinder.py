@@ -83,7 +83,7 @@ def errors(kind, path, targets):
     pressure = max(abs(path.met(t).measures["pressure"] / exact(kind, d).pressure - 1) for d, t in targets.items())
     points, R, direction = through(kind, path.problem.scene.mesh, 101)
     reference = exact(kind, "10", R)
-    state = path.at(fx.pressure(reference.pressure))           # before the sphere's maximum
+    state = path.state_at(fx.pressure(reference.pressure))           # before the sphere's maximum
     bounds = [fx.displacement(0.0, at=tuple(p), component="r").bind(path.problem) for p in points]
     u, true = np.array([path.value(b, state) for b in bounds]) / direction[0], reference.r - reference.R
     field = path.stress(path.met(targets["10"]))

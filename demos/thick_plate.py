@@ -61,11 +61,11 @@ def key_numbers(path, support):
         height = float(height_cm) / INCH
         if path["pole_height"].max() < height:
             return None
-        return timoshenko_pressure(height) / path.at(fx.pole_height(height)).measures["pressure"]
+        return timoshenko_pressure(height) / path.state_at(fx.pole_height(height)).measures["pressure"]
     numbers = {
         "pole_height_in_at_psi": {p: met(p) for p in PRESSURES},
         "pole_height_in_linear_theory": {p: linear(float(p), support) for p in PRESSURES},
-        "slope_over_linear_theory": path.at(fx.pressure(SMALL)).measures["pole_height"] / linear(SMALL, support),
+        "slope_over_linear_theory": path.state_at(fx.pressure(SMALL)).measures["pole_height"] / linear(SMALL, support),
         "pole_thickness_ratio_at_40.1_psi": path.profile().thickness_ratio[0] if met("40.1") else None,
         "mass_error": float(np.abs(path["mass_error"]).max()),
         "newton_iterations": path.counts.iterations, "steps": path.counts.steps}

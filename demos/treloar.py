@@ -94,8 +94,8 @@ def draw(paths, out, quick):
 
     limit = path.limit_points[0]
     rising, falling = (0.126, 0.440), (0.436, 0.349)
-    states = [path.at(fx.pressure(p)) for p in rising] + [limit]
-    states += [path.at(fx.pressure(p), after=limit) for p in falling]
+    states = [path.state_at(fx.pressure(p)) for p in rising] + [limit]
+    states += [path.state_at(fx.pressure(p), after=limit) for p in falling]
     figure, (left, right) = plots.figure(2, width=6, ratios=(1, 1.6))
     for k, state in enumerate(states):
         profile, color = path.profile(state), f"C{k}"

@@ -42,7 +42,7 @@ def main():
         summary[name], paths[name] = n | {"elements": list(elements)}, path
         tell(name, n)
         if law == "frictionless":                                # figures 6.3 and 6.4
-            state = path.at(fx.pole_stretch(THESIS["pole_stretch_with_slip"]))
+            state = path.state_at(fx.pole_stretch(THESIS["pole_stretch_with_slip"]))
             n = plugs.shape_numbers(path, state, PLUG, THICKNESS)
             n |= {"travel_cm": state.measures["travel"], "force_N": plugs.force(state)}
             summary["frictionless_at_pole_stretch_of_thesis"] = n

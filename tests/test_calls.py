@@ -31,7 +31,7 @@ def path():
     (lambda p: fx.tools.plane(1.0).moved(up=3), r"Tool.moved: up= is not known: must be Tool.moved\(r=0.0, z=0.0\)"),
     (lambda p: p.plot("pole_height"), r"must be Path.plot\(y, x, axes=None, \*\*style\)"),
     (lambda p: p.view3d("there.png", 3), "state = 3: must be a State or None"),
-    (lambda p: p.at(0.4), "Path.at: target = 0.4: must be a Target"),
+    (lambda p: p.state_at(0.4), "Path.state_at: target = 0.4: must be a Target"),
     (lambda p: p.stress().at("pole"), "Stress: points = 'pole': must be points"),
     (lambda p: p.profile().thickness_ratio_at("rim"), "radius = 'rim': must be "),
     (lambda p: p.profile().thickness_ratio_at(5.0), "radius = 5: must be from 0 to 1.25"),

@@ -140,7 +140,7 @@ def test_run_against_hand_coded_solver(tmp_path):
     # its last displacements, node by node, in the numbering of the mesh file
     u = states[-1][0]
     nodes = write(tmp_path / "nodes.csv", "node,u_r,u_z", [range(1, len(u) + 1), *u.T])
-    nodal = fx.compare_nodes(path, nodes, mesh=tmp_path / "mesh.txt", state=path.at(fx.pole_height(heights[-1])))
+    nodal = fx.compare_nodes(path, nodes, mesh=tmp_path / "mesh.txt", state=path.state_at(fx.pole_height(heights[-1])))
     assert nodal.maximum < 1e-8 * nodal.largest and nodal.largest > 1.9
     # the run's own file: the same limit point, and curves that differ by their drawing only
     path.to_csv(tmp_path / "ours.csv")

@@ -395,15 +395,15 @@ def test_column_and_value_that_a_path_does_not_have():
     with pytest.raises(fx.InputError, match="intermediate = Target.*must be a list of targets"):
         fx.trace(treloar(), until=fx.pressure(0.1), intermediate=fx.pressure(0.05))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.3"):
-        path.at(fx.pressure(0.3))
+        path.state_at(fx.pressure(0.3))
     with pytest.raises(fx.InputError, match="does not pass pressure = 0.10001: its values lie between 0 and 0.1"):
-        path.at(fx.pressure(0.10001))
+        path.state_at(fx.pressure(0.10001))
 
 
 def test_the_last_state_of_a_path_is_found_by_a_value_of_six_digits():
     """A pole height of 0.5123456 is written 0.512346: the path ends just before it."""
     path = fx.trace(treloar(), until=fx.pole_height(0.5123456), progress=False)
-    found = path.at(fx.pole_height(0.512346))
+    found = path.state_at(fx.pole_height(0.512346))
     assert found.measures["pole_height"] == pytest.approx(0.512346, rel=1e-10)
     assert path.last.measures["pressure"] < found.measures["pressure"] < (1 + 1e-5) * path.last.measures["pressure"]
 
@@ -411,7 +411,7 @@ def test_the_last_state_of_a_path_is_found_by_a_value_of_six_digits():
 def test_no_state_is_found_beyond_a_maximum_of_the_pressure():
     path = fx.trace(treloar(), until=fx.pressure(0.6), at_limit_point="stop", progress=False)
     with pytest.raises(fx.InputError, match="does not pass pressure"):
-        path.at(fx.pressure(path.last.measures["pressure"] * (1 + 1e-6)))
+        path.state_at(fx.pressure(path.last.measures["pressure"] * (1 + 1e-6)))
 
 
 def test_a_body_does_not_pass_the_axis():

@@ -125,7 +125,7 @@ def test_nodal_results(path, tmp_path):
     assert found.maximum == pytest.approx(0.01) and found.rms == pytest.approx(0.01 / 63**0.5)
     assert f"at node {same.nodes[7]}," in str(found)
     found.plot().savefig(tmp_path / "nodes.png")
-    earlier = path.at(fx.pressure(0.3))
+    earlier = path.state_at(fx.pressure(0.3))
     fx.write_nodes(path, tmp_path / "earlier.csv", state=earlier, mesh=tmp_path / "mesh.txt")
     assert fx.compare_nodes(path, tmp_path / "earlier.csv", state=earlier).maximum < 1e-13
     assert fx.compare_nodes(path, tmp_path / "earlier.csv").maximum > 0.1

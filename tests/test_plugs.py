@@ -79,7 +79,7 @@ def test_extreme_plugs(plug):
 def test_a_path_never_comes_back_to_itself():
     """Beyond the pressure maximum a state of the rising branch is refused; one of the falling branch is not."""
     path = fx.trace(treloar(), until=fx.pole_stretch(4.0), progress=False)
-    risen, fallen = path.at(fx.pressure(0.46)), path.at(fx.pressure(0.46), after=path.limit_points[0])
+    risen, fallen = path.state_at(fx.pressure(0.46)), path.state_at(fx.pressure(0.46), after=path.limit_points[0])
     curve = path.record.curve
     assert was_passed(curve, path.states[:-1], path.last, risen)
     k = next(i for i, s in enumerate(path.states) if s.measures["pole_stretch"] > fallen.measures["pole_stretch"])

@@ -109,7 +109,8 @@ def test_beyond_a_limit_point_and_back():
     first, second = path.limit_points
     assert (first.stage, second.stage) == ("blow", "back")
     assert first.measures["pressure"] == pytest.approx(second.measures["pressure"], rel=1e-9)
-    assert path.at(fx.pole_height(0.1)).measures["pressure"] == pytest.approx(path.last.measures["pressure"], rel=1e-9)
+    first_at_this_height = path.state_at(fx.pole_height(0.1))
+    assert first_at_this_height.measures["pressure"] == pytest.approx(path.last.measures["pressure"], rel=1e-9)
 
 
 def test_tables():
@@ -277,7 +278,7 @@ def test_a_load_that_is_left_out_reads_nothing(tmp_path):
     assert np.all(np.diff(found["off"]) < 0) and found["off"][-1] == 0
     assert np.all(np.diff(found["on again"]) > 0) and found["on again"][0] == 0
     assert same(path.last, run(plugged(), air("on", 0.05)).last)
-    half = path.at(fx.pressure(0.025, of="air"), after=end(path, "down"))
+    half = path.state_at(fx.pressure(0.025, of="air"), after=end(path, "down"))
     assert half.stage == "on again" and half.measures["air_pressure"] == pytest.approx(0.025, abs=1e-10)
     path.to_csv(tmp_path / "off.csv")
     rows = [line.split(",") for line in (tmp_path / "off.csv").read_text().splitlines()]
@@ -349,7 +350,7 @@ def test_the_record(tmp_path, there_and_back):
     rows = [line.split(",") for line in (tmp_path / "process.csv").read_text().splitlines()]
     assert rows[0][:3] == ["stage", "kind", "iterations"] and len(rows) == len(path) + 1
     assert [row[0] for row in rows[1:]] == [s.stage for s in path.states]
-    found = path.at(fx.travel(1.0, of="plug"))
+    found = path.state_at(fx.travel(1.0, of="plug"))
     assert found.stage == "down" and found.measures["plug_travel"] == pytest.approx(1.0, abs=1e-10)
     assert found.measures["air_pressure"] == pytest.approx(0.02)
     travel, pole = path.curve("plug_travel", "pole_height", points=3)
@@ -462,11 +463,11 @@ def test_a_controlled_item_is_not_constant_too():
 
 def test_a_state_of_the_path_that_meets_a_target_is_found(there_and_back):
     path = there_and_back
-    assert path.at(fx.travel(2.0, of="plug")) is end(path, "down")
-    assert path.at(fx.travel(1.5)).stage == "down"             # whatever was looked at before
+    assert path.state_at(fx.travel(2.0, of="plug")) is end(path, "down")
+    assert path.state_at(fx.travel(1.5)).stage == "down"             # whatever was looked at before
     path.value("tool_force", path.last)
-    assert path.at(fx.travel(1.5)).stage == "down"
+    assert path.state_at(fx.travel(1.5)).stage == "down"
     with pytest.raises(fx.InputError, match="after: must be a state of this path"):
-        path.at(fx.travel(1.5), after=State(np.zeros(1), 0.0, np.zeros(1), 0.0))
+        path.state_at(fx.travel(1.5), after=State(np.zeros(1), 0.0, np.zeros(1), 0.0))
     with pytest.raises(fx.InputError, match="column 'travel' is not known"):
         path.curve("travel")

@@ -212,7 +212,7 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
     assert np.abs(a.top - b.top).max() < 0.01 and np.abs(a.bottom - b.bottom).max() < 0.01
     for name in ("u", "pole_height", "pole_stretch"):
         assert after.measures[name] == pytest.approx(before.measures[name], rel=0.01)
-    later = path.at(fx.displacement(0.25, at=(0.7, 0.6), component="r"), after=after)
+    later = path.state_at(fx.displacement(0.25, at=(0.7, 0.6), component="r"), after=after)
     assert later.measures["u"] == pytest.approx(0.25) and later.setting["mesh"] == 1
     work = path.work()
     assert work["new_meshes"][-1] == pytest.approx(after.measures["strain_energy"] - before.measures["strain_energy"])

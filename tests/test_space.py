@@ -393,14 +393,14 @@ def test_trough_without_friction():
 
 @pytest.mark.parametrize("value", [0.3, 0.5])
 def test_states_at_targets_of_a_sliding_sheet_depend_on_no_steps(value):
-    """`Path.at`, a run that stops there and a run with many targets before it agree while gaps close on the fillet."""
+    """`Path.state_at`, a run that stops there and one with many targets before agree while gaps close on the fillet."""
     end, target, column = fx.pressure(1.2), fx.pressure(value), "mould_force"
     before = np.linspace(0.05, value - 0.05, 10).round(3)
     path, stopped, fine = (fx.trace(trough(0.1, friction="none"), until=until, progress=False, intermediate=[
         fx.pressure(p) for p in given]) for until, given in ((end, []), (target, []), (end, [*before, value])))
-    assert path.at(target).measures[column] == pytest.approx(stopped.last.measures[column], rel=1e-9)
+    assert path.state_at(target).measures[column] == pytest.approx(stopped.last.measures[column], rel=1e-9)
     for other in (stopped.wall(), fine.wall(fine.met(target))):
-        np.testing.assert_allclose(path.wall(path.at(target)).ratio, other.ratio, rtol=1e-5)
+        np.testing.assert_allclose(path.wall(path.state_at(target)).ratio, other.ratio, rtol=1e-5)
     np.testing.assert_allclose(path.wall().ratio, fine.wall().ratio, rtol=1e-8)
 
 

@@ -26,7 +26,7 @@ def test_columns_of_earlier_states(path):
 def test_a_found_state_is_that_of_a_run_that_steps_there(path, target, stage):
     """In every stage of a process: found in the finished path, and met by a run that goes on from the state before."""
     first = end(path, STAGES[stage - 1].name) if stage else None
-    found = path.at(target, after=first)
+    found = path.state_at(target, after=first)
     k = next(i for i, (a, b) in enumerate(zip(path.states, path.states[1:]))
              if a.stage == b.stage == STAGES[stage].name
              and (a.measures[target.name] - target.value) * (b.measures[target.name] - target.value) <= 0)
@@ -41,7 +41,7 @@ def test_a_found_state_is_that_of_a_run_that_steps_there(path, target, stage):
 def test_files_and_fields_of_a_found_state(path, tmp_path):
     """VTK files, profile and stress at recorded and found states; the run's last state stays what it was."""
     before = dict(path.last.measures)
-    found = path.at(fx.travel(1.1, of="plug"))
+    found = path.state_at(fx.travel(1.1, of="plug"))
     for k, state in enumerate((found, end(path, "down"))):
         path.to_vtk(tmp_path / f"{k}.pvd", state)
         assert path.profile(state).thickness.min() > 0

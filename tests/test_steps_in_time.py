@@ -148,13 +148,13 @@ def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
         return [state.measures[c] for c in ("ball_force", "strain_energy", "dissipated_energy", "process_time")]
     for accuracy, step in ((1e-2, StepControl(target=8)), (1e-3, None)):
         path = run(sheet(0), Stage("in", **DOWN), accuracy=accuracy, step=step)
-        assert measured(path.at(BETWEEN)) == pytest.approx(measured(pressed.met(BETWEEN)), rel=accuracy)
+        assert measured(path.state_at(BETWEEN)) == pytest.approx(measured(pressed.met(BETWEEN)), rel=accuracy)
 
 
 def test_between_states_of_a_flow_there_is_none_to_find():
     path = run(block(), Stage("flow", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
     with pytest.raises(fx.InputError, match="in a stage that controls an output quantity"):
-        path.at(fx.travel(0.987654))
+        path.state_at(fx.travel(0.987654))
 
 
 def test_check_sees_a_modulus_that_pulls_a_cooling_body_back():

@@ -36,7 +36,7 @@ def test_limit_pressure_is_the_largest_on_the_path(path):
     limit, = path.limit_points
     assert path["pressure"].max() == limit.measures["pressure"]
     for pressure, after in ((0.49327, None), (0.49327, limit)):
-        found = path.at(fx.pressure(pressure), after=after)
+        found = path.state_at(fx.pressure(pressure), after=after)
         assert (found.measures["pole_stretch"] > limit.measures["pole_stretch"]) == (after is limit)
 
 
@@ -141,7 +141,7 @@ def test_work_of_the_pressure_is_the_energy_gained():
 def test_fixed_control_meets_the_same_states(path):
     """SNES at fixed pressure and the continuation agree."""
     fixed = fx.solve(path.problem.scene, to=0.4, increments=10).last.measures
-    traced = path.at(fx.pressure(0.4)).measures
+    traced = path.state_at(fx.pressure(0.4)).measures
     assert fixed["pole_height"] == pytest.approx(traced["pole_height"], rel=1e-8)
 
 

@@ -112,7 +112,7 @@ def pressure(value: float, *, of: str | None = None) -> Target:
     Returns:
         The target.
 
-    >>> round(float(path.at(fx.pressure(0.02)).measures["pole_height"]), 3)
+    >>> round(float(path.state_at(fx.pressure(0.02)).measures["pole_height"]), 3)
     4.795
     """
     return _driven("pressure", value, of)
@@ -198,7 +198,7 @@ def pole_height(value: float) -> Target:
     Returns:
         The target.
 
-    >>> round(float(path.at(fx.pole_height(6.0)).measures["pressure"]), 4)
+    >>> round(float(path.state_at(fx.pole_height(6.0)).measures["pressure"]), 4)
     0.0289
     """
     return Target("pole_height", finite("pole_height", value), bind_pole_height)
@@ -221,7 +221,7 @@ def pole_stretch(value: float) -> Target:
     Returns:
         The target.
 
-    >>> round(float(path.at(fx.pole_stretch(1.5)).measures["pole_stretch"]), 9)
+    >>> round(float(path.state_at(fx.pole_stretch(1.5)).measures["pole_stretch"]), 9)
     1.5
     """
     return Target("pole_stretch", positive("pole_stretch", value), bind_pole_stretch, signed=False)
@@ -242,7 +242,7 @@ def enclosed_volume(value: float) -> Target:
     Returns:
         The target.
 
-    >>> round(float(path.at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
+    >>> round(float(path.state_at(fx.enclosed_volume(500.0)).measures["enclosed_volume"]), 6)
     500.0
     """
     return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)

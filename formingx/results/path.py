@@ -117,7 +117,7 @@ class Path(States):
 
         Args:
             file: its name ends in .pvd.
-            states: a state, several in order, or "all"; default the last. States that were solved for by `Path.at` are
+            states: a state, several in order, or "all"; default the last. States solved for by `Path.state_at` are
                 numbered in the given order.
 
         Raises:

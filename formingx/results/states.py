@@ -160,7 +160,7 @@ class States:
 
         Args:
             measure: name of a column, or a quantity bound to the problem of the state (`Target.bind`).
-            state: a state of this path, or one that was solved for by `Path.at`.
+            state: a state of this path, or one that was solved for by `Path.state_at`.
 
         Raises:
             InputError: there is no such column.
@@ -182,7 +182,7 @@ class States:
 
         Raises:
             InputError: there is no such stage, or it does not reach that time.
-            ConvergenceError: the state at that time could not be solved for (`Path.at`).
+            ConvergenceError: the state at that time could not be solved for (`Path.state_at`).
         """
         if stage is not None:
             stages = list(dict.fromkeys(state.stage for state in self.states))
@@ -199,9 +199,9 @@ class States:
             raise InputError(f"Path.state: time = {time:g}: {f'stage {stage!r}' if stage else 'the run'} goes from"
                              f" {first:g} to {last:g}")
         exact = next((state for state in candidates if state.time == time), None)
-        return exact or self.at(process_time(time), after=candidates[0])
+        return exact or self.state_at(process_time(time), after=candidates[0])
 
-    def at(self, target: Target, after: State | None = None) -> State:
+    def state_at(self, target: Target, after: State | None = None) -> State:
         """Return the first state of the path that meets a target.
 
         The state is solved for between two states of the path, not interpolated; it is not added to the path. A target
@@ -216,7 +216,7 @@ class States:
             ConvergenceError: two states enclose the value, but the solver did not converge between them.
         """
         if after is not None and after not in self.states:
-            raise InputError("Path.at: after: must be a state of this path")
+            raise InputError("Path.state_at: after: must be a state of this path")
         values: list[float] = []
         refused: list[InputError] = []
         piece: tuple[Segment, State, State, Bound] | None = None

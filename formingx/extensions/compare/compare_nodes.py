@@ -124,7 +124,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
         path: the computed `Path`.
         theirs: a CSV file or {column: values} with the displacements u_r, u_z, and the reference positions R, Z or,
             with `mesh`, the numbers node. For a sheet in three dimensions u_x, u_y, u_z and X, Y.
-        state: a state of the path; default: the last. To compare at a pressure: `path.at(formingx.pressure(...))`.
+        state: a state of the path; default the last. To compare at a pressure: `path.state_at(formingx.pressure(...))`.
         mesh: a text mesh file (`formingx.mesh.Grid`) with the reference positions of the numbered nodes, in our unit.
         columns: {our name: their name} for columns with other names.
         units: {our name: factor} from their units to ours, or {our name: our unit} if their header states their unit.

@@ -54,7 +54,7 @@ class StressField:
         recovery: the `Stresses` of the problem.
         state: the state.
 
-    >>> field = path.stress(path.at(fx.pole_height(6.0)))
+    >>> field = path.stress(path.state_at(fx.pole_height(6.0)))
     >>> field.at([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
     [0.9, 0.99]
     """

@@ -196,8 +196,8 @@ def _three(array: np.ndarray) -> np.ndarray:
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
     """Return the states to be written, with the numbers that are their times.
 
-    A state of the path has its number there. A state that was solved for by `Path.at` has its position in `states`. If
-    these numbers do not increase, the states are numbered from 0.
+    A state of the path has its number there. A state solved for by `Path.state_at` has its position in `states`.
+    If these numbers do not increase, the states are numbered from 0.
 
     Args:
         path: the computed `Path`.
