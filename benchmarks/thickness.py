@@ -74,7 +74,7 @@ def measures(path, ratio):
     return {"heights": [s.measures["pole_height"] for s in met],
             "pressure": [s.measures["pressure"] for s in met],
             "pole_thickness": [path.profile(s).thickness[0] for s in met],
-            "rim_stress": [float(path.stress(s).at(near_rim).on_face((0.0, 1.0)).meridional[0]) for s in met]}
+            "rim_stress": [float(path.stress(s).at_points(near_rim).on_face((0.0, 1.0)).meridional[0]) for s in met]}
 
 
 def errors(found, reference):
@@ -141,7 +141,7 @@ def rim_faces():
 
 
 def least_along_rim(stress, h):
-    F = stress.at([(1.0, z) for z in np.linspace(0, h, 401)]).deformation_gradient
+    F = stress.at_points([(1.0, z) for z in np.linspace(0, h, 401)]).deformation_gradient
     return float(np.hypot(F[:, 0, 1], F[:, 1, 1]).min())
 
 

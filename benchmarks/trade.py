@@ -85,7 +85,7 @@ def one(scene, way):
     if way["model"] != "membrane":
         layer = list(size["thickness"])[-1]
         point = (size["radius"] - thickness, thickness)           # top face, one thickness inside the rim
-        rim_stress = float(path.stress().at([point], layer).on_face((0.0, 1.0)).meridional[0])
+        rim_stress = float(path.stress().at_points([point], layer).on_face((0.0, 1.0)).meridional[0])
     return {"pressure": pressures[0], "pole_thickness": profile.thickness[0], "rim_stress": rim_stress,
             "seconds": path.counts.seconds, "total_seconds": seconds, "steps": path.counts.steps,
             "failures": path.counts.failures, "iterations": path.counts.iterations, "unknowns": path.problem.n_unknowns,

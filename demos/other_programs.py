@@ -40,7 +40,7 @@ def in_wall(path, R):
     """Return (displacement, radial stress, hoop stress) of a tube at reference radius R."""
     Z = path.problem.scene.mesh.nodes_of("top")[0, 1]
     bound = fx.displacement(0.0, at=(R, Z), component="r").bind(path.problem)
-    stress = path.stress().at([(R, Z / 2)]).cauchy[0]
+    stress = path.stress().at_points([(R, Z / 2)]).cauchy[0]
     return path.value(bound, path.last), stress[0, 0], stress[2, 2]
 
 

@@ -155,7 +155,7 @@ def draw_faces(paths):
     for ax, (law, path) in zip(axes, paths.items()):
         field = path.stress()
         for face, Z in (("top", THICKNESS), ("bottom", 0.0)):
-            sigma = field.at(np.column_stack([R, np.full_like(R, Z)])).cauchy
+            sigma = field.at_points(np.column_stack([R, np.full_like(R, Z)])).cauchy
             ax.plot(R, np.linalg.eigvalsh(sigma[:, :2, :2])[:, 1], label=face)
         ax.axvline(PLUG, color="0.7", linewidth=1)
         ax.set(xlabel="reference radius R, cm", ylabel=r"$\sigma_1$, MPa", title=law)

@@ -162,7 +162,7 @@ def shape_numbers(path, state, plug_radius, thickness) -> dict:
 
 def pole_stretches(path, state, thickness) -> dict:
     """Return the principal stretches of the top face at the pole: in the plane and through the thickness."""
-    F = path.stress(state).at([[0.0, thickness]]).deformation_gradient[0]
+    F = path.stress(state).at_points([[0.0, thickness]]).deformation_gradient[0]
     return {"meridional": float(F[0, 0]), "hoop": float(F[2, 2]), "thickness": float(F[1, 1])}
 
 

@@ -197,7 +197,7 @@ def draw_wall(grids, path, targets, out):
     runs[f"{path.problem.forms.domain.topology.index_map(2).size_global} triangles"] = (path, targets)
     for (name, (run, aims)), style in zip(runs.items(), ("C1.--", "C0.-", "C2-"), strict=True):
         points, _, _ = through("tube", run.problem.scene.mesh, len(R))
-        stress = run.stress(run.met(aims["50"])).at(points)
+        stress = run.stress(run.met(aims["50"])).at_points(points)
         p = stress.hydrostatic_pressure
         misses[name] = float(np.abs(p - true.hydrostatic_pressure).max() / np.abs(true.hydrostatic_pressure).max())
         every = {"markevery": 8} if name.startswith(("6 ", "12 ")) else {}

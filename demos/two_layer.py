@@ -42,7 +42,7 @@ def interfaces(path, state, R):
     """Return [(stress below, stress above)] at radii R of each interface, from the bottom up."""
     names = list(path.problem.scene.mesh.layers)
     stress = path.stress(state)
-    return [tuple(stress.at(np.column_stack([R, np.full(len(R), k * LAYER)]), name) for name in pair)
+    return [tuple(stress.at_points(np.column_stack([R, np.full(len(R), k * LAYER)]), name) for name in pair)
             for k, pair in enumerate(itertools.pairwise(names), 1)]
 
 

@@ -113,7 +113,7 @@ def draw_stretches(path, state):
     """Return a figure of principal stretches and Lagrange strains of the top face, with slip: figs. 6.4 and 6.5."""
     figure, (stretches, strains) = plots.figure(2, width=5.0)
     R = np.linspace(0, 0.99 * RADIUS, 300)
-    F = path.stress(state).at(np.column_stack([R, np.full_like(R, THICKNESS)])).deformation_gradient
+    F = path.stress(state).at_points(np.column_stack([R, np.full_like(R, THICKNESS)])).deformation_gradient
     plane = np.linalg.svd(F[:, :2, :2], compute_uv=False)
     for k, (n, l) in enumerate(((1, plane[:, 0]), (2, plane[:, 1]), (3, F[:, 2, 2]))):
         stretches.plot(R, l, color=f"C{k}", label=rf"$\lambda_{n}$")

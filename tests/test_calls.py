@@ -32,7 +32,7 @@ def path():
     (lambda p: p.plot("pole_height"), r"must be Path.plot\(y, x, axes=None, \*\*style\)"),
     (lambda p: p.view3d("there.png", 3), "state = 3: must be a State or None"),
     (lambda p: p.state_at(0.4), "Path.state_at: target = 0.4: must be a Target"),
-    (lambda p: p.stress().at("pole"), "Stress: points = 'pole': must be points"),
+    (lambda p: p.stress().at_points("pole"), "Stress: points = 'pole': must be points"),
     (lambda p: p.profile().thickness_ratio_at("rim"), "radius = 'rim': must be "),
     (lambda p: p.profile().thickness_ratio_at(5.0), "radius = 5: must be from 0 to 1.25"),
     (lambda p: fx.WLF(10.0, 100.0, 120.0)(np.inf), "temperature = inf: must be above .*, and finite"),

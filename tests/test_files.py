@@ -76,7 +76,7 @@ def test_vtk_read_back(inflated, tmp_path):
             at = np.abs(points[:, 0] - R) < 1e-9
             assert np.allclose(step["thickness_ratio"][at], ratio, rtol=1e-3)
         at = np.unique(points, axis=0)[::7]
-        stress = inflated.stress(state).at(at)
+        stress = inflated.stress(state).at_points(at)
         for x, sigma, stretches in zip(at, stress.cauchy, stress.principal_stretches):
             here = np.hypot(*(points - x).T) < 1e-9
             assert np.allclose(step["cauchy_rr"][here], sigma[0, 0], atol=1e-9)
@@ -94,7 +94,7 @@ def test_an_interface_keeps_both_sides(tmp_path):
     here = np.hypot(step["points"][:, 0] - 0.5, step["points"][:, 1] - 0.1) < 1e-9
     found = step["cauchy_hoop"][here]
     for layer in ("soft", "hard"):
-        exact = path.stress().at([(0.5, 0.1)], layer).cauchy[0, 2, 2]
+        exact = path.stress().at_points([(0.5, 0.1)], layer).cauchy[0, 2, 2]
         assert np.abs(found - exact).min() < 1e-9 * abs(exact)
     assert np.ptp(found) > 0.5 * np.abs(found).max()
     errors = step["stress_error"].reshape(-1, 6)                # a value for each triangle

@@ -234,7 +234,7 @@ def test_results_go_on_from_mesh_to_mesh(tmp_path):
               for state in (before, after)]
     assert virial[0] == pytest.approx(-1, abs=1e-4) and virial[1] == pytest.approx(virial[0], abs=2e-5)
     for state in (before, after):
-        table, stress = path.contact("top", state), path.stress(state).at([(0.0, 0.5)])
+        table, stress = path.contact("top", state), path.stress(state).at_points([(0.0, 0.5)])
         assert (table.pressure > 0).any() and stress.cauchy[0, 2, 2] < 0
     path.save(tmp_path / "run")
     fx.report([tmp_path / "run", path], tmp_path / "both.html")

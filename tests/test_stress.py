@@ -23,7 +23,7 @@ def test_uniaxial_tension(material, true_stress):
     """All stress measures of a homogeneous state, at quadrature points and projected."""
     path = fx.trace(cylinder(material), until=fx.travel(2.0 * (STRETCH - 1)))
     field, s = path.stress(), true_stress(STRETCH)
-    for stress in (field.at([(0.0, 0.3), (0.4, 1.1), (1.0, 2.0)]), field.at_quadrature_points("sheet")):
+    for stress in (field.at_points([(0.0, 0.3), (0.4, 1.1), (1.0, 2.0)]), field.at_quadrature_points("sheet")):
         n = len(stress.points)
         assert stress.cauchy == pytest.approx(np.broadcast_to(np.diag([0, s, 0]), (n, 3, 3)), abs=1e-7 * s)
         assert stress.first_piola[:, 1, 1] == pytest.approx(s / STRETCH, rel=1e-7)
@@ -39,7 +39,7 @@ def test_penalties_have_a_pressure_too(keeping):
     """The part of the stress that the penalty carries is taken where the penalty is integrated."""
     path = fx.trace(cylinder(fx.NeoHookean(c10=2.0), keeping), until=fx.travel(2.0 * (STRETCH - 1)))
     s = MATERIALS[0][1](STRETCH)
-    for stress in (path.stress().at([(0.5, 0.5)]), path.stress().at_quadrature_points()):
+    for stress in (path.stress().at_points([(0.5, 0.5)]), path.stress().at_quadrature_points()):
         assert np.abs(stress.cauchy - np.diag([0, s, 0])).max() < 1e-5 * s
 
 
@@ -70,7 +70,7 @@ def test_thick_wall_converges(kind):
         field = fx.trace(scene, until=fx.displacement(0.5, at=at, component="r")).stress()
         points = field.at_quadrature_points()
         raw.append(wall_errors(points, kind, 1.5, constants))
-        projected.append(wall_errors(field.at(points.points), kind, 1.5, constants))
+        projected.append(wall_errors(field.at_points(points.points), kind, 1.5, constants))
     for errors in (raw, projected):
         orders = np.log2(errors[0] / errors[1])
         assert errors[1].max() < 5e-3 and orders.min() > 1.8, (errors, orders)
@@ -138,9 +138,9 @@ def test_loaded_and_free_faces():
     path = fx.trace(treloar((40, 2)), until=fx.pole_stretch(2.0))
     pressure, R = path.last.measures["pressure"], np.linspace(0, 1.1, 12)
     field = path.stress()
-    largest = field.at([(0.0, 0.041)]).principal_stresses[0, 0]
+    largest = field.at_points([(0.0, 0.041)]).principal_stresses[0, 0]
     for Z, sought in ((0.0, -pressure), (0.082, 0.0)):
-        face = field.at(np.column_stack([R, np.full(12, Z)])).on_face((0, 1))
+        face = field.at_points(np.column_stack([R, np.full(12, Z)])).on_face((0, 1))
         assert np.abs(face.normal - sought).max() < 0.03 * pressure
         assert np.abs(face.shear).max() < 0.03 * pressure and pressure < 0.05 * largest
 
@@ -161,7 +161,7 @@ def test_traction_is_continuous_across_interfaces_and_pressure_is_not(stack):
     R = np.linspace(0, 15, 16)
     for k, (below, above) in enumerate(itertools.pairwise("abcd"), 1):
         points = np.column_stack([R, np.full(len(R), 0.3 * k)])
-        lower, upper = field.at(points, below), field.at(points, above)
+        lower, upper = field.at_points(points, below), field.at_points(points, above)
         left, right = lower.on_face((0, 1)), upper.on_face((0, 1))
         assert np.abs(left.normal - right.normal).max() < 0.03 * pressure
         assert np.abs(left.shear - right.shear).max() < 0.03 * pressure
@@ -180,7 +180,7 @@ def test_quadrature_points_of_a_layer(stack):
     """As many as the rule has, all inside the layer; projected and raw stresses agree on average."""
     raw = stack.stress().at_quadrature_points("c")
     assert len(raw.points) == 80 * 7 and raw.points[:, 1].min() > 0.6 and raw.points[:, 1].max() < 0.9
-    projected = stack.stress().at(raw.points, "c")
+    projected = stack.stress().at_points(raw.points, "c")
     inside = raw.points[:, 0] < 15
     difference = (projected.hydrostatic_pressure - raw.hydrostatic_pressure)[inside]
     assert np.sqrt(np.mean(difference**2)) < 0.01 * np.abs(raw.hydrostatic_pressure).max()
@@ -191,11 +191,11 @@ def test_wrong_requests(stack):
     with pytest.raises(fx.InputError, match="a membrane has no stress through its thickness"):
         fx.trace(treloar((8, 1), model=fx.Membrane()), until=fx.pole_stretch(1.2)).stress()
     with pytest.raises(fx.InputError, match="which layer.*'a', 'b', 'c', 'd'"):
-        field.at([(0, 0.1)])
+        field.at_points([(0, 0.1)])
     with pytest.raises(fx.InputError, match="layer 'e' is not known; known: 'a'"):
-        field.at([(0, 0.1)], "e")
+        field.at_points([(0, 0.1)], "e")
     with pytest.raises(fx.InputError, match=r"\(R, Z\) = \(0, 0.1\) is not in the layer 'c'"):
-        field.at([(0, 0.1)], "c")
+        field.at_points([(0, 0.1)], "c")
 
 
 RANKS = """
@@ -211,7 +211,7 @@ field = path.stress()
 R = np.linspace(0, 5, 7)
 numbers = [path.last.measures["pressure"]]
 for name, Z in (("a", 0.3), ("b", 0.3), ("b", 0.6), ("c", 0.6)):
-    stress = field.at(np.column_stack([R, np.full(7, Z)]), name)
+    stress = field.at_points(np.column_stack([R, np.full(7, Z)]), name)
     numbers += [*stress.hydrostatic_pressure, *stress.principal_stretches.ravel(), *stress.on_face((0, 1)).normal]
 raw = field.at_quadrature_points("b").hydrostatic_pressure
 numbers += [len(raw), raw.mean()]
@@ -220,7 +220,7 @@ scene = fx.Scene(mesh=ball, materials={"x": soft, "y": hard}, loads=[fx.Pressure
                  supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")])
 path = fx.trace(scene, until=fx.displacement(0.5, at=(1.0, 0.0), component="r"), progress=False)
 field = path.stress()
-numbers += [path.last.measures["pressure"], *field.at([(0.9, 1.2)], "x").hydrostatic_pressure]
+numbers += [path.last.measures["pressure"], *field.at_points([(0.9, 1.2)], "x").hydrostatic_pressure]
 for error in (field.error(), field.error("y")):
     order = np.lexsort(np.round(error.points, 9).T)
     numbers += [error.total, error.relative, *error.cells[order], *error.volume[order]]

@@ -185,7 +185,7 @@ def test_pressure_jumps_between_layers():
     path = fx.trace(scene, until=fx.pole_height(0.5))
     forms, point = path.problem.forms, (0.0, 0.1)                       # where a and b meet on the axis
     assert forms.space.num_sub_spaces == 3
-    normal_stretch = path.stress().at([point], "a").deformation_gradient[0, 1, 1]
+    normal_stretch = path.stress().at_points([point], "a").deformation_gradient[0, 1, 1]
     with path.problem.state_context(path.last):
         p = [value_at(forms.w.sub(1 + forms.pressure_of[name]).collapse(), point) for name in "ab"]
     # 2 c10 (l^2 - 1) + p, the stress across the interface, is the same on both sides

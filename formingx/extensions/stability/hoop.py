@@ -86,6 +86,6 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])
     for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):
         points = a[:, None] + (b - a)[:, None] * (1 + gauss)[:, None] / 2
-        P = stress.at(points.reshape(-1, points.shape[-1]), name).first_piola[:, 2, 2].reshape(points.shape[:2])
+        P = stress.at_points(points.reshape(-1, points.shape[-1]), name).first_piola[:, 2, 2].reshape(points.shape[:2])
         resultant += np.linalg.norm(b - a, axis=1) * (P @ weights) / 2
     return HoopResultants((lines[0] + lines[-1]) / 2, resultant, problem.comm)

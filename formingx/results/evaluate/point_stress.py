@@ -36,7 +36,7 @@ class Stress:
         deformation_gradient: deformation gradient F, shape (n, 3, 3).
         second_piola: second Piola-Kirchhoff stress S, shape (n, 3, 3), stress.
 
-    >>> pole = path.stress().at([(0.0, 0.15)])
+    >>> pole = path.stress().at_points([(0.0, 0.15)])
     >>> pole.principal_stretches.round(1).tolist(), pole.principal_stresses[:, 0].round(1).tolist()
     ([[2.3, 0.2, 2.3]], [4.0])
     """

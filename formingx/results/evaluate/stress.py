@@ -48,14 +48,14 @@ log = logging.getLogger("formingx")
 
 
 class StressField:
-    """Stresses of one state: projected on smooth fields (`at`), or as computed (`at_quadrature_points`).
+    """Stresses of one state: projected on smooth fields (`at_points`), or as computed (`at_quadrature_points`).
 
     Args:
         recovery: the `Stresses` of the problem.
         state: the state.
 
     >>> field = path.stress(path.state_at(fx.pole_height(6.0)))
-    >>> field.at([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
+    >>> field.at_points([(0.0, 0.0), (0.0, 0.3)]).principal_stresses[:, 0].round(2).tolist()
     [0.9, 0.99]
     """
 
@@ -63,7 +63,7 @@ class StressField:
         self._recovery, self._state = recovery, state
         self._nodes = recovery.project(state)
 
-    def at(self, points: ArrayLike, layer: str | None = None) -> Stress:
+    def at_points(self, points: ArrayLike, layer: str | None = None) -> Stress:
         """Return the projected stresses at points; collective.
 
         Args:

@@ -402,7 +402,7 @@ class _Fields:
         if path.problem.scene.heat is not None:
             found["temperature"] = path.temperature(np.vstack(points), state).reshape(2, -1).mean(0)
         if self._stressed:
-            stress = path.stress(state).at(np.vstack(points))
+            stress = path.stress(state).at_points(np.vstack(points))
             found["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
         if self._faces:
             found["contact pressure"] = sum(_nearest(face.of(state), self._positions) for face in self._faces)
