@@ -168,7 +168,7 @@ class Record:
         problem, memory = self.equations, self.equations.memory
         problem.advance(state.x, state.control)
         state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
-        state.before = memory
+        state.memory_before = memory
         state.time = problem.time_at(state.control)
         self.segments[-1].states.append(state)
         try:

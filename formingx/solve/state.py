@@ -25,7 +25,7 @@ class State:
             the state before, mean over the volume of the body (length)}.
         met: the target that the state meets exactly, or None.
         memory: history variables of the problem after this state (`Problem.histories`).
-        before: history variables with which the state was solved for; empty if they are not known.
+        memory_before: history variables with which the state was solved for; empty if they are not known.
         stage: name of the stage of a process.
         setting: step data of the stage, as plain data (`StepData`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
@@ -49,7 +49,7 @@ class State:
     kind: str = "step"
     met: Target | None = None
     memory: list[Any] = field(default_factory=list)
-    before: list[Any] = field(default_factory=list)
+    memory_before: list[Any] = field(default_factory=list)
     stage: str = ""
     setting: dict[str, Any] = field(default_factory=dict)
     stepping: dict[str, Any] = field(default_factory=dict)

@@ -117,7 +117,7 @@ class _PerturbedPaths:
         self._closing: list[np.ndarray] = []
         self._solved = state
         if np.any(state.x):
-            with self.problem.state_context(replace(state, memory=state.before)):
+            with self.problem.state_context(replace(state, memory=state.memory_before)):
                 constraint = fixed(state.control)
                 solve_perturbed(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
 
@@ -157,7 +157,7 @@ class _PerturbedPaths:
             before: the state of the base run before it.
             last: True if a stage or a piece of a stage ends at the state.
         """
-        with self.problem.state_context(replace(state, memory=state.before)):
+        with self.problem.state_context(replace(state, memory=state.memory_before)):
             self._closing = []
             for number, face in enumerate(self.problem.contacts):
                 self._closing.append(self._close_gaps(number, face, state, before))
