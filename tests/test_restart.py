@@ -97,6 +97,16 @@ def test_goes_on_to_another_target_and_from_memory(whole, tmp_path):
     same(fx.load(copy, scene), further)
 
 
+def test_a_state_is_stored_with_one_set_of_history_variables(whole):
+    """Files hold the history variables after a state only: those before it are the ones of an earlier state."""
+    folder, scene, path = whole["stick"]
+    before = path.states[-1].memory_before[0]
+    assert before.history.position.shape == path.states[-1].memory[0].history.position.shape
+    assert not any(state.memory_before for state in fx.load(folder, scene).states)
+    data = checkpoint_data.read_data(folder, len(path) - 1)
+    assert len(data["memory"]) == len(path.problem.histories) and "memory_before" not in data
+
+
 def test_a_run_that_fails_leaves_its_states(tmp_path):
     scene = treloar()
     with pytest.raises(fx.ConvergenceError) as caught:

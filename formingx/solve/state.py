@@ -25,7 +25,7 @@ class State:
             the state before, mean over the volume of the body (length)}.
         met: the target that the state meets exactly, or None.
         memory: history variables of the problem after this state (`Problem.histories`).
-        memory_before: history variables with which the state was solved for; empty if they are not known.
+        memory_before: history variables with which the state was solved for; empty in a loaded path.
         stage: name of the stage of a process.
         setting: step data of the stage, as plain data (`StepData`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.

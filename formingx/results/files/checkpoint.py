@@ -39,6 +39,7 @@ from .checkpoint_data import (
     END,
     FIELDS,
     FORMAT,
+    HISTORIES,
     check_scene,
     complete_states,
     crc_sums,
@@ -271,11 +272,11 @@ def _read_state(data: dict, problem: Any) -> State:
     last = problem.comm.rank == problem.comm.size - 1
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
-    met = data.pop("met")
+    met, stored = data.pop("met"), (f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES))
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
                  memory=_read_memory(problem, data.pop("memory")),
-                 **{f.name: data[f.name] for f in fields(State) if f.name in data and f.name not in FIELDS})
+                 **{name: data[name] for name in stored if name in data})
 
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
@@ -322,7 +323,7 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
 
 def _plain_state(state: State) -> dict[str, Any]:
     """Return the attributes of a state as JSON data, without its unknowns and history variables."""
-    excluded = (*FIELDS, "memory", "met", "history")
+    excluded = (*FIELDS, *HISTORIES, "met", "history")
     data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in excluded}
     return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
                    "history": [list(i) for i in state.history]}

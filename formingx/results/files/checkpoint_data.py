@@ -19,6 +19,7 @@ from .progress import progress
 
 FORMAT = 8  # number of the format of the files, in scene.json
 FIELDS = ("x", "direction")
+HISTORIES = ("memory", "memory_before")
 ARRAYS = "arrays.bin"
 END = "end.json"
 
@@ -193,7 +194,7 @@ def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     data = read_json(state_folder / "state.json")
     try:
         content = (state_folder / ARRAYS).read_bytes()
-        missing = [f.name for f in fields(State) if f.name not in (*FIELDS, "memory") and f.name not in data]
+        missing = [f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES) and f.name not in data]
         complete = not missing and data.get("number") == number and (
             not checksums or crc_sums(data, content) == data.get("checksums"))
         found = unpack(data, content) if complete else data
