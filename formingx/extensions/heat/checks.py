@@ -17,7 +17,7 @@ from .run import checked_materials
 _FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
            " glass")
 _RISES = 2.0
-"""Equilibrium modulus at the lowest over the modulus at the highest temperature, above which `springs_back` warns."""
+"""Equilibrium modulus at the lowest temperature over the modulus at the highest, above which a check warns."""
 
 _ALLOWED = 0.01
 """Error of the temperature, over the span of temperatures, for which `layers_needed` asks."""
@@ -43,7 +43,7 @@ def error_of_layers(layers: float, biot: float) -> float:
     Returns:
         Error over the difference between the highest and the lowest temperature.
     """
-    return _ONE_LAYER * _share(biot) * layers ** -_ORDER
+    return _ONE_LAYER * _biot_factor(biot) * layers ** -_ORDER
 
 
 def layers_needed(biot: float) -> int:
@@ -55,10 +55,10 @@ def layers_needed(biot: float) -> int:
     Returns:
         Number of layers through the thickness.
     """
-    return max(1, int(np.ceil((_ONE_LAYER * _share(biot) / _ALLOWED) ** (1 / _ORDER))))
+    return max(1, int(np.ceil((_ONE_LAYER * _biot_factor(biot) / _ALLOWED) ** (1 / _ORDER))))
 
 
-def _share(biot: float) -> float:
+def _biot_factor(biot: float) -> float:
     """Return the temperature error of coarse layers at a Biot number over their error at an infinite one."""
     return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
 
@@ -97,7 +97,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 
 @register("scene")
-def springs_back(body: Any) -> Iterator[Finding]:
+def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
     """Find equilibrium moduli that increase on cooling, and so pull the part back instead of fixing its shape.
 
     For example, a film was drawn into a mould with a table of stiffness on its equilibrium energy. It came off the
@@ -134,7 +134,7 @@ def springs_back(body: Any) -> Iterator[Finding]:
 
 
 @register("start")
-def beyond_limits(body: Any) -> Iterator[Finding]:
+def beyond_known_range(body: Any) -> Iterator[Finding]:
     """Find constants that are unknown at temperatures to which tools, air and heaters may bring the body; collective.
 
     Args:
@@ -145,11 +145,11 @@ def beyond_limits(body: Any) -> Iterator[Finding]:
     """
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
-        yield from _beyond(body.scene, low, high, "the tools and the air may bring it")
+        yield from _outside_known_range(body.scene, low, high, "the tools and the air may bring it")
 
 
 @register("end")
-def were_beyond_limits(path: Any) -> Iterator[Finding]:
+def passed_known_range(path: Any) -> Iterator[Finding]:
     """Find constants that were unknown at temperatures of the run and not reported by a check before it; collective.
 
     Args:
@@ -165,11 +165,11 @@ def were_beyond_limits(path: Any) -> Iterator[Finding]:
             local = [f(state.memory[k].temperature) for state in states if len(state.memory[k].temperature)
                     for f in (np.min, np.max)]
             ends = [value for part in path.problem.comm.allgather(local) for value in part]
-            found = _beyond(path.problem.scene, min(ends), max(ends), "the run brought it")
+            found = _outside_known_range(path.problem.scene, min(ends), max(ends), "the run brought it")
             yield from (finding for finding in found if finding.about not in reported)
 
 
-def _beyond(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
+def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
     """Yield warnings for functions of temperature that are unknown at one of two temperatures.
 
     The functions are constants of materials, friction coefficients and specific volumes.

@@ -99,13 +99,13 @@ class Conduction(HeatVectors):
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
         self._factored_for: float | None = None
         self._displaced: Any = None
-        self._deform()
+        self._set_deformation()
         unity = self.constant(1.0)
         self.volume = self._integral(unity * self._weight * self._dx)
         self.capacity = self._integral(self._stored(materials, unity, unity))
         self._scale.value = 1 / self.capacity
         self.tool_contacts = [self._tool_contact(b) for b in boundaries if isinstance(b, ContactWithTool)]
-        self._fix([b for b in boundaries if isinstance(b, FixedTemperature)])
+        self._set_fixed_values([b for b in boundaries if isinstance(b, FixedTemperature)])
         self._laws = [b for b in boundaries if hasattr(b, "flux") and not isinstance(b, Absorption)]
         self._sources = [(b, fem.Function(self.space)) for b in boundaries if isinstance(b, Absorption)]
         given = [*self._laws, *(source for source, _ in self._sources),
@@ -139,7 +139,7 @@ class Conduction(HeatVectors):
         for touch, area in zip(self.tool_contacts, self._areas):
             touch.area = self._assemble(area)[touch.dofs]
         for source, depth in self._sources:
-            depth.x.array[: self._n] = distance_to_line(self._moved(self.points, self.displacements()),
+            depth.x.array[: self._n] = distance_to_line(self._deformed(self.points, self.displacements()),
                                                         self._face_line(source.on))
             depth.x.scatter_forward()
 
@@ -183,20 +183,20 @@ class Conduction(HeatVectors):
             ConvergenceError: Newton's method found no solution.
         """
         T = state[0]
-        answers = [touch.answer(lines, k, c) for touch, lines, k in zip(self.tool_contacts, state[1:], known[1:])]
+        responses = [touch.response(lines, k, c) for touch, lines, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
         for iteration in range(_MOST_ITERATIONS):
             R = self._body_rate(T + change)
-            for touch, answer in zip(self.tool_contacts, answers):
+            for touch, response in zip(self.tool_contacts, responses):
                 T_face = (T + change)[touch.dofs]
-                R[touch.dofs] += touch.area * answer.g * (answer.free - T_face)
+                R[touch.dofs] += touch.area * response.conductance * (response.face_temperature - T_face)
             residual = known[0] + c * R - self._mass(change)
-            self._factorise(c, answers, afresh=iteration % 4 == 3)        # modified Newton: a tangent serves 4 times
+            self._factorise(c, responses, afresh=iteration % 4 == 3)        # modified Newton: a tangent serves 4 times
             correction = self._solve(residual)
             change += correction
             size, last = self._largest(change), self._largest(correction)
             if last <= max(1e-11 * size, 1e-15 * self._largest(T + change)):
-                return self._finish(T, change, known, c, answers)
+                return self._end_of_stage(T, change, known, c, responses)
             if not np.isfinite(last):
                 break
         raise ConvergenceError("heat: Newton's method did not converge in a step")
@@ -216,15 +216,15 @@ class Conduction(HeatVectors):
         Returns:
             Largest absolute change of body and tools over all ranks, degrees.
         """
-        answers = [touch.answer(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
-        self._factorise(c, answers, afresh=False)
+        responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
+        self._factorise(c, responses, afresh=False)
         rhs = known[0].copy()
-        for touch, answer in zip(self.tool_contacts, answers):
-            rhs[touch.dofs] += c * touch.area * answer.g * answer.free
+        for touch, response in zip(self.tool_contacts, responses):
+            rhs[touch.dofs] += c * touch.area * response.conductance * response.face_temperature
         change = self._solve(rhs)
         sizes = [self._largest(change)]
-        for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
-            sizes.append(self._largest(touch.finish(answer, k, change[touch.dofs], c)[1]))
+        for touch, response, k in zip(self.tool_contacts, responses, known[1:]):
+            sizes.append(self._largest(touch.flux_and_change(response, k, change[touch.dofs], c)[1]))
         return max(sizes)
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
@@ -256,8 +256,8 @@ class Conduction(HeatVectors):
         for item in (self._solver, self._matrix, self._rhs, self._out):
             item.destroy()
 
-    def _finish(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
-                answers: list[Any]) -> Stage:
+    def _end_of_stage(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
+                responses: list[Any]) -> Stage:
         """Return changes, rates and heats of an implicit stage that has converged.
 
         Args:
@@ -265,47 +265,47 @@ class Conduction(HeatVectors):
             change: their change in the stage, shape (n,).
             known: known heats of body and tools.
             c: factor of the rates, time.
-            answers: response of each tool in contact.
+            responses: response of each tool in contact.
         """
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
-        for touch, answer, k in zip(self.tool_contacts, answers, known[1:]):
-            q, moved, rate = touch.finish(answer, k, (T + change)[touch.dofs], c)
+        for touch, response, k in zip(self.tool_contacts, responses, known[1:]):
+            q, moved, rate = touch.flux_and_change(response, k, (T + change)[touch.dofs], c)
             R[touch.dofs] += touch.area * q
             through.append(touch.area @ q)
             changes.append(moved)
             rates.append(rate)
         return Stage(changes, rates, self._heats(through))
 
-    def _heats(self, through_touches: list[float]) -> np.ndarray:
+    def _heats(self, tool_heats: list[float]) -> np.ndarray:
         """Return heat per time into the body at the present `T`, over all ranks: by each law, source and tool contact.
 
-        through_touches: this rank's part of the heat through each tool contact, over `capacity`.
+        tool_heats: this rank's part of the heat through each tool contact, over `capacity`.
         """
-        local = [fem.assemble_scalar(form) for form in self._scalars] + through_touches
+        local = [fem.assemble_scalar(form) for form in self._scalars] + tool_heats
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
 
-    def _deform(self) -> None:
+    def _set_deformation(self) -> None:
         """Set the UFL factors of deformation.
 
         `_weight` is the volume per reference section area, `_area` the deformed face area per reference length. `_J` is
-        det F, and `_carry` maps Grad T to grad T (None without displacement).
+        det F, and `_gradient_map` maps Grad T to grad T (None without displacement).
         """
         kinematics, u, X = self._kinematics, self._u, self._X
-        self._weight, self._J, self._carry = kinematics.weight(X), self.constant(1.0), None
+        self._weight, self._J, self._gradient_map = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
         if u is not None:
             F = kinematics.deformation_gradient(u, X)
             self._J = kin.volume_ratio(F)
-            self._carry = ufl.inv(ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]])).T
+            self._gradient_map = ufl.inv(ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]])).T
             area = kinematics.area_vector(u, X, ufl.FacetNormal(self.mesh.domain))
             self._area = ufl.sqrt(ufl.inner(area, area))
 
     def _gradient(self, f: Any) -> Any:
         """Return the spatial gradient grad f of a scalar (UFL vector)."""
-        return ufl.grad(f) if self._carry is None else self._carry * ufl.grad(f)
+        return ufl.grad(f) if self._gradient_map is None else self._gradient_map * ufl.grad(f)
 
-    def _layers(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
+    def _layer_measures(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
         """Return (properties, UFL measure) of the layers of each `ThermalProperties` object in {layer: object}."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
@@ -316,17 +316,18 @@ class Conduction(HeatVectors):
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
         """Return the form (UFL) of the heat in the body at temperature T over `capacity`, tested by v."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
-                   for m, dx in self._layers(materials))
+                   for m, dx in self._layer_measures(materials))
 
     def _compile(self, materials: Mapping[str, ThermalProperties]) -> None:
         """Compile the forms of mass, rate and tangent, and create the matrix and its solver."""
         T, v, J = self.T, self._v, self._J
         R = -sum(self._scale * self.constant(m.conductivity) * J * self._weight
-                 * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layers(materials))
+                 * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layer_measures(materials))
         scalars = []
         for law in self._laws:
             ds = self._ds(law.on, {"quadrature_degree": law.quadrature_degree})
-            flux = law.flux(T, self.constant(self._zero), **{k: self._number(p) for k, p in law.parameters.items()})
+            parameters = {name: self._coefficient(value) for name, value in law.parameters.items()}
+            flux = law.flux(T, self.constant(self._zero), **parameters)
             R += self._scale * flux * self._area * v * ds
             scalars.append(self._scale * flux * self._area * ds)
         for source, depth in self._sources:
@@ -345,7 +346,7 @@ class Conduction(HeatVectors):
         self._rhs, self._out = self._matrix.createVecRight(), self._matrix.createVecRight()
         self._solver = DirectSolver(self._matrix, symmetric=False)
 
-    def _number(self, value: float | Table) -> Any:
+    def _coefficient(self, value: float | Table) -> Any:
         """Return the parameter of a law, a number or a table over R, as a UFL coefficient."""
         return value(self._X[0]) if isinstance(value, Table) else self.constant(value)
 
@@ -358,7 +359,7 @@ class Conduction(HeatVectors):
         """Return the local temperature unknowns on a boundary, with ghosts."""
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
-    def _fix(self, fixed: list[FixedTemperature]) -> None:
+    def _set_fixed_values(self, fixed: list[FixedTemperature]) -> None:
         """Store the unknowns and values of faces with prescribed temperatures."""
         self._fixed_mask = np.zeros(self._n, dtype=bool)
         self._fixed, self._bcs, taken = [], [], self._fixed_mask.copy()
@@ -395,7 +396,7 @@ class Conduction(HeatVectors):
         return u.x.array.reshape(-1, self.points.shape[1])[: self._n]
 
     @staticmethod
-    def _moved(points: np.ndarray, u: Any) -> np.ndarray:
+    def _deformed(points: np.ndarray, u: Any) -> np.ndarray:
         """Return deformed positions points + u, shape (n, 2), length; u = None: the points themselves."""
         return points if u is None else points + u
 
@@ -411,12 +412,12 @@ class Conduction(HeatVectors):
         X, u = (gathered(self.comm, a) for a in (self.points[own], u[own]))
         return line + u[cKDTree(X).query(line)[1]]
 
-    def _factorise(self, c: float, answers: list[Any], afresh: bool) -> None:
+    def _factorise(self, c: float, responses: list[Any], afresh: bool) -> None:
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
 
         Args:
             c: factor of the rates, time.
-            answers: response of each tool in contact, which adds to the diagonal.
+            responses: response of each tool in contact, which adds to the diagonal.
             afresh: False to keep factors with the same c.
         """
         if self._factored_for == c and not afresh:
@@ -428,8 +429,8 @@ class Conduction(HeatVectors):
         self._matrix.assemble()
         if self.tool_contacts:
             extra = np.zeros(self._n)
-            for touch, answer in zip(self.tool_contacts, answers):
-                extra[touch.dofs] += c * touch.area * answer.g
+            for touch, response in zip(self.tool_contacts, responses):
+                extra[touch.dofs] += c * touch.area * response.conductance
             self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, extra)
             self._matrix.setDiagonal(self._rhs, PETSc.InsertMode.ADD_VALUES)
         if not self._solver.factorise():

@@ -126,22 +126,22 @@ class ContactWithTool:
         return f"ContactWithTool({self.on!r}, conductance={self.conductance!r}, tool={self.tool!r})"
 
 
-class Answer(NamedTuple):
+class ToolResponse(NamedTuple):
     """Response of n lines of a conducting tool, with m nodes each, to the flux q into the body in an implicit stage.
 
-    The flux is q = g (free - T) with the temperature T of the body. The lines change by `change` - q `column`.
+    The flux is q = g (free - T) with the temperature T of the body. The lines change by `change` - q `compliance`.
 
     Attributes:
-        free: temperature of the face of the tool without a flux, shape (n,).
-        g: conductance of contact and line in series, heat per time, area and degree, shape (n,).
+        face_temperature: temperature of the face of the tool without a flux, shape (n,).
+        conductance: conductance of contact and line in series, heat per time, area and degree, shape (n,).
         change: change of temperature of the lines without a flux, shape (n, m).
-        column: decrease of the temperatures of a line per flux q, shape (m,).
+        compliance: decrease of the temperatures of a line per flux q, shape (m,).
     """
 
-    free: np.ndarray
-    g: np.ndarray
+    face_temperature: np.ndarray
+    conductance: np.ndarray
     change: np.ndarray
-    column: np.ndarray
+    compliance: np.ndarray
 
 
 class HeatContact:
@@ -217,7 +217,7 @@ class HeatContact:
         rate[:, :1] -= q[:, None]
         return q, rate
 
-    def answer(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> Answer:
+    def response(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> ToolResponse:
         """Return the response of the lines to a flux in an implicit stage M w' = known + c rate(lines + w').
 
         M is the capacity matrix of a line, w' the change of its temperatures.
@@ -233,17 +233,18 @@ class HeatContact:
         """
         back = self.back if absolute else 0.0
         if not self.conducts:
-            return Answer(np.full(len(self.dofs), back), self.conductance, lines, np.zeros(0))
-        inverse, column = self._factor(c)
+            return ToolResponse(np.full(len(self.dofs), back), self.conductance, lines, np.zeros(0))
+        inverse, compliance = self._factor(c)
         change = (known - c * lines @ self._K) @ inverse
-        return Answer(back + lines[:, 0] + change[:, 0], self.conductance / (1 + self.conductance * column[0]),
-                      change, column)
+        in_series = self.conductance / (1 + self.conductance * compliance[0])
+        return ToolResponse(back + lines[:, 0] + change[:, 0], in_series, change, compliance)
 
-    def finish(self, answer: Answer, known: np.ndarray, T: np.ndarray, c: float) -> tuple[Any, Any, Any]:
+    def flux_and_change(self, response: ToolResponse, known: np.ndarray, T: np.ndarray,
+                        c: float) -> tuple[Any, Any, Any]:
         """Return the flux and the change of the lines at the end of a stage.
 
         Args:
-            answer: response of the lines, from `answer`.
+            response: response of the lines, from `response`.
             known: known heat per area at the nodes of the lines, shape (n, m).
             T: temperatures of the body at the contact nodes, shape (n,).
             c: factor of the rate, time.
@@ -251,8 +252,8 @@ class HeatContact:
         Returns:
             Flux q into the body, shape (n,); change of the lines and their rates of heat, shape (n, m) each.
         """
-        q = answer.g * (answer.free - T)
-        change = answer.change - np.outer(q, answer.column)
+        q = response.conductance * (response.face_temperature - T)
+        change = response.change - np.outer(q, response.compliance)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:

@@ -73,7 +73,7 @@ class CoolingHistory:
         self._cooling, self._problem, self._forms = cooling, problem, forms
         self._field = problem.temperature
         self._body = self._conduction()
-        self._touches = self._tool_contacts(self._body)
+        self._contacts = self._tool_contacts(self._body)
         self._n = len(self._body.points)
         self._first = scene.temperature.T.x.array[: self._n]
         self._seen: Any = None                              # temperature seen by the field and its coefficients
@@ -105,12 +105,12 @@ class CoolingHistory:
             Largest error in each state, degrees, shape (states,).
         """
         finer, power, found = self._conduction(degree=3), self._body.power, []
-        estimator, touches = SpaceError(self._body, finer), self._tool_contacts(finer)
+        estimator, tool_contacts = SpaceError(self._body, finer), self._tool_contacts(finer)
         try:
             for state in states:
                 with self._problem.state_context(state):
                     self._body.power = 0.0                  # as in `finer`, which has none
-                    for body, touching in ((self._body, self._touches), (finer, touches)):
+                    for body, touching in ((self._body, self._contacts), (finer, tool_contacts)):
                         _set_conductances(body, touching, state.control)
                         body.update()
                     found.append(estimator.largest(self._state, self._time))
@@ -151,7 +151,7 @@ class CoolingHistory:
         error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
         return [Finding("warning", "temperature", f"The error of the temperature in space {error} degrees at time"
                         f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
-                        f" lose heat{_such_as(scene, min(errors[worst], most) / allowed, duration)}.")]
+                        f" lose heat{_finer_elements(scene, min(errors[worst], most) / allowed, duration)}.")]
 
     def start(self) -> None:
         """Set the initial temperatures of body and tools, at time 0."""
@@ -160,7 +160,7 @@ class CoolingHistory:
         self._power: Any = None if self._dissipated is None else np.zeros(self._n)
         self._before: Any = None
         self._state = [self._first.copy(), *(touch.start() for touch in self._body.tool_contacts)]
-        self._take()
+        self._update_problem()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Solve the heat equation over an accepted step, in the body halfway through the step.
@@ -178,20 +178,20 @@ class CoolingHistory:
             self._body.power, self._power = (self._power + power) / 2, power
         if until <= self._time:
             return
-        _set_conductances(self._body, self._touches, control)
+        _set_conductances(self._body, self._contacts, control)
         self._before = self._time, self._state[0]
         if start is not None:
-            after = [touch.conductance.copy() for touch, *_ in self._touches]
+            after = [touch.conductance.copy() for touch, *_ in self._contacts]
             self._problem.set_fields(start.x)
-            _set_conductances(self._body, self._touches, start.control)
-            for (touch, *_), conductance in zip(self._touches, after):
+            _set_conductances(self._body, self._contacts, start.control)
+            for (touch, *_), conductance in zip(self._contacts, after):
                 touch.conductance[:] = (touch.conductance + conductance) / 2
             self._problem.set_fields((start.x[: len(x)] + x) / 2)
         self._body.update()
         self._state[0] = self._body.with_fixed_values(self._state[0])
         self._integrate(until)
         self._problem.set_fields(x)
-        self._take()
+        self._update_problem()
 
     def _integrate(self, until: float) -> None:
         """Take time steps of the heat equation in the body at a fixed position, up to the time `until`."""
@@ -225,7 +225,7 @@ class CoolingHistory:
         """
         self._time, self._dt, self._power, self._before = memory.time, memory.step, memory.power, memory.before
         self._state = [memory.temperature.copy(), *(lines.copy() for lines in memory.lines)]
-        self._take()
+        self._update_problem()
 
     def save(self, memory: HeatState) -> dict[str, Any]:
         """Return a state of the heat equation as plain data, the same on all ranks; collective.
@@ -256,11 +256,11 @@ class CoolingHistory:
         Raises:
             InputError: the data belong to another mesh or another `work_to_heat`.
         """
-        rows = _rows(self._body.points, data["points"])
+        rows = _matching_rows(self._body.points, data["points"])
         if ("power" in data) != (self._dissipated is not None):
             raise InputError("the temperature history belongs to a scene with another work_to_heat")
         power = np.array(data["power"])[rows] if "power" in data else None
-        lines = [np.array(d["above_back"])[_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
+        lines = [np.array(d["above_back"])[_matching_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
                  for touch, d in zip(self._body.tool_contacts, data["lines"], strict=True)]
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
@@ -289,7 +289,7 @@ class CoolingHistory:
         return HeatState(memory.time, to_body(memory.temperature), lines, memory.step, power,
                       before and (before[0], to_body(before[1])))
 
-    def _take(self) -> None:
+    def _update_problem(self) -> None:
         """Pass the present and the previous temperature to the problem, and update temperature-dependent constants."""
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
@@ -306,21 +306,21 @@ class CoolingHistory:
             self._problem.take_temperature()
 
 
-def _set_conductances(body: Conduction, touches: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
+def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
     """Set the conductance of each contact node: 0 unless the tool is present and near the node of the deformed body.
 
     Args:
         body: heat equation of the body.
-        touches: (`HeatContact`, contact of the problem, conductances in contact) of each tool.
+        tool_contacts: (`HeatContact`, contact of the problem, conductances in contact) of each tool.
         control: load parameter (control) of the state, dimensionless; it gives the travel of the tools.
     """
     u = body.displacements()
-    for touch, contact, conductance in touches:
+    for touch, contact, conductance in tool_contacts:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
         touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
 
 
-def _such_as(scene: Any, times: float, duration: float) -> str:
+def _finer_elements(scene: Any, times: float, duration: float) -> str:
     """Return advice on element sizes that reduce the temperature error by a factor `times`, or "" if none is known.
 
     The error is of third order. The duration is the time over which heat has penetrated.
@@ -340,7 +340,7 @@ def _equal(a: Any, b: Any) -> bool:
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 
 
-def _rows(points: np.ndarray, others: Any) -> np.ndarray:
+def _matching_rows(points: np.ndarray, others: Any) -> np.ndarray:
     """Return the row of `others` at each point, shape (n,); raise an InputError if a point has none."""
     from scipy.spatial import cKDTree
     others = np.reshape(others, (-1, points.shape[-1]))

@@ -42,7 +42,7 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
     try:
-        return to_mesh(lambda: _cut(grid, cuts), mesh.comm, "the mesh, cut into layers for heat") if cuts else mesh
+        return to_mesh(lambda: _cut_grid(grid, cuts), mesh.comm, "the mesh, cut into layers for heat") if cuts else mesh
     except InputError:           # an element is so curved that straight rows do not fit in it: a quarter of its height
         return mesh
 
@@ -62,7 +62,7 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
         Sizes, for `elements=(n, sizes)` of a mesh.
     """
     grid = gathered(mesh)
-    heights, lengths, area = zip(*(_along(grid, face) for face in faces))
+    heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
     thinnest, longest = min([_PART * depth, *(part * height for height in heights)]), max(lengths)
     n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * area[0] / longest / len(faces) / thinnest + 1)))
     sizes = [2 ** (k / 3) for k in range(n)]
@@ -79,10 +79,10 @@ def height_at(mesh: Mesh, face: str) -> float:
     Returns:
         Height, length.
     """
-    return _along(gathered(mesh), face)[0]
+    return _boundary_sizes(gathered(mesh), face)[0]
 
 
-def _along(grid: Grid, face: str) -> tuple[float, float, float]:
+def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
     """Return the median height of the elements along a boundary, its length, and the area of the mesh."""
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
@@ -103,7 +103,7 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
     """
     if not depths:
         return {}
-    below = np.array([_depth(points, grid.boundaries[name][:, :2]) for name in depths])
+    below = np.array([_distance_from_edges(points, grid.boundaries[name][:, :2]) for name in depths])
     first, last = (np.array(values)[:, None] for values in zip(*depths.values()))
     edges = np.unique(np.concatenate([_ordered(grid.points, rows[:, [i, j]]) for rows in grid.layers.values()
                                       for i, j in ((0, 1), (1, 2), (2, 0))]), axis=0)
@@ -122,7 +122,7 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
     return found
 
 
-def _depth(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
+def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Return the distance of each point from the edges of a boundary, shape (n,), length.
 
     edges: numbers of the two ends of each edge in `points`, shape (m, 2).
@@ -204,16 +204,17 @@ def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
 
 
-def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
+def _cut_grid(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
     """Return the grid with its edges cut at the positions of `_cuts`, and its triangles cut between them."""
     nodes = _Nodes(grid, cuts)
     quadratic = next(iter(grid.layers.values())).shape[1] == 6
     layers, boundaries = {}, {}
     for name, triangles in grid.layers.items():
-        layers[name] = np.array([new for row in _rows(triangles) for new in _parts(grid, nodes, row, quadratic)])
+        layers[name] = np.array([new for row in _integer_rows(triangles)
+                                 for new in _pieces(grid, nodes, row, quadratic)])
     for name, edges in grid.boundaries.items():
         found = []
-        for row in _rows(edges):
+        for row in _integer_rows(edges):
             line, _ = nodes.along(row[0], row[1], grid.points[row])
             found += [[a, b, nodes.middle(a, b)] if quadratic else [a, b] for a, b in zip(line, line[1:])]
         boundaries[name] = np.array(found, dtype=np.int64).reshape(-1, 3 if quadratic else 2)
@@ -221,12 +222,12 @@ def _cut(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
     return Grid(points, np.arange(1, len(points) + 1), layers, boundaries)
 
 
-def _rows(table: np.ndarray) -> list[list[int]]:
+def _integer_rows(table: np.ndarray) -> list[list[int]]:
     """Return the rows of an integer table as lists of int."""
     return [list(map(int, row)) for row in table]
 
 
-def _parts(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
+def _pieces(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
     """Return the pieces of one triangle as lists of node numbers.
 
     Args:

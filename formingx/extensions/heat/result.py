@@ -121,7 +121,7 @@ class HeatRun:
             P2 Function on `mesh`.
         """
         T = fem.Function(self._body.space, name="temperature")
-        T.x.array[: len(self._body.points)] = self._at(time)[0]
+        T.x.array[: len(self._body.points)] = self._state_at(time)[0]
         T.x.scatter_forward()
         return T
 
@@ -140,7 +140,7 @@ class HeatRun:
         """
         points = np.atleast_2d(np.asarray(points, dtype=float))
         reader = PointReader(self._body.space, points)
-        return np.array([reader.read(self.temperature(t).x.array) for t in self._chosen(times)])
+        return np.array([reader.read(self.temperature(t).x.array) for t in self._times_or_outputs(times)])
 
     def through(self, times: Any = None, *, line: Any = None, points: int = _POINTS) -> tuple[np.ndarray, np.ndarray]:
         """Return temperatures along a straight line through the body.
@@ -157,7 +157,7 @@ class HeatRun:
         Raises:
             InputError: a point outside the body, a time outside the run, or no default line.
         """
-        first, last = np.array(self._ends() if line is None else line, dtype=float).reshape(2, 2)
+        first, last = np.array(self._default_line() if line is None else line, dtype=float).reshape(2, 2)
         s = np.linspace(0, 1, points)
         return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
 
@@ -185,7 +185,7 @@ class HeatRun:
         Returns:
             Temperature and reference position of the node.
         """
-        return self._extreme(self._at(time)[0], 1)
+        return self._extreme(self._state_at(time)[0], 1)
 
     def coldest(self, time: float | None = None) -> Spot:
         """Return the node of lowest temperature at a time.
@@ -196,7 +196,7 @@ class HeatRun:
         Returns:
             Temperature and reference position of the node.
         """
-        return self._extreme(self._at(time)[0], -1)
+        return self._extreme(self._state_at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
         """Return when all temperatures of the body have entered a range, and when the first leaves it again.
@@ -215,14 +215,14 @@ class HeatRun:
         if not low < high:
             raise InputError(f"time_to_reach: low = {low!r}: must be below high = {high!r}")
 
-        def out(time):                                       # below 0: inside
+        def excess(time):                                       # below 0: inside
             """Return the largest excess beyond the range at a time, degrees."""
             return max(low - self.coldest(time).temperature, self.hottest(time).temperature - high)
-        reached = self._first(out, self._times)
+        reached = self._first_time_inside(excess, self._times)
         if reached is None:
             return Window(None, None)
         later = [t for t in self._times if t > reached]
-        return Window(reached, self._first(lambda t: -out(t), later, from_time=reached))
+        return Window(reached, self._first_time_inside(lambda t: -excess(t), later, from_time=reached))
 
     def tool_profile(self, on: str, at: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return temperatures along the depth of a conducting tool, below the contact node nearest to a point.
@@ -241,7 +241,7 @@ class HeatRun:
         conducting = {t.on: k for k, t in enumerate(self._body.tool_contacts) if t.conducts}
         known("tool_profile: conducting tool on boundary", on, conducting)
         number = conducting[on]
-        touch, lines = self._body.tool_contacts[number], self._at(time)[1 + number]
+        touch, lines = self._body.tool_contacts[number], self._state_at(time)[1 + number]
         away = np.hypot(*(touch.points - np.asarray(at, dtype=float)).T)
         mine = (away.min(initial=np.inf), self._comm.rank)
         nearest = min(self._comm.allgather(mine))
@@ -272,7 +272,7 @@ class HeatRun:
             file: path of the file.
             time: the time; default the end of the run.
         """
-        table = np.column_stack([self._body.points, self._at(time)[0]])
+        table = np.column_stack([self._body.points, self._state_at(time)[0]])
         rows = gathered(self._comm, table)
         files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
 
@@ -292,10 +292,10 @@ class HeatRun:
         """
         from ...figures import figure
         axes = figure()[1] if axes is None else axes
-        chosen = self._chosen(times)
+        chosen = self._times_or_outputs(times)
         distance, T = self.through(chosen, line=line)
         for k, (t, row) in enumerate(zip(chosen, T)):
-            shade = {"color": _shade(k, len(chosen))} | style
+            shade = {"color": _colour(k, len(chosen))} | style
             axes.plot(scale * distance, row, **{"label": f"t = {t:g}"} | shade)
         axes.set(xlabel="distance through the thickness", ylabel=f"temperature, {_DEGREES[self.unit]}")
         return axes
@@ -305,11 +305,11 @@ class HeatRun:
         names = self._body.names
         return [n if names.count(n) == 1 else f"{n} {names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
-    def _chosen(self, times: Any) -> np.ndarray:
+    def _times_or_outputs(self, times: Any) -> np.ndarray:
         """Return times as an array; None: `outputs`."""
         return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
 
-    def _ends(self) -> list[np.ndarray]:
+    def _default_line(self) -> list[np.ndarray]:
         """Return the reference positions of the two ends of the default line through the body.
 
         Raises:
@@ -321,7 +321,7 @@ class HeatRun:
         raise InputError(f"a line through the body: the mesh has no faces 'bottom' and 'top', only"
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
-    def _at(self, time: float | None) -> list[np.ndarray]:
+    def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`.
 
         Between two steps they follow Hermite's cubic, with slopes of the parabolas through three steps.
@@ -358,19 +358,19 @@ class HeatRun:
         value, R, Z = max(self._comm.allgather(mine))
         return Spot(float(sign * value), R, Z)
 
-    def _first(self, out: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """Return the first time at which the function `out` of time is not positive, or None.
+    def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
+        """Return the first time at which the function `excess` of time is not positive, or None.
 
         Args:
-            out: function of time.
+            excess: function of time.
             times: times of steps to examine, in order; a root between two of them is located.
             from_time: time before the first of them, or None.
         """
         from scipy.optimize import brentq
         before = from_time
         for t in times:
-            if out(t) <= 0:
-                return t if before is None or out(before) <= 0 else float(brentq(out, before, t, xtol=1e-9 * t))
+            if excess(t) <= 0:
+                return t if before is None or excess(before) <= 0 else float(brentq(excess, before, t, xtol=1e-9 * t))
             before = t
         return None
 
@@ -378,7 +378,7 @@ class HeatRun:
 _DEGREES = {"C": "°C", "K": "K"}
 
 
-def _shade(k: int, n: int) -> Any:
+def _colour(k: int, n: int) -> Any:
     """Return the colour of curve k of n curves."""
     from matplotlib import colormaps
     return colormaps["viridis"](0.9 * (1 - k / max(n - 1, 1)))

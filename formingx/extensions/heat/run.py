@@ -77,13 +77,13 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     if displacement is not None and getattr(displacement, "ufl_shape", None) != (2,):
         raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
     tolerance = positive("heat: tolerance", tolerance)
-    moved = None if displacement is None else _Displaced(displacement, mesh)
+    moved = None if displacement is None else _Displacement(displacement, mesh)
     fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
     make = partial(Conduction, fine, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit],
                    displacement if moved is None or fine is mesh else moved.on(fine))
     body = make()
     try:
-        _begin(body, start, unit)
+        _set_initial_temperature(body, start, unit)
         run = HeatRun(body, unit, outputs)
         _advance(run, body, outputs, tolerance, max_steps)
         _check_error(run, SpaceError(body, make(degree=3)), tolerance)
@@ -106,7 +106,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
     return depths
 
 
-class _Displaced:
+class _Displacement:
     """Displacement of a body as a P2 Function, evaluated at points or on another mesh of the body; collective.
 
     Args:
@@ -133,7 +133,7 @@ class _Displaced:
         return u
 
 
-def _begin(body: Conduction, start: Any, unit: str) -> None:
+def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
     """Set the initial temperature, and check that it is above absolute zero."""
     if getattr(start, "unit", unit) != unit:
         raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
@@ -232,7 +232,7 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
         InputError: a law that is not allowed.
     """
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
-    held = [b.on for b in found if isinstance(b, FixedTemperature)]
+    prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:
         if not hasattr(boundary, "on") or not (hasattr(boundary, "flux") or hasattr(boundary, "check")) \
                 or isinstance(boundary, type):
@@ -241,7 +241,7 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
         known(f"heat: {boundary!r}: boundary", boundary.on, mesh.boundaries)
         if hasattr(boundary, "check"):
             boundary.check(mesh, absolute_zero)
-        if boundary.on in held and hasattr(boundary, "check") and not isinstance(boundary, FixedTemperature):
+        if boundary.on in prescribed and hasattr(boundary, "check") and not isinstance(boundary, FixedTemperature):
             raise InputError(f"heat: {boundary!r}: the temperature of {boundary.on!r} is fixed, so this does nothing")
     return found
 

@@ -26,7 +26,7 @@ class SpaceError:
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
-        self._values, self._raised_values = fem.Function(body.space), fem.Function(finer.space)
+        self._values, self._cubic_values = fem.Function(body.space), fem.Function(finer.space)
 
     def largest(self, state: list[np.ndarray], time: float) -> float:
         """Estimate the largest discretisation error of the temperature in a state; collective.
@@ -43,16 +43,17 @@ class SpaceError:
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
-        lines = [self._faces(*each) for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
-        rates, _ = finer.rates([self._raised(state[0]), *lines])
-        residual = time * (rates[0] - finer.mass(self._raised(slope)))
+        lines = [self._face_temperatures(*each)
+                 for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
+        rates, _ = finer.rates([self._in_cubic_space(state[0]), *lines])
+        residual = time * (rates[0] - finer.mass(self._in_cubic_space(slope)))
         return finer.difference([residual, *(np.zeros_like(line) for line in lines)], time)
 
     def destroy(self) -> None:
         """Free the PETSc objects of `finer` (collective)."""
         self._finer.destroy()
 
-    def _faces(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
+    def _face_temperatures(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
         """Return temperatures of a tool at the contact nodes of `finer`, interpolated at its face and 0 below it.
 
         Args:
@@ -64,12 +65,12 @@ class SpaceError:
         if touch.conducts:
             values = np.zeros(len(self._body.points))
             values[touch.dofs] = lines[:, 0]
-            found[:, 0] = self._raised(values)[finer.dofs]
+            found[:, 0] = self._in_cubic_space(values)[finer.dofs]
         return found
 
-    def _raised(self, own: np.ndarray) -> np.ndarray:
+    def _in_cubic_space(self, own: np.ndarray) -> np.ndarray:
         """Return the P3 nodal values of a P2 function, both locally owned entries."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
-        self._raised_values.interpolate(self._values)
-        return self._raised_values.x.array[: len(self._finer.points)].copy()
+        self._cubic_values.interpolate(self._values)
+        return self._cubic_values.x.array[: len(self._finer.points)].copy()
