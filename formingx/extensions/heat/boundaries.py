@@ -79,7 +79,7 @@ class _Boundary:
                 raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError unless temperatures are above absolute zero and tables cover the boundary.
+        """Raise an InputError if a temperature is below absolute zero, or a table does not cover the boundary.
 
         Args:
             mesh: the `Mesh`, which must have the boundary.
@@ -104,6 +104,9 @@ class Convection(_Boundary):
         on: name of the boundary.
         h: heat transfer coefficient, heat per time, area and degree, number or `table` over the reference radius.
         air: temperature of the air, number or `table` over the reference radius.
+
+    Raises:
+        InputError: a negative h, or a value that is neither a finite number nor a table.
 
     >>> fx.Convection("top", h=2e-5, air=fx.table({0.0: 25.0, 10.0: 20.0}))              # W/(mm2 K); by R
     Convection('top', h=2e-05, air=table({0: 25, 10: 20}))
@@ -131,16 +134,22 @@ class Convection(_Boundary):
 
 
 class Radiation(_Boundary):
-    r"""Radiation from a black heater to a grey face, with absolute temperatures.
+    r"""Radiation from a black heater to a grey face.
 
     .. math:: q = f \epsilon \sigma (T_{heater}^4 - T^4)
 
+    T is the absolute temperature of the face; the run converts temperatures in degrees Celsius.
+
     Args:
         on: name of the boundary.
-        emissivity: emissivity of the face, from 0 to 1, number or `table` over the reference radius.
-        heater: temperature of the heater, number or `table` over the reference radius.
+        emissivity: emissivity epsilon of the face, from 0 to 1, number or `table` over the reference radius.
+        heater: temperature of the heater in the unit of the run, number or `table` over the reference radius.
         view_factor: view factor f, from 0 to 1, number or `table` over the reference radius.
         stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
+
+    Raises:
+        InputError: an emissivity or view factor that is not between 0 and 1, or a value that is neither a finite number
+            nor a table.
 
     >>> fx.Radiation("top", emissivity=0.9, heater=600.0, stefan_boltzmann=5.67e-14)      # W/(mm2 K4)
     Radiation('top', emissivity=0.9, heater=600.0, view_factor=1.0, stefan_boltzmann=5.67e-14)
@@ -179,7 +188,10 @@ class HeatFlux(_Boundary):
 
     Args:
         on: name of the boundary.
-        flux: heat per time and area, number or `table` over the reference radius; negative out of the body.
+        flux: heat per time and deformed area, number or `table` over the reference radius; positive into the body.
+
+    Raises:
+        InputError: a flux that is neither a finite number nor a table.
 
     >>> fx.HeatFlux("top", flux=1e-3)
     HeatFlux('top', flux=0.001)
@@ -207,7 +219,10 @@ class FixedTemperature(_Boundary):
 
     Args:
         on: name of the boundary.
-        temperature: number or `table` over the reference radius.
+        temperature: temperature of the face, number or `table` over the reference radius.
+
+    Raises:
+        InputError: a temperature that is neither a finite number nor a table.
 
     >>> fx.FixedTemperature("rim", temperature=80.0)
     FixedTemperature('rim', temperature=80.0)
@@ -226,11 +241,11 @@ class Absorption:
 
     .. math:: s = q \, a \exp(-a x)
 
-    Radiation that leaves through the opposite face is lost. For radiation from both sides give one law per face.
+    Radiation that reaches the opposite face leaves the body there. For radiation from both sides give one law per face.
 
     Args:
         on: name of the boundary through which the radiation enters.
-        flux: incoming radiation q, heat per time and area.
+        flux: incoming radiation q, heat per time and deformed area.
         coefficient: absorption coefficient a, 1/length, positive.
 
     Raises:

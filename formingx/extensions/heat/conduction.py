@@ -38,12 +38,13 @@ _MOST_ITERATIONS = 20
 
 
 class Stage(NamedTuple):
-    """Result of an implicit stage y + change of a time step, for a body and the tools in contact with it.
+    """Result of an implicit stage of a time step, for a body and the tools in contact with it.
 
     Attributes:
-        changes: changes of temperature: of the body, locally owned entries, shape (n,); then of each tool in contact,
-            along its depth, shape (nodes, m).
-        rates: rates of heat M dT/dt at the end of the stage, of the same shapes.
+        changes: changes of temperature since the start of the step: of the body, locally owned entries, shape (n,);
+            then of each tool in contact, along its depth, shape (nodes, m).
+        rates: rates of heat M dT/dt at the end of the stage: of the body over its heat capacity, degrees per time; of
+            the tools per contact area; shapes as of `changes`.
         heats: heat per time into the whole body through each boundary and from each source, in the order of
             `Conduction.names`, without faces of prescribed temperature.
     """
@@ -66,14 +67,14 @@ class Conduction(HeatVectors):
         boundaries: laws of the faces and heat sources.
         kinematics: the `Kinematics`.
         absolute_zero: absolute zero in the unit of temperatures.
-        displacement: displacement of the body (UFL), length, or None.
+        displacement: displacement of the body (UFL), length; None: the reference configuration.
         degree: polynomial degree of the temperature in an element.
 
     Attributes:
         mesh: the `Mesh`.
         comm: MPI communicator.
         space: function space of the temperature.
-        T: temperature `Function` in the forms.
+        T: temperature `Function` at which the forms are assembled.
         points: reference positions of the locally owned nodes, shape (n, 2), length.
         capacity: heat capacity of the whole body, heat per degree.
         volume: reference volume of the body.
@@ -115,7 +116,7 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the initial temperatures of body and tools, with prescribed values at fixed faces.
+        """Return the initial temperatures of body and tools, with the values of `FixedTemperature` at its faces.
 
         Returns:
             [temperatures of the body, from `T`, shape (n,); temperatures in each tool, shape (contact nodes, m)].
@@ -123,7 +124,7 @@ class Conduction(HeatVectors):
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 
     def with_fixed_values(self, T: np.ndarray) -> np.ndarray:
-        """Return nodal temperatures, replaced by the prescribed values at faces of prescribed temperature.
+        """Return nodal temperatures in which nodes on faces of prescribed temperature have the prescribed values.
 
         Args:
             T: temperatures, locally owned entries, shape (n,).
@@ -151,7 +152,7 @@ class Conduction(HeatVectors):
                 m)].
 
         Returns:
-            Rates of heat M dT/dt (capacity matrix M), arrays as in `state`; heat per time into the body, as
+            Rates of heat M dT/dt with the capacity matrix M, as `Stage.rates`; heat per time into the body, as
             `Stage.heats`.
         """
         R = self._body_rate(state[0])
@@ -172,7 +173,8 @@ class Conduction(HeatVectors):
 
         Args:
             state: temperatures y of the body, then in each tool in contact, at the start of the step.
-            known: known heats k, arrays as in `state`.
+            known: heats k from earlier stages: of the body over its heat capacity, degrees, shape (n,); of each tool in
+                contact per contact area, shape (contact nodes, m).
             c: factor c of the rates, time.
             guess: initial guess of the change of the temperatures of the body, locally owned entries, shape (n,).
 
@@ -210,7 +212,8 @@ class Conduction(HeatVectors):
         matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
 
         Args:
-            known: heats k of the body, shape (n,), and of each tool in contact, shape (contact nodes, m).
+            known: heats k: of the body over its heat capacity, degrees, shape (n,); of each tool in contact per contact
+                area, shape (contact nodes, m).
             c: factor c of the rates, time.
 
         Returns:
@@ -240,14 +243,14 @@ class Conduction(HeatVectors):
         return self._solve(rate)
 
     def through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
-        """Return the heat that flows into the body through each face of prescribed temperature.
+        """Return the heat that enters the body in a step through each face of prescribed temperature.
 
         Args:
-            missing: heat that the nodes store less the heat that they receive otherwise, over `capacity`, locally owned
-                entries, shape (n,).
+            missing: heat that each node stores in the step minus the heat supplied by conduction, laws and sources,
+                over `capacity`, degrees, locally owned entries, shape (n,).
 
         Returns:
-            Heat through each face, in the order of the last `names`, summed over ranks.
+            Heat through each face, shape (faces,), summed over ranks. These faces are the last entries of `names`.
         """
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
 
@@ -262,8 +265,8 @@ class Conduction(HeatVectors):
 
         Args:
             T: temperatures of the body at the start of the step, shape (n,).
-            change: their change in the stage, shape (n,).
-            known: known heats of body and tools.
+            change: change of these temperatures in the stage, shape (n,).
+            known: heats of body and tools from earlier stages, as in `stage`.
             c: factor of the rates, time.
             responses: response of each tool in contact.
         """
@@ -278,18 +281,19 @@ class Conduction(HeatVectors):
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, tool_heats: list[float]) -> np.ndarray:
-        """Return heat per time into the body at the present `T`, over all ranks: by each law, source and tool contact.
+        """Return the heat per time into the whole body by each law, source and tool contact, at the temperature `T`.
 
-        tool_heats: this rank's part of the heat through each tool contact, over `capacity`.
+        tool_heats: heat per time through each tool contact on this rank, over `capacity`.
         """
         local = [fem.assemble_scalar(form) for form in self._scalars] + tool_heats
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
 
     def _set_deformation(self) -> None:
-        """Set the UFL factors of deformation.
+        """Set the UFL factors by which the deformation enters the forms.
 
-        `_weight` is the volume per reference section area, `_area` the deformed face area per reference length. `_J` is
-        det F, and `_gradient_map` maps Grad T to grad T (None without displacement).
+        `_weight` is the reference volume per area of the section. `_area` is the deformed area of a face per reference
+        length of its line. `_J` is det F. `_gradient_map` is F^-T, which maps Grad T to grad T; None without
+        displacement.
         """
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._gradient_map = kinematics.weight(X), self.constant(1.0), None
@@ -306,7 +310,7 @@ class Conduction(HeatVectors):
         return ufl.grad(f) if self._gradient_map is None else self._gradient_map * ufl.grad(f)
 
     def _layer_measures(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """Return (properties, UFL measure) of the layers of each `ThermalProperties` object in {layer: object}."""
+        """Return pairs (material, UFL measure over all layers of this material) for {layer: material}."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -314,7 +318,7 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the form (UFL) of the heat in the body at temperature T over `capacity`, tested by v."""
+        """Return the UFL form, with test function v, of the heat of the body at temperature T, over `capacity`."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layer_measures(materials))
 
@@ -360,7 +364,7 @@ class Conduction(HeatVectors):
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
     def _set_fixed_values(self, fixed: list[FixedTemperature]) -> None:
-        """Store the unknowns and values of faces with prescribed temperatures."""
+        """Store the local unknowns on the faces of prescribed temperature, and their values."""
         self._fixed_mask = np.zeros(self._n, dtype=bool)
         self._fixed, self._bcs, taken = [], [], self._fixed_mask.copy()
         for boundary in fixed:
@@ -397,7 +401,7 @@ class Conduction(HeatVectors):
 
     @staticmethod
     def _deformed(points: np.ndarray, u: Any) -> np.ndarray:
-        """Return deformed positions points + u, shape (n, 2), length; u = None: the points themselves."""
+        """Return deformed positions points + u, shape (n, 2), length; the points themselves if u is None."""
         return points if u is None else points + u
 
     def _face_line(self, boundary: str) -> np.ndarray:
@@ -418,7 +422,7 @@ class Conduction(HeatVectors):
         Args:
             c: factor of the rates, time.
             responses: response of each tool in contact, which adds to the diagonal.
-            afresh: False to keep factors with the same c.
+            afresh: True to factorise in any case; False to keep the last factors if they have the same c.
         """
         if self._factored_for == c and not afresh:
             return

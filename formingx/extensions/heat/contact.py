@@ -108,14 +108,14 @@ class ContactWithTool:
         self.tool = tool if isinstance(tool, ConductingTool) else finite(f"ContactWithTool({on!r}): tool", tool)
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError unless the temperatures of the tool are above absolute zero.
+        """Raise an InputError if a temperature of the tool is below absolute zero.
 
         Args:
             mesh: not used.
             absolute_zero: absolute zero in the unit of temperatures.
 
         Raises:
-            InputError: the tool is too cold.
+            InputError: the temperature of the tool, of its back or at its start is below absolute zero.
         """
         tool = self.tool
         for value in (tool.back, tool.start) if isinstance(tool, ConductingTool) else (tool,):
@@ -127,15 +127,16 @@ class ContactWithTool:
 
 
 class ToolResponse(NamedTuple):
-    """Response of n lines of a conducting tool, with m nodes each, to the flux q into the body in an implicit stage.
+    """Linear response of a tool to the flux q into the body, in an implicit stage of a time step.
 
-    The flux is q = g (free - T) with the temperature T of the body. The lines change by `change` - q `compliance`.
+    The tool has m nodes along its depth (a line) below each of n contact nodes. The flux is q = `conductance`
+    (`face_temperature` - T) with the temperature T of the body. The lines change by `change` - q `compliance`.
 
     Attributes:
-        face_temperature: temperature of the face of the tool without a flux, shape (n,).
+        face_temperature: temperature of the face of the tool at the end of the stage if q were 0, shape (n,).
         conductance: conductance of contact and line in series, heat per time, area and degree, shape (n,).
-        change: change of temperature of the lines without a flux, shape (n, m).
-        compliance: decrease of the temperatures of a line per flux q, shape (m,).
+        change: change of temperature of the lines in the stage if q were 0, shape (n, m).
+        compliance: decrease of the temperatures of a line per unit of flux q, shape (m,).
     """
 
     face_temperature: np.ndarray
@@ -160,9 +161,10 @@ class HeatContact:
         dofs: local numbers of the nodes, shape (n,).
         points: reference positions of the nodes, shape (n, 2), length.
         area: tributary deformed area of each node over the heat capacity of the body, shape (n,); set by `Conduction`.
-        conductance: contact conductance of each node, shape (n,); 0 without contact.
+        conductance: contact conductance of each node, heat per time, area and degree, shape (n,); 0 without contact.
         back: temperature of the back of a conducting tool, or prescribed temperature of the tool.
-        depths: distances from the face of the m nodes of a line and of the back, shape (m + 1,), length.
+        depths: distances of the m nodes of a line, then of the back, from the face of the tool, shape (m + 1,), length;
+            empty for a tool of prescribed temperature.
     """
 
     def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
@@ -210,7 +212,8 @@ class HeatContact:
             T: temperatures of the body at the contact nodes, shape (n,).
 
         Returns:
-            Flux q into the body, shape (n,); rates of heat M dw/dt at the nodes of the lines per area, shape (n, m).
+            Flux q into the body, heat per time and area, shape (n,); rates of heat M dw/dt at the nodes of the lines,
+            per contact area, shape (n, m). M is the capacity matrix of a line, w its temperature.
         """
         q = self.conductance * (self.face(lines) - T)
         rate = -lines @ self._K
@@ -218,15 +221,18 @@ class HeatContact:
         return q, rate
 
     def response(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> ToolResponse:
-        """Return the response of the lines to a flux in an implicit stage M w' = known + c rate(lines + w').
+        r"""Return the linear response of the lines to the flux q into the body, in an implicit stage of a time step.
 
-        M is the capacity matrix of a line, w' the change of its temperatures.
+        .. math:: M \Delta = k - c K (w + \Delta) - c q e_1
+
+        M and K are the capacity and conductivity matrices of a line, w its temperatures and Delta their change. The
+        vector e_1 is 1 at the node on the face of the tool, else 0.
 
         Args:
-            lines: temperatures of the lines above the back of the tool, shape (n, m).
-            known: known heat per area at the nodes of the lines, shape (n, m).
-            c: factor of the rate, time.
-            absolute: False if all temperatures are differences, so that the back has 0.
+            lines: temperatures w of the lines above the back of the tool, shape (n, m).
+            known: heat k per contact area from earlier stages, at the nodes of the lines, shape (n, m).
+            c: factor c of the rate, time.
+            absolute: False if the temperatures of body and tool are differences of two states; the back then has 0.
 
         Returns:
             The response.
@@ -244,20 +250,21 @@ class HeatContact:
         """Return the flux and the change of the lines at the end of a stage.
 
         Args:
-            response: response of the lines, from `response`.
-            known: known heat per area at the nodes of the lines, shape (n, m).
+            response: result of `response`.
+            known: heat per contact area from earlier stages, at the nodes of the lines, shape (n, m).
             T: temperatures of the body at the contact nodes, shape (n,).
             c: factor of the rate, time.
 
         Returns:
-            Flux q into the body, shape (n,); change of the lines and their rates of heat, shape (n, m) each.
+            Flux q into the body, heat per time and area, shape (n,); changes of temperature of the lines, degrees,
+            shape (n, m); rates of heat of the lines per contact area, shape (n, m).
         """
         q = response.conductance * (response.face_temperature - T)
         change = response.change - np.outer(q, response.compliance)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the inverse of capacity + c conductivity matrix of a line, shape (m, m), and c times its first column.
+        """Return (M + c K)^-1, shape (m, m), and c times its first column, for capacity and conductivity matrices M, K.
         """
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

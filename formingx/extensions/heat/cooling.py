@@ -48,7 +48,7 @@ class ToolHeat(NamedTuple):
             The heat exchange.
 
         Raises:
-            InputError: `given` is no such pair.
+            InputError: `given` is not a pair (conductance, tool).
         """
         try:
             return cls(*given)
@@ -120,19 +120,21 @@ class Cooling:
         checked_boundaries(scene.mesh, [*self.boundaries, *self.contacts_with_tools(scene)], zero)
 
     def without_tools(self, mesh: Any, thickness: float, boundaries: Any) -> Cooling:
-        """Return a copy without tools, with other laws at the faces, for a part that has left its tools.
+        """Return the heat conduction of a part after demoulding: without tools, with other laws at the faces.
 
-        A prescribed temperature that differs from the present one would change the stress by a finite amount in any
-        step, however short. It is replaced by convection with a large conductance (`_CONTINUOUS`
-        conductivity/thickness).
+        A prescribed temperature of a face would change the stress at once by a finite amount. It is replaced by
+        convection with the large conductance `_CONTINUOUS` conductivity/thickness.
 
         Args:
             mesh: `Mesh` of the body.
             thickness: largest wall of the body, length.
-            boundaries: list of laws, or {boundary: prescribed temperature}.
+            boundaries: list of laws of heat, or {boundary: prescribed temperature}.
 
         Returns:
-            The `Cooling`.
+            A new `Cooling`.
+
+        Raises:
+            InputError: `boundaries` is neither a list of laws nor a dict.
         """
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
             boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
@@ -149,10 +151,10 @@ class Cooling:
 
         Args:
             mesh: the `Mesh`, for its layers.
-            thickness: wall h, length.
+            thickness: thickness h of the wall, length.
 
         Returns:
-            Time t for the diffusivity a.
+            Time t, with the smallest diffusivity a of the layers.
         """
         return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
@@ -168,27 +170,29 @@ class Cooling:
         return CoolingHistory(self, problem)
 
     def extremes(self, scene: Any) -> tuple[float, float]:
-        """Return bounds of the temperature that the body can reach by its laws, without heating by work; collective.
+        """Return bounds of the temperature of the body by the maximum principle, without heating by work; collective.
+
+        The bounds are the extremes of the initial temperature and of the temperatures of air, heaters, tools and faces.
 
         Args:
-            scene: the `Scene`, whose temperature is the initial one.
+            scene: the `Scene`, with the initial temperature.
 
         Returns:
-            Lowest and highest temperature; -inf and inf with a heat flux or a source.
+            Lowest and highest temperature; -inf and inf if there is a `HeatFlux` or an `Absorption`.
         """
         first = scene.temperature.T.x.array
         ends = scene.mesh.comm.allgather((first.min(initial=np.inf), first.max(initial=-np.inf)))
         return _extremes([*np.ravel(ends)], [*self.boundaries, *self.contacts_with_tools(scene)])
 
     def conductances(self, scene: Any) -> dict[str, float]:
-        """Return the largest conductance among the laws of each boundary.
+        """Return the largest heat transfer coefficient or contact conductance at each boundary.
 
         Args:
             scene: the `Scene`.
 
         Returns:
-            {boundary: conductance, heat per time, area and degree}; infinite for a prescribed temperature. Boundaries
-            without conductance are left out.
+            {boundary: conductance, heat per time, area and degree}; inf for a prescribed temperature. Boundaries
+            without convection, tool or prescribed temperature are left out.
         """
         found: dict[str, float] = {}
         for law in [*self.boundaries, *self.contacts_with_tools(scene)]:
@@ -210,7 +214,7 @@ class Cooling:
         return contact.name in self.tools
 
     def contacts_with_tools(self, scene: Any) -> list[ContactWithTool]:
-        """Return the contacts of a scene that exchange heat, as laws of faces in complete contact.
+        """Return a law of heat, with complete contact, for each contact of a scene whose tool exchanges heat.
 
         Args:
             scene: the `Scene`.
@@ -230,7 +234,9 @@ class Cooling:
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
-    """Return lowest and highest temperature of a body (maximum principle), from its initial ones and its laws of heat.
+    """Return bounds of the temperature from initial `temperatures` and laws of heat, by the maximum principle.
+
+    They are -inf and inf if a law prescribes a flux without a temperature.
     """
     for law in laws:
         if not getattr(law, "temperatures", ()):            # a flux without a temperature has no bound

@@ -42,14 +42,14 @@ class HeatState(NamedTuple):
     """State of the heat equation at the end of a step of the run.
 
     Attributes:
-        time: process time.
+        time: process time at the end of the step.
         temperature: temperatures of the body, locally owned entries, shape (n,).
         lines: for each tool contact, temperatures in the tool, above its back, shape (contact nodes, m); see
             `HeatContact`.
-        step: length of the next time step of the heat equation, or None.
-        power: heat per time of the dissipated work over the heat capacity of the body, locally owned entries, shape
-            (n,), or None.
-        before: (time, temperatures) at the start of the step, or None.
+        step: length of the next time step of the heat equation, time; None before the first step.
+        power: heat per time of the dissipated work at the nodes, over the heat capacity of the body, degrees per time,
+            locally owned entries, shape (n,); None without heating by work.
+        before: (time, temperatures) at the start of the step; None before the first step.
     """
 
     time: float
@@ -83,14 +83,16 @@ class CoolingHistory:
         self.start()
 
     def _conduction(self, degree: int = 2) -> Conduction:
-        """Return the heat equation of the deformed body with temperatures of a polynomial degree in each element."""
+        """Return the heat equation of the deformed body; `degree`: polynomial degree of the temperature in an element.
+        """
         scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
         laws = [*self._cooling.boundaries, *self._cooling.contacts_with_tools(scene)]
         return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
     def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
-        """Return (`HeatContact`, contact of the problem, its nodal conductances) of each tool that exchanges heat."""
+        """Return (`HeatContact` of `body`, contact of the problem, nodal conductances) of each tool with heat exchange.
+        """
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
         return [(touch, contact, touch.conductance.copy())
                 for touch, contact in zip(body.tool_contacts, contacts, strict=True)]
@@ -128,7 +130,7 @@ class CoolingHistory:
             states: accepted states, in order.
 
         Returns:
-            List with one warning, or an empty list.
+            List with one warning, or an empty list if the error is below its tolerance in all of these states.
         """
         states = [state for state in states if state.time > 0]
         if not states:
@@ -163,14 +165,17 @@ class CoolingHistory:
         self._update_problem()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Solve the heat equation over an accepted step, in the body halfway through the step.
+        """Solve the heat equation over an accepted step, with the body at its position halfway through the step.
 
-        A point whose contact status changes in the step has half its conductance, which makes the step of second order.
+        A contact node that closes or opens in the step has half its conductance, so that the step is of second order.
 
         Args:
-            x: unknowns at the end of the step, locally owned entries.
+            x: unknowns at the end of the step, locally owned entries, dimensionless.
             control: load parameter (control) at the end of the step, dimensionless.
-            start: state at the start of the step; None: the body stays as it is at the end.
+            start: state at the start of the step; None: the body has its final position during the whole step.
+
+        Raises:
+            ConvergenceError: the end of the step was not reached.
         """
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
@@ -194,7 +199,7 @@ class CoolingHistory:
         self._update_problem()
 
     def _integrate(self, until: float) -> None:
-        """Take time steps of the heat equation in the body at a fixed position, up to the time `until`."""
+        """Solve the heat equation up to the time `until`, with the body at a fixed position."""
         dt, tolerance = self._dt or 1e-3 * (until - self._time), self._cooling.tolerance
         for _ in range(_MOST_STEPS):
             trial = stepping.fitted(dt, until - self._time)
@@ -254,7 +259,7 @@ class CoolingHistory:
             A state for `put`.
 
         Raises:
-            InputError: the data belong to another mesh or another `work_to_heat`.
+            InputError: the data belong to another mesh, or only one of both runs has `work_to_heat`.
         """
         rows = _matching_rows(self._body.points, data["points"])
         if ("power" in data) != (self._dissipated is not None):
@@ -267,13 +272,15 @@ class CoolingHistory:
 
     def transfer(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
-        """Interpolate a state of the heat equation on another mesh to this one, after the material histories.
+        """Interpolate a state of the heat equation from another mesh to this one.
+
+        The material histories must have been transferred before, since they give the heat of the dissipated work.
 
         Args:
             source: history of the temperature on the other mesh.
-            memory: its state.
-            x: unknowns of this problem, locally owned entries.
-            control: load parameter (control) of the state, dimensionless.
+            memory: state of `source`, from `get`.
+            x: not used.
+            control: not used.
             mapping: function from reference points of the other mesh, shape (n, 2), to reference points of this mesh.
 
         Returns:
@@ -290,7 +297,8 @@ class CoolingHistory:
                       before and (before[0], to_body(before[1])))
 
     def _update_problem(self) -> None:
-        """Pass the present and the previous temperature to the problem, and update temperature-dependent constants."""
+        """Pass the temperatures at start and end of the step to the problem, for its temperature-dependent constants.
+        """
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
         if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
@@ -307,11 +315,11 @@ class CoolingHistory:
 
 
 def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
-    """Set the conductance of each contact node: 0 unless the tool is present and near the node of the deformed body.
+    """Set the conductance of each contact node; 0 if the tool is absent or away from the deformed position of the node.
 
     Args:
         body: heat equation of the body.
-        tool_contacts: (`HeatContact`, contact of the problem, conductances in contact) of each tool.
+        tool_contacts: (`HeatContact`, contact of the problem, nodal conductances in contact) of each tool.
         control: load parameter (control) of the state, dimensionless; it gives the travel of the tools.
     """
     u = body.displacements()
@@ -323,7 +331,7 @@ def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:
     """Return advice on element sizes that reduce the temperature error by a factor `times`, or "" if none is known.
 
-    The error is of third order. The duration is the time over which heat has penetrated.
+    The error is of third order in the element size. `duration` is the time during which heat has penetrated.
     """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
@@ -335,13 +343,13 @@ def _finer_elements(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Return True if two triples (time, temperatures, (earlier time, temperatures) or None) are equal."""
+    """Return True if two triples (time, temperatures, None or a pair (earlier time, temperatures)) are equal."""
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 
 
 def _matching_rows(points: np.ndarray, others: Any) -> np.ndarray:
-    """Return the row of `others` at each point, shape (n,); raise an InputError if a point has none."""
+    """Return the row of `others` that coincides with each point, shape (n,); raise an InputError if there is none."""
     from scipy.spatial import cKDTree
     others = np.reshape(others, (-1, points.shape[-1]))
     if not len(points):

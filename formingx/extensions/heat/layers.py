@@ -28,13 +28,13 @@ _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """Cut the elements of a mesh into layers below faces that exchange heat; collective.
+    """Cut the elements of a mesh into thin layers below faces that exchange heat; collective.
 
     Args:
         mesh: the mesh.
         depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
-        moved: function from reference to deformed positions, both of shape (n, 2), length; depths are distances between
-            deformed positions. None: depths in the reference configuration.
+        moved: function from reference to deformed positions, both of shape (n, 2), length; depths are then measured in
+            the deformed body. None: depths in the reference configuration.
 
     Returns:
         The new mesh; the given mesh if its elements are thin enough, or too curved to be cut.
@@ -59,7 +59,7 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
         depth: penetration depth of heat, length; the layer at a face is at most `_PART` of it.
 
     Returns:
-        Sizes, for `elements=(n, sizes)` of a mesh.
+        Sizes, dimensionless, as the argument `elements=(n, sizes)` of a mesh takes them.
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
@@ -83,7 +83,7 @@ def height_at(mesh: Mesh, face: str) -> float:
 
 
 def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
-    """Return the median height of the elements along a boundary, its length, and the area of the mesh."""
+    """Return (median height of the elements along a boundary, length of the boundary, area of the mesh's section)."""
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
     ends = grid.boundaries[face][:, :2]
@@ -94,7 +94,9 @@ def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return {ends of a cut edge, the end of smaller (R, Z) first: positions of the cuts, from 0 to 1}.
+    """Return the cuts of the edges, as {node numbers of the ends of an edge: positions of the cuts on it, from 0 to 1}.
+
+    The end of smaller (R, Z) comes first, and the positions count from it. Edges without cuts are left out.
 
     Args:
         grid: the grid.
@@ -123,9 +125,9 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the distance of each point from the edges of a boundary, shape (n,), length.
+    """Return the distance of each point from the nearest edge of a boundary, shape (n,), length.
 
-    edges: numbers of the two ends of each edge in `points`, shape (m, 2).
+    points: positions, shape (n, 2), length. edges: numbers of the two ends of each edge in `points`, shape (m, 2).
     """
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
@@ -135,7 +137,7 @@ def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return edges (pairs of point numbers, shape (n, 2)), each from its end of smaller R (at equal R of smaller Z)."""
+    """Return edges (pairs of point numbers), shape (n, 2), with the end of smaller R first, at equal R of smaller Z."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
     return np.where(swap[:, None], edges[:, ::-1], edges)
@@ -159,9 +161,16 @@ class _Nodes:
         self._middles: dict[tuple[int, int], int] = {}
 
     def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
-        """Return (numbers of the nodes along an edge from a to b, their positions from 0 to 1), with new nodes at cuts.
+        """Return the nodes along an edge from node a to node b, with new nodes at its cuts.
 
-        curve: positions of the nodes of the uncut edge: its ends, and its middle if it is quadratic, shape (2 or 3, 2).
+        Args:
+            a: number of the first end.
+            b: number of the other end.
+            curve: positions of the nodes of the uncut edge: its ends, and its middle if it is quadratic, shape (2, 2)
+                or (3, 2), length.
+
+        Returns:
+            Numbers of the nodes; their positions along the edge, from 0 at a to 1 at b.
         """
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
@@ -173,14 +182,14 @@ class _Nodes:
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
-        """Return the number of the node in the middle of an edge from a to b; the first call adds it at `point`."""
+        """Return the number of the middle node of an edge between nodes a and b; the first call adds it at `point`."""
         key = min(a, b), max(a, b)
         if key not in self._middles:
             self._middles[key] = self._new(point)
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """Store the number of the existing middle node of an edge from a to b that is not cut."""
+        """Store the number of the existing middle node of an uncut edge between nodes a and b."""
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
@@ -190,7 +199,10 @@ class _Nodes:
 
 
 def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return points at s (0 to 1) of a straight edge (2 nodes) or a quadratic one (ends, middle), shape (n, 2)."""
+    """Return the points at parameters s, shape (n,), from 0 to 1, of an edge, shape (n, 2), length.
+
+    curve: nodes of the edge: its ends, and its middle if it is quadratic, shape (2, 2) or (3, 2), length.
+    """
     s = np.asarray(s, dtype=float)[:, None]
     if len(curve) == 2:
         return (1 - s) * curve[0] + s * curve[1]
@@ -198,7 +210,7 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the point at area coordinates x, shape (3,), of a triangle with the positions of its 3 or 6 nodes."""
+    """Return the point at area coordinates x, shape (3,), of a triangle; `nodes`: positions of its 3 or 6 nodes."""
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
@@ -228,7 +240,7 @@ def _integer_rows(table: np.ndarray) -> list[list[int]]:
 
 
 def _pieces(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """Return the pieces of one triangle as lists of node numbers.
+    """Cut one triangle, and return its pieces as lists of node numbers.
 
     Args:
         grid: the grid before the cut.

@@ -33,8 +33,8 @@ class Window(NamedTuple):
     """Times at which the temperatures of a body enter and leave a range.
 
     Attributes:
-        reached: time from which the whole body is in the range, or None.
-        left: time at which a part of the body leaves the range again, or None.
+        reached: first time at which the whole body is in the range; None if this never happens.
+        left: first time after `reached` at which a part of the body leaves the range; None if this never happens.
     """
 
     reached: float | None
@@ -44,7 +44,7 @@ class Window(NamedTuple):
 class HeatRun:
     """Temperatures of a body over time, at every accepted step of `heat`.
 
-    Between two steps the temperature is a cubic in time; output times are ends of steps.
+    Within a step the temperature is a cubic in time; output times are ends of steps.
 
     Args:
         body: heat equation of the body.
@@ -93,7 +93,7 @@ class HeatRun:
 
     @property
     def heat_stored(self) -> np.ndarray:
-        """Heat stored by the body in each step, shape (n,); the first is 0."""
+        """Heat that the body stores in each step, shape (n,); the first is 0. In plane strain it is per unit depth."""
         return np.array(self._stored)
 
     @property
@@ -106,7 +106,10 @@ class HeatRun:
 
     @property
     def balance(self) -> np.ndarray:
-        """Heat stored by the body minus heat supplied in each step, over the largest heat of the step, shape (n,)."""
+        """Error of the heat balance in each step, over the largest heat of the step, shape (n,), dimensionless.
+
+        It is the heat stored by the body minus the heat through all boundaries and from all sources.
+        """
         heats = np.array(self._heats)
         largest = np.abs(np.column_stack([heats, self._stored])).max(1)
         return (np.array(self._stored) - heats.sum(1)) / np.where(largest > 0, largest, 1.0)
@@ -118,7 +121,10 @@ class HeatRun:
             time: the time; default the end of the run.
 
         Returns:
-            P2 Function on `mesh`.
+            Quadratic `Function` on `mesh`.
+
+        Raises:
+            InputError: a time outside the run.
         """
         T = fem.Function(self._body.space, name="temperature")
         T.x.array[: len(self._body.points)] = self._state_at(time)[0]
@@ -170,6 +176,9 @@ class HeatRun:
 
         Returns:
             Temperatures, shape (times,).
+
+        Raises:
+            InputError: as in `through`.
         """
         _, T = self.through(times, line=line)
         weights = np.full(_POINTS, 2.0)
@@ -184,6 +193,9 @@ class HeatRun:
 
         Returns:
             Temperature and reference position of the node.
+
+        Raises:
+            InputError: a time outside the run.
         """
         return self._extreme(self._state_at(time)[0], 1)
 
@@ -195,14 +207,17 @@ class HeatRun:
 
         Returns:
             Temperature and reference position of the node.
+
+        Raises:
+            InputError: a time outside the run.
         """
         return self._extreme(self._state_at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
-        """Return when all temperatures of the body have entered a range, and when the first leaves it again.
+        """Return the times at which the whole body has entered a range of temperatures, and leaves it again.
 
         Args:
-            low: lower bound of the range.
+            low: lower bound of the range, in the unit of the run.
             high: upper bound of the range.
 
         Returns:
@@ -215,8 +230,8 @@ class HeatRun:
         if not low < high:
             raise InputError(f"time_to_reach: low = {low!r}: must be below high = {high!r}")
 
-        def excess(time):                                       # below 0: inside
-            """Return the largest excess beyond the range at a time, degrees."""
+        def excess(time):
+            """Return the largest excess of a temperature over the range, degrees; negative if the body is inside it."""
             return max(low - self.coldest(time).temperature, self.hottest(time).temperature - high)
         reached = self._first_time_inside(excess, self._times)
         if reached is None:
@@ -236,7 +251,7 @@ class HeatRun:
             Depths from the face of the tool, shape (m,), length; temperatures, shape (m,).
 
         Raises:
-            InputError: no conducting tool is in contact with the boundary.
+            InputError: no conducting tool is in contact with the boundary, or a time outside the run.
         """
         conducting = {t.on: k for k, t in enumerate(self._body.tool_contacts) if t.conducts}
         known("tool_profile: conducting tool on boundary", on, conducting)
@@ -306,7 +321,7 @@ class HeatRun:
         return [n if names.count(n) == 1 else f"{n} {names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
     def _times_or_outputs(self, times: Any) -> np.ndarray:
-        """Return times as an array; None: `outputs`."""
+        """Return times as an array, shape (k,); the output times if `times` is None."""
         return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
 
     def _default_line(self) -> list[np.ndarray]:
@@ -322,9 +337,12 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _state_at(self, time: float | None) -> list[np.ndarray]:
-        """Return the temperatures of body and tools at a time, as an entry of `states`.
+        """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
 
-        Between two steps they follow Hermite's cubic, with slopes of the parabolas through three steps.
+        Within a step Hermite's cubic is used, with slopes from the parabolas through three steps.
+
+        Raises:
+            InputError: a time outside the run.
         """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
@@ -342,7 +360,7 @@ class HeatRun:
                 for va, vb, da, db in zip(a, b, slope_a, slope_b)]
 
     def _slope(self, k: int) -> list[np.ndarray]:
-        """Return the time derivative of temperatures at step k, from the parabola through three neighbouring steps."""
+        """Return the time derivative of the temperatures after step k, from the parabola through three steps."""
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]
@@ -359,12 +377,12 @@ class HeatRun:
         return Spot(float(sign * value), R, Z)
 
     def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """Return the first time at which the function `excess` of time is not positive, or None.
+        """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
 
         Args:
             excess: function of time.
-            times: times of steps to examine, in order; a root between two of them is located.
-            from_time: time before the first of them, or None.
+            times: times of steps to examine, in order. Between two of them the root is computed.
+            from_time: a time before the first of `times`, from which on a root is sought, or None.
         """
         from scipy.optimize import brentq
         before = from_time
@@ -379,6 +397,6 @@ _DEGREES = {"C": "°C", "K": "K"}
 
 
 def _colour(k: int, n: int) -> Any:
-    """Return the colour of curve k of n curves."""
+    """Return the colour (RGBA) of curve k of n curves, k from 0."""
     from matplotlib import colormaps
     return colormaps["viridis"](0.9 * (1 - k / max(n - 1, 1)))

@@ -57,7 +57,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
     Raises:
         InputError: an argument that is not allowed.
-        ConvergenceError: steps became too short, or too many.
+        ConvergenceError: the tolerance needs steps that are too short, or more than `max_steps`.
 
     >>> sheet = fx.mesh.disc(radius=20.0, thickness=2.0, elements=(4, 2))
     >>> polymer = fx.ThermalProperties(conductivity=0.2, density=1e-3, heat_capacity=2000.0)
@@ -94,7 +94,11 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return {boundary: penetration depths of heat at the first and the last time of interest, length}."""
+    """Return {boundary: penetration depths of heat at the first and the last time of interest, length}.
+
+    A depth is sqrt(a t) with the diffusivity a at the time t. At a boundary with absorption the first depth is at most
+    1 / absorption coefficient. times: output times, shape (n,).
+    """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
     first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
@@ -107,7 +111,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
 
 
 class _Displacement:
-    """Displacement of a body as a P2 Function, evaluated at points or on another mesh of the body; collective.
+    """Displacement of a body as a quadratic `Function`, evaluated at points or on another mesh; collective.
 
     Args:
         displacement: (u_r, u_z), a Function or UFL expression, length.
@@ -126,7 +130,7 @@ class _Displacement:
                                          for part in self._parts])
 
     def on(self, mesh: Mesh) -> fem.Function:
-        """Return the displacement as a P2 Function on another mesh of the body."""
+        """Return the displacement as a quadratic `Function` on another mesh of the same body, length."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
         points = of_space(u.function_space)
         u.x.array[:] = (self(points) - points).ravel()
@@ -134,7 +138,10 @@ class _Displacement:
 
 
 def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
-    """Set the initial temperature, and check that it is above absolute zero."""
+    """Set the initial temperature `T` of a body; raise an InputError if it is below absolute zero or in another unit.
+
+    start: initial temperature, as the argument of `heat`.
+    """
     if getattr(start, "unit", unit) != unit:
         raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
     T = fields.values_at(start, body.points, body.mesh, "heat: start")
@@ -147,7 +154,7 @@ def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
 
 
 def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
-    """Integrate from time 0 over the output times; record accepted steps in the run.
+    """Integrate from time 0 to the last output time, and record the accepted steps in the run.
 
     Args:
         run: the run, whose last state is the initial one.
@@ -155,6 +162,9 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
         outputs: output times.
         tolerance: largest estimated error of one step, degrees.
         max_steps: maximum number of steps.
+
+    Raises:
+        ConvergenceError: steps became too short, or too many.
     """
     state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
     for end in outputs:
@@ -229,7 +239,9 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
         List of the laws.
 
     Raises:
-        InputError: a law that is not allowed.
+        InputError: an object that is no law of heat, a boundary that the mesh does not have, a temperature below
+            absolute zero, a table that does not cover its boundary, or a second law (except `Absorption`) on a face of
+            prescribed temperature.
     """
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]

@@ -20,8 +20,8 @@ class SpaceError:
     """Estimator of the discretisation error of the temperatures of a body with quadratic elements.
 
     Args:
-        body: heat equation of the run.
-        finer: the same equation with cubic elements; `destroy` frees it.
+        body: heat equation of the run, with quadratic elements.
+        finer: heat equation of the same body with cubic elements; `destroy` frees it.
     """
 
     def __init__(self, body: Conduction, finer: Conduction):
@@ -31,7 +31,8 @@ class SpaceError:
     def largest(self, state: list[np.ndarray], time: float) -> float:
         """Estimate the largest discretisation error of the temperature in a state; collective.
 
-        The faces of tools keep their temperatures; the tools respond to the correction along their depth.
+        The residual contains the present temperatures of the faces of tools. The temperatures of the tools change with
+        the correction of the body.
 
         Args:
             state: [temperatures of the body, shape (n,); temperatures in each tool in contact, shape (contact nodes,
@@ -54,12 +55,15 @@ class SpaceError:
         self._finer.destroy()
 
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
-        """Return temperatures of a tool at the contact nodes of `finer`, interpolated at its face and 0 below it.
+        """Return temperatures of a tool above its back, at contact nodes of cubic elements, shape (nodes, m), degrees.
+
+        The temperature of its face is interpolated; the other entries are 0.
 
         Args:
-            touch: contact of the tool in `body`.
-            finer: the same contact in `finer`.
-            lines: temperatures of the tool above its back in `body`, shape (nodes, m).
+            touch: contact with the tool, of the quadratic elements.
+            finer: the same contact, of the cubic elements.
+            lines: temperatures of the tool at the contact nodes of quadratic elements, above its back, shape (nodes,
+                m), degrees.
         """
         found = np.zeros((len(finer.dofs), lines.shape[1]))
         if touch.conducts:
@@ -69,7 +73,7 @@ class SpaceError:
         return found
 
     def _in_cubic_space(self, own: np.ndarray) -> np.ndarray:
-        """Return the P3 nodal values of a P2 function, both locally owned entries."""
+        """Return the nodal values, in the space of cubic elements, of a quadratic function; locally owned entries."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._cubic_values.interpolate(self._values)

@@ -22,9 +22,10 @@ class Step(NamedTuple):
     Attributes:
         state: temperatures at the end of the step: of the body, shape (n,), then in each tool in contact, shape
             (contact nodes, m).
-        error: estimated error of the step, degrees.
+        error: estimated time integration error of the step, degrees.
         stored: heat that the whole body stores in the step.
-        heats: heat that enters the body in the step by each boundary and source, in the order of `Conduction.names`.
+        heats: heat that enters the body in the step through each boundary and from each source, shape (names,), in the
+            order of `Conduction.names`.
     """
 
     state: list[np.ndarray]
@@ -80,14 +81,14 @@ def next_length(dt: float, error: float, tolerance: float) -> float:
 
 
 def fitted(dt: float, left: float) -> float:
-    """Return the length of a step that ends at a given time or leaves no short remainder before it.
+    """Return the length of a step that ends at an output time, or leaves no short step before it.
 
     Args:
         dt: length that the error allows, time.
-        left: time from now until the given time.
+        left: time from the start of the step to the next output time.
 
     Returns:
-        `left` if dt reaches it, otherwise at most half of it and at most dt.
+        `left` if dt is at least `left`, otherwise the smaller of dt and left / 2.
     """
     return left if dt >= left * (1 - 1e-9) else min(dt, left / 2)
 

@@ -21,7 +21,7 @@ class HeatVectors:
     Attributes:
         mesh: the `Mesh`.
         comm: MPI communicator.
-        T: temperature `Function` in the forms.
+        T: temperature `Function` at which the forms are assembled.
         capacity: heat capacity of the whole body, heat per degree.
         power: heat source, heat per time at the nodes over `capacity`, locally owned entries, shape (n,), or 0.
     """
@@ -40,10 +40,10 @@ class HeatVectors:
     _mass_form: Any
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a UFL constant, whose value can change without a new compilation of the forms.
+        """Return a constant for UFL forms, whose value can change without a new compilation of the forms.
 
         Args:
-            value: initial value.
+            value: value of the constant, which may be changed later.
 
         Returns:
             The DOLFINx `Constant`.
@@ -68,7 +68,7 @@ class HeatVectors:
             change: change of the nodal temperatures, locally owned entries, shape (n,), degrees.
 
         Returns:
-            Locally owned entries, shape (n,), degrees.
+            Stored heat at the nodes over `capacity`, locally owned entries, shape (n,), degrees.
         """
         return self._mass(change)
 
@@ -84,7 +84,7 @@ class HeatVectors:
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """Return the nodal values of a heat source, as `power` has them.
+        """Assemble the form of a heat source, as `power` stores it.
 
         Args:
             form: result of `source`.
@@ -113,7 +113,7 @@ class HeatVectors:
         return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
-        """Return (M/c) dT, locally owned entries, shape (n,), for the capacity matrix M and the scalar c = `capacity`.
+        """Return M dT/c, locally owned entries, shape (n,), degrees, with the capacity matrix M and c = `capacity`.
 
         change: change of the nodal temperatures dT, shape (n,), degrees.
         """
