@@ -33,7 +33,7 @@ def chill(mesh, conductivity, capacity, tolerance):
 
 def exact(conductivity, capacity):
     """Return the temperatures of `chill` by Laplace transform."""
-    sheet, tool = reference.on_tool(
+    sheet, tool = reference.sheet_on_tool(
         same_slab(THICKNESS), reference.Slab(DEPTH, conductivity, capacity), CONDUCTANCE, START, BACK, H, AIR,
         [0.0, THICKNESS / 2, THICKNESS], [0.0], TIMES)
     return np.column_stack([sheet, tool])

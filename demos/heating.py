@@ -48,7 +48,7 @@ def by_heaters(mesh, top, bottom, tolerance):
               + H * (AIR - T) for _, heater in faces]
 
     def exact(places):
-        x, T = reference.lines(same_slab(THICKNESS), START, fluxes, HEATER_TIMES)
+        x, T = reference.method_of_lines(same_slab(THICKNESS), START, fluxes, HEATER_TIMES)
         return T[:, [int(np.argmin(np.abs(x - THICKNESS * place))) for place in places]]
     return heated, exact
 

@@ -11,7 +11,7 @@ import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
-from formingx.materials.inflation import Inflated
+from formingx.materials.inflation import FreeInflation
 from formingx.results import files
 from formingx.results.show import plots
 
@@ -93,7 +93,7 @@ def picture(out, fits, data):
         ax.plot(l, 4 * np.sqrt(l**2 - 1) * P * MPA * THICKNESS / (RADIUS * l**3), "ko", ms=4, label="equibiaxial test")
         for name, f in each.items():
             fine = np.linspace(1.001, min(4.4, 0.98 * f.material.largest_stretch("equibiaxial")), 300)
-            ax.plot(fine, MPA * Inflated([(f.material, THICKNESS)], RADIUS).disc(fine), label=name)
+            ax.plot(fine, MPA * FreeInflation([(f.material, THICKNESS)], RADIUS).disc(fine), label=name)
         ax.set(xlabel="stretch", ylabel="pressure of a cap, kg/cm$^2$", title=f"{way} misfits", ylim=(0, 0.8))
     axes[0].legend(frameon=False, fontsize="small")
     save(figure, out / "measured_treloar.png")

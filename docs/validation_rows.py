@@ -52,7 +52,7 @@ def _disc(case: str, words: str) -> Row:
 def _blown_balloon() -> float:
     """Return p R0/H0 of the balloon of demos/balloon.py at stretch 2, blown by 2.6 of its volume a second, MPa."""
     body = balloon(c10=0.05, branches=[(0.3, 0.5), (0.4, 5.0)])
-    return float(body.drive(lambda t: (math.log1p(2.6 * t) / 3, 2.6 / 3 / (1 + 2.6 * t)), [7 / 2.6])[0])
+    return float(body.deform(lambda t: (math.log1p(2.6 * t) / 3, 2.6 / 3 / (1 + 2.6 * t)), [7 / 2.6])[0])
 
 
 def _program(problem: str, key: str, what: str, unit: str, source: str) -> Row:

@@ -49,9 +49,9 @@ def _wall(kind):
         body = reference_time.wall(kind, inner_radius=1, outer_radius=2, c10=C10, branches=P1)
         radii = np.array([1.1, 1.25, 1.5, 1.75, 2])
         end = 1 / speed
-        driven = body.drive(lambda t, v=speed: ((1 + v * t) ** n - 1, n * v * (1 + v * t) ** (n - 1)),
+        driven = body.deform(lambda t, v=speed: ((1 + v * t) ** n - 1, n * v * (1 + v * t) ** (n - 1)),
                             (radii - 1) / speed)
-        held = [driven[-1], *body.hold(end + np.array([0.1, 0.5, 1, 2]))]
+        held = [driven[-1], *body.relax(end + np.array([0.1, 0.5, 1, 2]))]
         body.jump_to_load(0.0, (-0.5, body.s))
         s = [body.s, *body.creep(end + 2 + np.array([0.5, 1, 2, 5, 10, 20, 50]))]
         for name, keys, values in (
@@ -67,15 +67,15 @@ def balloon():
     found = {}
     for q in (2.6, 26, 260):
         body, stretches = reference_time.balloon(c10=C10, branches=P1), np.array([1.1, 1.25, 1.5, 2, 2.5, 3])
-        blown = body.drive(lambda t, q=q: (math.log1p(q * t) / 3, q / (3 * (1 + q * t))), (stretches**3 - 1) / q)
+        blown = body.deform(lambda t, q=q: (math.log1p(q * t) / 3, q / (3 * (1 + q * t))), (stretches**3 - 1) / q)
         found |= {f"flow_{q}/p_R0_over_H0_at_stretch/{l}": p for l, p in zip((1.1, 1.25, 1.5, 2, 2.5, 3), blown)}
         held = (0.1, 0.5, 1, 2, 5, 20)
-        found |= {f"flow_{q}/held/{t}": p for t, p in zip(held, body.hold(26 / q + np.array(held)))}
+        found |= {f"flow_{q}/held/{t}": p for t, p in zip(held, body.relax(26 / q + np.array(held)))}
     for pressure in (0.1, 0.2, 0.4, 0.8):
         body, stretches = reference_time.balloon(c10=C10, branches=P1), np.array([1.1, 1.2, 1.3, 1.5])
         body.jump_to_load(pressure, (0, math.log(1.38)))
         last = 1.11 if pressure == 0.1 else 10.0                 # 0.1 MPa is carried for ever at a stretch of 1.155
-        reached, snap = body.creep_through(np.log(stretches), math.log(last))
+        reached, snap = body.creep_times(np.log(stretches), math.log(last))
         found |= {f"pressure_{pressure}/time_at_stretch/{l}": t for l, t in zip((1.1, 1.2, 1.3, 1.5), reached)
                   if np.isfinite(t)}
         if snap is not None:

@@ -14,7 +14,7 @@ from formingx.checks import parallel
 from formingx.checks.expected_stretch import expected_stretches
 from formingx.checks.scripts import check_script
 from formingx.checks.sizes import Body
-from formingx.materials.inflation import Inflated, first_peak
+from formingx.materials.inflation import FreeInflation, first_peak
 from formingx.problem.problem import Problem
 
 CUP = {"radius": 1.25, "depth": 0.4, "mouth": 0.082}
@@ -323,7 +323,7 @@ def test_a_scene_for_a_process_is_driven():
 def test_free_inflation():
     """Tubes and caps of a neo-Hookean material in closed form, and Treloar's sheet; two layers as one."""
     m = fx.NeoHookean(c10=0.5)                               # mu = 1
-    one, two = Inflated([(m, 0.1)], 2.0), Inflated([(m, 0.04), (m, 0.06)], 2.0)
+    one, two = FreeInflation([(m, 0.1)], 2.0), FreeInflation([(m, 0.04), (m, 0.06)], 2.0)
     hoop = np.array([1.2, 1.577, 3.0])
     axial = np.array([brentq(lambda z, h=h: 2 * z**2 - h**2 - 1 / (h * z) ** 2, 0.5, h) for h in hoop])
     assert one.tube(hoop) == pytest.approx(0.05 * (hoop**2 - (hoop * axial) ** -2) / (hoop**2 * axial), rel=1e-10)
@@ -332,9 +332,9 @@ def test_free_inflation():
     assert one.disc(np.sqrt(1 + s**2)) == pytest.approx(cap, rel=1e-10) and two.disc(hoop) == pytest.approx(
         one.disc(hoop), rel=1e-12)
     limit = fx.trace(treloar(), until=fx.pole_stretch(2.5), progress=False).limit_points[0].measures["pressure"]
-    peak = first_peak(Inflated([(fx.NeoHookean(c10=2.0), 0.082)], 1.25).disc)
+    peak = first_peak(FreeInflation([(fx.NeoHookean(c10=2.0), 0.082)], 1.25).disc)
     assert 0.96 * limit < peak.pressure < limit
-    assert first_peak(Inflated([(fx.Gent(mu=1.0, Jm=3.0), 0.1)], 2.0).tube) is None
+    assert first_peak(FreeInflation([(fx.Gent(mu=1.0, Jm=3.0), 0.1)], 2.0).tube) is None
 
 
 def test_every_demo_is_sound():

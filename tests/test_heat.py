@@ -46,7 +46,7 @@ def test_series_and_finite_volumes_agree():
     def source(x):
         return 4e6 * np.exp(-1500 * x)
     fluxes = [lambda T, k=k: h[k] * (air[k] - T) for k in (0, 1)]
-    x, T = reference.lines(SLAB, 25.0, fluxes, times, cells=200, source=source)
+    x, T = reference.method_of_lines(SLAB, 25.0, fluxes, times, cells=200, source=source)
     assert reference.series(SLAB, 25.0, h, air, x, times, source) == pytest.approx(T, abs=2e-5)
 
 
@@ -54,12 +54,12 @@ def test_transform_agrees_with_the_series_and_with_the_contact_of_half_spaces():
     times = [0.2, 3.0]
     perfect = reference.Slab(0.02, 1e9, 1e12)                 # stays at its temperature
     x = np.linspace(0, D, 7)
-    sheet, _ = reference.on_tool(SLAB, perfect, 1000.0, 150.0, 30.0, 10.0, 25.0, x, [0.0], times)
+    sheet, _ = reference.sheet_on_tool(SLAB, perfect, 1000.0, 150.0, 30.0, 10.0, 25.0, x, [0.0], times)
     assert sheet == pytest.approx(reference.series(SLAB, 150.0, (1000.0, 10.0), (30.0, 25.0), x, times), abs=1e-5)
     # half spaces in perfect contact: both faces at the mean weighted by effusivity (Carslaw and Jaeger, section 2.15)
     tool = reference.Slab(0.02, 0.4, 0.84e6)
     e, f = (np.sqrt(b.conductivity * b.capacity) for b in (SLAB, tool))
-    a, b = reference.on_tool(SLAB, tool, 1e9, 150.0, 30.0, 0.0, 25.0, [0.0], [0.0], [0.1])
+    a, b = reference.sheet_on_tool(SLAB, tool, 1e9, 150.0, 30.0, 0.0, 25.0, [0.0], [0.0], [0.1])
     assert [a[0, 0], b[0, 0]] == pytest.approx([(e * 150 + f * 30) / (e + f)] * 2, abs=1e-2)
 
 
@@ -104,8 +104,8 @@ def test_a_tool_that_conducts():
     run = fx.heat(strip(24), SHEET, [fx.ContactWithTool("bottom", conductance=300, tool=tool),
                                      fx.Convection("top", h=10, air=25)], start=150.0, times=times, unit="C")
     depths = np.array([0.0, 1e-3])
-    sheet, inside = reference.on_tool(SLAB, reference.Slab(0.01, *TOOL.values()), 300, 150.0, 30.0, 10, 25.0, places,
-                                      depths, times)
+    sheet, inside = reference.sheet_on_tool(SLAB, reference.Slab(0.01, *TOOL.values()), 300, 150.0, 30.0, 10, 25.0,
+                                             places, depths, times)
     assert run.at(np.column_stack([0 * places, places])) == pytest.approx(sheet, abs=1e-4 * 125)
     for t, exact in zip(times, inside):
         y, T = run.tool_profile("bottom", (0.0, 0.0), t)

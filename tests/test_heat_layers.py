@@ -27,8 +27,9 @@ def chilled(accuracy, thickness, conductance, metal, times, start=150.0, **optio
     run = fx.heat(mesh, SHEET, [fx.ContactWithTool("bottom", conductance=conductance, tool=tool)], start=start,
                   times=times, unit="C", tolerance=0.02)
     x = np.linspace(0, thickness, 15)
-    exact, _ = reference.on_tool(reference.Slab(thickness, 0.17, 1050 * 1800.0), reference.Slab(0.02, *metal.values()),
-                                 conductance, start, 30.0, 0.0, 25.0, x, [0.0], times)
+    exact, _ = reference.sheet_on_tool(reference.Slab(thickness, 0.17, 1050 * 1800.0),
+                                       reference.Slab(0.02, *metal.values()),
+                                       conductance, start, 30.0, 0.0, 25.0, x, [0.0], times)
     return run, np.abs(run.at(np.column_stack([0 * x, x])) - exact).max(1)
 
 

@@ -153,7 +153,7 @@ def test_steps_of_any_length(law, ratio):
     for step in range(12):
         state = material("updated", F, state, 0.0 if step % 4 == 3 else ratio)
         for name, v in state.items():
-            if name in material.material.of_motion:
+            if name in material.material.motion_variables:
                 continue
             assert np.linalg.eigvalsh(matrix(v)).min() > 0
             if not name.startswith("A"):

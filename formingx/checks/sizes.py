@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..findings import Finding, register
-from ..materials.inflation import Inflated, Peak, first_peak
+from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
@@ -185,7 +185,7 @@ class PressurisedFace:
         materials = self._body.scene.materials
         if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
-        blown = Inflated(self._layers(), self.radius)
+        blown = FreeInflation(self._layers(), self.radius)
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
@@ -201,7 +201,7 @@ class PressurisedFace:
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
             return None
-        pressures = Inflated(self._layers(), self.radius).tube(np.linspace(peak.stretch, blow_ratio, 200))
+        pressures = FreeInflation(self._layers(), self.radius).tube(np.linspace(peak.stretch, blow_ratio, 200))
         return float(pressures.min()) / peak.pressure, peak
 
     def _layers(self) -> list[tuple[Any, float]]:

@@ -3,9 +3,9 @@ r"""One-dimensional heat conduction through a slab, solved without finite elemen
 .. math:: \rho c \, \frac{\partial T}{\partial t} = k \frac{\partial^2 T}{\partial x^2} + q(x)
 
 `series`: eigenfunctions of a slab with convection at both faces, about the steady state (Carslaw and Jaeger, Conduction
-of Heat in Solids, 1959, section 3.11). `on_tool`: a sheet in contact with a tool, by Laplace transform and Talbot's
-inversion (Abate and Valko, Int. J. Numer. Methods Eng. 60 (2004) 979-993). `lines`: finite volumes and a stiff solver
-(method of lines), for faces that radiate.
+of Heat in Solids, 1959, section 3.11). `sheet_on_tool`: a sheet in contact with a tool, by Laplace transform and
+Talbot's inversion (Abate and Valko, Int. J. Numer. Methods Eng. 60 (2004) 979-993). `method_of_lines`: finite volumes
+and a stiff solver, for faces that radiate.
 """
 
 from collections.abc import Callable
@@ -112,7 +112,7 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
     return lambda x: a + b * np.asarray(x) + integrated(np.asarray(x, dtype=float))[0]
 
 
-def on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
+def sheet_on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
 
@@ -168,7 +168,7 @@ def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
     return r / n * (total + sum((w * transformed(s)).real for s, w in zip(points, weights)))
 
 
-def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: Any, cells: int = 400,
+def method_of_lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: Any, cells: int = 400,
           source: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the temperatures of a slab with given heat fluxes at its faces, by the method of lines.
 
@@ -186,13 +186,14 @@ def lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: An
     Returns:
         Positions x, shape (n,), length, and temperatures, shape (k, n).
     """
-    coarse, fine = (_lines(slab, start, fluxes, times, n, source) for n in (cells // 2, cells))
+    coarse, fine = (_finite_volumes(slab, start, fluxes, times, n, source) for n in (cells // 2, cells))
     x = np.linspace(0, slab.thickness, cells // 2 + 1)
     return x, (4 * fine[:, ::2] - coarse) / 3
 
 
-def _lines(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int, source: Callable | None) -> np.ndarray:
-    """Return the temperatures at the nodes of finite volumes, shape (times, cells + 1); arguments as in `lines`."""
+def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int,
+                    source: Callable | None) -> np.ndarray:
+    """Return the temperatures at the nodes, shape (times, cells + 1); arguments as in `method_of_lines`."""
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells

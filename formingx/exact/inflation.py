@@ -97,7 +97,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
         return _varying_membrane(pole_stretch, radius, thickness, c10, c01)
     k = c01 / positive("c10", c10)
 
-    def slopes(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
+    def derivatives(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
         l1, r, _, theta = y.tolist()          # floats: several times faster here than NumPy's scalars
         l2 = r / R
         l3 = 1 / (l1 * l2)
@@ -116,7 +116,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
     start, l3 = 1e-6, pole_stretch**-2        # a spherical cap at the pole: curvature 1/(2 T)
     T = 2 * l3 * (pole_stretch**2 - l3**2) * (1 + k * pole_stretch**2)
     r0 = pole_stretch * start
-    solution = solve_ivp(slopes, (start, 1e3), [pole_stretch, r0, 0.0, r0 / (2 * T)], events=rim, rtol=1e-10,
+    solution = solve_ivp(derivatives, (start, 1e3), [pole_stretch, r0, 0.0, r0 / (2 * T)], events=rim, rtol=1e-10,
                          atol=1e-12, method="DOP853", dense_output=True, max_step=0.5)
     end = solution.t_events[0][0]
     R = np.linspace(start, end, 400)
@@ -139,7 +139,7 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
     from scipy.optimize import root_scalar
     unit = positive("c10 at R = 0", float(c10(0.0)))       # lengths over radius, tensions over 2 c10(0) h0
 
-    def slopes(s, y, p):
+    def derivatives(s, y, p):
         r, _, H = map(float, y)
         V, a, k = p * r**2 / 2, float(c10(radius * s)) / unit, c01 / unit
         sN, l2 = math.hypot(H, V), r / s
@@ -150,7 +150,7 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
     def integrate(p, stretch):
         start = 1e-4                                       # a flat pole: errors of start^2
         N = (stretch - stretch**-5) * (1 + c01 / unit * stretch**2)
-        return solve_ivp(slopes, (start, 1), [stretch * start, 0.0, start * N], args=(p,), rtol=1e-9, atol=1e-12,
+        return solve_ivp(derivatives, (start, 1), [stretch * start, 0.0, start * N], args=(p,), rtol=1e-9, atol=1e-12,
                          method="DOP853", dense_output=True)
 
     stretches = np.geomspace(1.02, pole_stretch, max(2, int(np.ceil(np.log(pole_stretch) / 0.1))))

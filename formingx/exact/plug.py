@@ -104,7 +104,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     def start(p):
         return edge / p[1] if slides else edge
 
-    def slopes(s, y, p):
+    def derivatives(s, y, p):
         r, _, H = y
         V, width = p[0], 1 - start(p)
         R = 1 - width * (1 - s)
@@ -126,7 +126,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     p = [edge * tension(l1, 1.0) * first_depth / (1 - edge)]
     if slides:
         p.append(brentq(lambda l: tension(l, l) - tension(l1, 1.0), 1, l1))
-    found = _continued(slopes, ends, s, y, p, first_depth, depth, radius)
+    found = _continuation(derivatives, ends, s, y, p, first_depth, depth, radius)
     r = found.y[0]
     if r.min() < edge * (1 - 1e-6):
         raise InputError(f"travel = {travel!r}: the membrane would touch the side of the plug")
@@ -137,12 +137,12 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
                      R / (l1 * r))
 
 
-def _continued(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float, goal: float,
-               radius: float) -> Any:
+def _continuation(derivatives: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float,
+                  goal: float, radius: float) -> Any:
     """Return the solution of a boundary value problem at a travel, reached in steps from a guess at a smaller travel.
 
     Args:
-        slopes: function of (s, y, p) that returns the derivatives of y, as in `solve_bvp`.
+        derivatives: function of (s, y, p) that returns the derivatives of y, as in `solve_bvp`.
         ends: function of (travel, y at the first point, y at the last point, p) that returns the residuals there.
         s: points of the guess on [0, 1], shape (n,).
         y: guess of the solution, shape (3, n); its second row is proportional to the travel.
@@ -156,7 +156,7 @@ def _continued(slopes: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p
     """
     from scipy.integrate import solve_bvp
     while True:
-        found = solve_bvp(slopes, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
+        found = solve_bvp(derivatives, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
         if not found.success:
             raise InputError(f"travel = {goal * radius!r}: the membrane comes to {depth * radius:.6g} and not further:"
                              f" {found.message}")
@@ -213,15 +213,15 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         return y[3] - np.pi / 2
     upright.terminal = True  # type: ignore[attr-defined]
     flat = np.array([(rp - f) / l0, rp - f, 0, 0, 1 - l0**-6])
-    edge = _integrated(2 * (f + h0), flat, _touching(mu, h0, f), events=upright, dense_output=True)
+    edge = _integrate(2 * (f + h0), flat, _contact_derivatives(mu, h0, f), events=upright, dense_output=True)
     edge_length = edge.t[-1]                        # arc length of the edge
 
     def separation_point(u):                     # y where contact ends, at the arc length u from the flat
-        return _state_after(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _touching(mu))
+        return _state_after(max(u - edge_length, 0.0), edge.sol(min(u, edge_length)), _contact_derivatives(mu))
 
     def rim_error(u):                            # 0 if the membrane ends at the rim
         y = separation_point(u)
-        return _state_after(1 - y[0], y, _free)[1] - 1 if y[0] < 1 else 1.0
+        return _state_after(1 - y[0], y, _free_derivatives)[1] - 1 if y[0] < 1 else 1.0
 
     lengths = np.concatenate([np.linspace(0.01, 1, 30) * edge_length, edge_length + np.linspace(0.01, 3, 60)])
     found = [rim_error(lengths[0])]
@@ -232,7 +232,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
         raise InputError(f"face_stretch = {face_stretch!r}: this plug does not draw the membrane so far")
     u = brentq(rim_error, lengths[len(found) - 2], lengths[len(found) - 1], xtol=1e-13)
     _, r, _, phi, t = y = separation_point(u)
-    travel = _state_after(1 - y[0], y, _free)[2] * radius + thickness * (1 - l0**-2) / 2
+    travel = _state_after(1 - y[0], y, _free_derivatives)[2] * radius + thickness * (1 - l0**-2) / 2
     force = 4 * np.pi * c10 * thickness * radius * r * t * np.sin(phi)
     return SlidingState(float(travel), float(force), l0, float(phi), float(max(u - edge_length, 0.0) * radius))
 
@@ -250,26 +250,26 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
-def _state_after(length: float, y: np.ndarray, slopes: Callable) -> np.ndarray:
+def _state_after(length: float, y: np.ndarray, derivatives: Callable) -> np.ndarray:
     """Return the state (R, r, z, phi, T1) of the meridian at a distance from a point with the state y.
 
     Lengths are over the radius of the membrane, tensions over 2 c10 h0.
 
     Args:
-        length: distance, arc length or reference radius as in `slopes`.
+        length: distance, arc length or reference radius as in `derivatives`.
         y: state (reference radius, deformed radius, height, slope, meridional tension), shape (5,).
-        slopes: function of the five entries of a state that returns their derivatives by the distance.
+        derivatives: function of the five entries of a state that returns their derivatives by the distance.
     """
-    return y if length == 0 else _integrated(length, y, slopes).y[:, -1]
+    return y if length == 0 else _integrate(length, y, derivatives).y[:, -1]
 
 
-def _integrated(length: float, y: np.ndarray, slopes: Callable, **options: Any) -> Any:
-    """Return the solution of `solve_ivp` for the derivatives `slopes` over a distance `length`, from the state y."""
+def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: Any) -> Any:
+    """Return the solution of `solve_ivp` with these `derivatives` over a distance `length`, from the state y."""
     from scipy.integrate import solve_ivp
-    return solve_ivp(lambda s, y: slopes(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
+    return solve_ivp(lambda s, y: derivatives(*y), (0, length), y, rtol=1e-9, atol=1e-12, **options)
 
 
-def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
+def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length where the membrane touches.
 
     R and r are the reference and deformed radius, z is the height, phi the slope, T1 the meridional tension. Lengths
@@ -280,16 +280,16 @@ def _touching(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
         h0: reference thickness; 0 on the side of the plug.
         fillet: radius of the edge; infinite on the side of the plug.
     """
-    def slopes(R, r, z, phi, t):
+    def derivatives(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
         half = h0 * R / (l1 * r) / 2                        # half of the thickness
         kappa, lever = 1 / (fillet + half), 1 / (1 + half / fillet)
         N = t * kappa + t2 * np.sin(phi) / r
         return [1 / l1, np.cos(phi), np.sin(phi), kappa, (t2 - t) * np.cos(phi) / r + mu * lever * N]
-    return slopes
+    return derivatives
 
 
-def _free(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
+def _free_derivatives(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
     """Return the derivatives of (R, r, z, phi, T1) by R on the free part of a membrane under a plug.
 
     Args:

@@ -61,7 +61,7 @@ class Body:
     >>> from formingx.exact.time import block
     >>> bar = block("uniaxial", c10=0.5, branches=[(1.0, 2.0)])
     >>> bar.jump(0.2)
-    >>> bar.hold([1.0, 10.0]).round(4).tolist()
+    >>> bar.relax([1.0, 10.0]).round(4).tolist()
     [0.8545, 0.5541]
     """
 
@@ -85,7 +85,7 @@ class Body:
 
     def jump(self, s: float) -> None:
         """Deform the body instantaneously to the degree of freedom s, without relaxation."""
-        self.w = self._jumped(s)
+        self.w = self._after_jump(s)
         self.s = s
 
     def jump_to_load(self, load: float, bracket: tuple[float, float]) -> None:
@@ -94,9 +94,9 @@ class Body:
         bracket: two degrees of freedom s, between which the load is reached.
         """
         from scipy.optimize import brentq
-        self.jump(brentq(lambda s: self._load(s, self._jumped(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
+        self.jump(brentq(lambda s: self._load(s, self._after_jump(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
-    def drive(self, path: Callable, times: Any) -> np.ndarray:
+    def deform(self, path: Callable, times: Any) -> np.ndarray:
         """Return the loads while the degree of freedom s follows a prescribed path, shape (n,).
 
         Args:
@@ -105,30 +105,30 @@ class Body:
         """
         def rate(t, y):
             s, ds = path(t)
-            return self._flow(s, ds, y.reshape(self.w.shape)).ravel()
+            return self._elastic_rate(s, ds, y.reshape(self.w.shape)).ravel()
 
         found = self._integrate(rate, self.w.ravel(), times)
         states = [(path(t)[0], y.reshape(self.w.shape)) for t, y in zip(times, found)]
         self.s, self.w = states[-1]
         return np.array([self._load(*state) for state in states])
 
-    def hold(self, times: Any) -> np.ndarray:
+    def relax(self, times: Any) -> np.ndarray:
         """Return the loads at times, shape (n,), while the degree of freedom s is constant (relaxation)."""
         s = self.s
-        return self.drive(lambda t: (s, 0.0), times)
+        return self.deform(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
         """Return the degree of freedom s at times, shape (n,), while the load is constant (creep)."""
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
-            return np.append(ds, self._flow(s, ds, w))
+            return np.append(ds, self._elastic_rate(s, ds, w))
 
         found = self._integrate(rate, np.append(self.s, self.w), times)
         self.s, self.w = found[-1, 0], found[-1, 1:].reshape(self.w.shape)
         return found[:, 0]
 
-    def creep_through(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
+    def creep_times(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
         """Return the times at which the degree of freedom s reaches given values under the present load.
 
         At no s before `end` may the relaxed body be in equilibrium under this load, because creep would end there.
@@ -146,7 +146,7 @@ class Body:
         def rate(s, y):
             w = y[1:].reshape(self.w.shape)
             dt = self._time_per_s(s, w)
-            return np.append(dt, self._strain_rate(s) - dt * self._relaxing(w).ravel())
+            return np.append(dt, self._strain_rate(s) - dt * self._relaxation_rate(w).ravel())
 
         def limit_point(s, y):
             return self._time_per_s(s, y[1:].reshape(self.w.shape))
@@ -167,7 +167,7 @@ class Body:
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu
 
-    def _jumped(self, s: float) -> np.ndarray:
+    def _after_jump(self, s: float) -> np.ndarray:
         """Return the elastic strains after an instantaneous deformation to s, shape (n, branches, 3)."""
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
@@ -175,11 +175,11 @@ class Body:
         """Return the derivative of the elastic strains by s without relaxation, flattened."""
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
-    def _flow(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
+    def _elastic_rate(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
         """Return the time derivative of the elastic strains w for the rate ds of s, flattened."""
-        return self._strain_rate(s) * ds - self._relaxing(w).ravel()
+        return self._strain_rate(s) * ds - self._relaxation_rate(w).ravel()
 
-    def _relaxing(self, w: np.ndarray) -> np.ndarray:
+    def _relaxation_rate(self, w: np.ndarray) -> np.ndarray:
         """Return the rate at which the elastic strains w decrease by relaxation, shape (n, branches, 3), 1/time."""
         m = np.exp(2 * w)
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
@@ -190,7 +190,7 @@ class Body:
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])
         stiffness += 2 * (d[0] * m[..., 0] - d[2] * m[..., 2]) @ self.mu
-        relaxation = 2 * m * self._relaxing(w)
+        relaxation = 2 * m * self._relaxation_rate(w)
         relaxation = (relaxation[..., 0] - relaxation[..., 2]) @ self.mu
         return float((dc @ self._difference(s, w) + (c * de) @ stiffness) / (c @ relaxation))
 

@@ -114,7 +114,7 @@ class ConstitutiveHistory(History, Protocol):
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Reset the internal variables that describe the motion in the last step (`Material.of_motion`).
+        """Reset the internal variables that describe the motion in the last step (`Material.motion_variables`).
 
         The time integration of the next step then assumes no earlier motion.
         """

@@ -74,8 +74,8 @@ class MaterialHistory:
         return dict(zip(self._sizes, parts, strict=True))
 
     def forget_motion(self) -> None:
-        """Reset the variables that `Material.of_motion` names to their initial values."""
-        for name in self._terms.material.of_motion:
+        """Reset the variables that `Material.motion_variables` names to their initial values."""
+        for name in self._terms.material.motion_variables:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
@@ -155,7 +155,7 @@ class MaterialHistory:
             Values that `put` accepts.
         """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
-        shapes = self._terms.material.shapes
+        shapes = self._terms.material.tensor_powers
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places)
              for entry in (source, self)] if shapes else []
 

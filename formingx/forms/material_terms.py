@@ -59,7 +59,7 @@ class MaterialTerms:
 
     def _constant(self, name: str, value: Any) -> Any:
         """Return the coefficient (UFL scalar) of a material constant with a name and a value."""
-        self._in_middle = name in self.material.of_flow
+        self._in_middle = name in self.material.flow_constants
         return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
 
     @property
@@ -109,7 +109,8 @@ class MaterialTerms:
             function: f(T), vectorised.
 
         Returns:
-            f (UFL scalar) at the end of a step; in the middle of a step for a constant named in `Material.of_flow`.
+            f (UFL scalar) at the end of a step. For a constant named in `Material.flow_constants`, f in the middle of
+            the step.
         """
         forms, found = self.forms, self.quadrature_function()
         law = getattr(function, "clamped", function)          # a user's own constant may be any function

@@ -41,7 +41,7 @@ class StepError:
         heat = len(self._materials) < len(forms.histories)
         terms = [terms for terms in forms.terms if terms.has_history or heat and terms.follows_temperature]
         self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
-        systematic = any(entry.material.of_motion or entry.material.integral for entry in terms)
+        systematic = any(entry.material.motion_variables or entry.material.integral for entry in terms)
         self._weight = _SYSTEMATIC if systematic else 1.0
         self._relaxed = [_Stress(forms, entry, entry.equilibrium_energy) for entry in terms
                          if entry.has_history and entry.equilibrium_energy(forms.elastic_F) is not None]

@@ -19,8 +19,8 @@ class Energies:
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
-    of_motion: Any = ()
-    shapes: Any = MappingProxyType({})
+    motion_variables: Any = ()
+    tensor_powers: Any = MappingProxyType({})
     rate_dependent = True
     integral: Any = None
     stores_energy: Any = True
@@ -52,7 +52,7 @@ class Energies:
         return self.step_energy(F, rest, ufl.as_ufl(0.0), **constants)
 
     @property
-    def of_flow(self) -> tuple[str, ...]:
+    def flow_constants(self) -> tuple[str, ...]:
         """Names of the constants that determine a rate of flow; a step uses their values at its middle."""
         return ()
 

@@ -106,7 +106,7 @@ class Response:
         return to_3 @ tau, np.einsum("ai,ijn,bj->abn", to_3, K, to_3)
 
 
-def along(mode: str, stretches: Any) -> np.ndarray:
+def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
     r"""Return both in-plane stretches of a homogeneous test.
 
     .. math:: l_1 = l, \qquad l_2 = l^k
@@ -191,7 +191,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
         The first is 1 where the stress is finite, else not a number. The others are l^2 dP/dl and the smaller
         eigenvalue of the Hessian, both divided by the size of Hessian and stress.
         """
-        tau, K = response.logarithmic(along(mode, l), constants)
+        tau, K = response.logarithmic(in_plane_stretches(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
         slope = K[0, 0] + MODES[mode] * K[0, 1] - tau[0]
         smaller = (K[0, 0] + K[1, 1]) / 2 - np.hypot((K[0, 0] - K[1, 1]) / 2, K[0, 1])

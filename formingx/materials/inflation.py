@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .homogeneous import along
+from .homogeneous import in_plane_stretches
 from .material import Material
 
 _HALVINGS = 60             # bisections of the axial stretch, down to round-off
@@ -26,7 +26,7 @@ class Peak(NamedTuple):
     pressure: float
 
 
-class Inflated:
+class FreeInflation:
     """Thin body in free inflation.
 
     Args:
@@ -82,7 +82,7 @@ class Inflated:
         Returns:
             Pressures, shape (n,), stress; infinite beyond the largest stretch of a material.
         """
-        force = self._forces(along("equibiaxial", stretch))[0]
+        force = self._forces(in_plane_stretches("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
         return np.where(np.isfinite(found), found, np.inf)
 

@@ -43,11 +43,11 @@ class Material(Energies):
         parameters: {name: constant}, each a number or one of the varying constants in `formingx.materials.constants`.
         internal: internal variables at a quadrature point, {name: value in the reference configuration}. A value is a
             number, or nested tuples of the shape of the variable. Empty: no history.
-        of_motion: names of internal variables that describe the motion in the last step and predict the rate in the
-            next. With their values in the reference configuration they predict no motion.
-        shapes: {name: 1 or -1} of internal variables that are positive definite tensors, like C or its inverse, with
-            entries 11, 22, 12, 33. They are transferred to another mesh relative to the deformed body, others as
-            numbers.
+        motion_variables: names of internal variables that describe the motion in the last step and predict the rate in
+            the next. With their values in the reference configuration they predict no motion.
+        tensor_powers: {name: 1 or -1} of internal variables that are positive definite tensors with entries 11, 22, 12,
+            33: 1 for a tensor like C, -1 for one like its inverse. They are transferred to another mesh relative to the
+            deformed body, others as numbers.
         rate_dependent: False if the history depends on the strain alone, as damage does, and not on the time.
         integral: law of a stress that depends on all past states (`IntegralLaw`), or None.
         stores_energy: True if `stored_energy` is defined.
@@ -180,7 +180,7 @@ class Material(Energies):
         for bad in flat[~((flat > 0) & np.isfinite(flat))][:1]:
             raise InputError(f"{self}: a stretch of {bad:.6g}: must be finite and greater than 0")
         self._check_isotropic()
-        both = flat.reshape(2, -1) if mode == "biaxial" else homogeneous.along(mode, flat)
+        both = flat.reshape(2, -1) if mode == "biaxial" else homogeneous.in_plane_stretches(mode, flat)
         P = self.response.stress(both, self._numbers())[:2 if mode == "biaxial" else 1].ravel()
         for bad in flat[~np.isfinite(P)][:1]:
             raise InputError(self._beyond(mode, bad) if mode in MODES else

@@ -54,7 +54,7 @@ class RelaxingMaterial(Relaxing):
 
     _tensor = ""                    # name of the internal variable of a branch
     _stores_C = True                # C of the last state is an internal variable too
-    _sign = 1                       # sign of the internal variable of a branch, see `Material.shapes`
+    _power = 1                       # power of the internal variable of a branch, see `Material.tensor_powers`
 
     def __init__(self, equilibrium: Material | None, branches: Any, shift: Any = None):
         super().__init__(equilibrium)
@@ -88,16 +88,16 @@ class RelaxingMaterial(Relaxing):
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
         """Internal variables, {name: entries (11, 22, 12, 33) of the tensor in the reference configuration}."""
-        return dict.fromkeys(self.shapes, IDENTITY)
+        return dict.fromkeys(self.tensor_powers, IDENTITY)
 
     @property
-    def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
+    def tensor_powers(self) -> dict[str, int]:  # type: ignore[override]  # read only here
         """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
-        branches = {f"{self._tensor}_{k}": self._sign for k, *_ in self._branches(self.parameters)}
+        branches = {f"{self._tensor}_{k}": self._power for k, *_ in self._branches(self.parameters)}
         return {"C": 1} | branches if self._stores_C else branches
 
     @property
-    def of_flow(self) -> tuple[str, ...]:
+    def flow_constants(self) -> tuple[str, ...]:
         """Names of the relaxation times of all branches, the constants that determine a rate of flow."""
         return tuple(f"tau_{k}" for k, *_ in self._branches(self.parameters))
 

@@ -99,19 +99,19 @@ class Solidification(Material):
                 _FRACTION: 0.0}
 
     @property
-    def of_flow(self) -> tuple[str, ...]:
+    def flow_constants(self) -> tuple[str, ...]:
         """Names of the constants that a step takes at its middle: flow constants of the base, and the fraction."""
-        return (*self._base.of_flow, "set_middle")
+        return (*self._base.flow_constants, "set_middle")
 
     @property
-    def of_motion(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
+    def motion_variables(self) -> tuple[str, ...]:  # type: ignore[override]  # read only here
         """Names of the internal variables of the base that describe the motion in the last step."""
-        return self._base.of_motion
+        return self._base.motion_variables
 
     @property
-    def shapes(self) -> dict[str, int]:  # type: ignore[override]  # read only here
+    def tensor_powers(self) -> dict[str, int]:  # type: ignore[override]  # read only here
         """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
-        return {**self._base.shapes, _BEFORE: 1, _LAST: 1}
+        return {**self._base.tensor_powers, _BEFORE: 1, _LAST: 1}
 
     @property
     def largest_I1(self):

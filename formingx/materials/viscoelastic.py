@@ -73,18 +73,18 @@ class Viscoelastic(RelaxingMaterial):
         return deviator_squared(C, self._metric(Cv))
 
     def _step(self, C, before, Cv, x):
-        G, x = self._start(before, Cv, x)
+        G, x = self._step_start(before, Cv, x)
         a, s = determinant(G), inner(cofactor(G), C) + x * inner(cofactor(C), G) + x**2
         p, q = a ** (1 / 3), (a + x * s) ** (1 / 3)
         return 3 * s / (q**2 + p * q + p**2) - 3
 
     def _advanced(self, C, before, Cv, x):
-        G, x = self._start(before, Cv, x)
+        G, x = self._step_start(before, Cv, x)
         grown = plus(G, C, x)
         scale = determinant(grown) ** (-1 / 3)
         return tuple(scale * g for g in grown)
 
-    def _start(self, before, Cv, x):
+    def _step_start(self, before, Cv, x):
         """Return G (entries) and x' of the docstring of the class, from C_n, Cv_n and x = dt/tau."""
         if before is None:
             return Cv, x
@@ -129,8 +129,8 @@ class TransientNetwork(RelaxingMaterial):
     0.05
     """
 
-    _tensor, _sign = "A", -1
-    of_motion = ("change", "pace")
+    _tensor, _power = "A", -1
+    motion_variables = ("change", "pace")
 
     @property
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
@@ -162,15 +162,15 @@ class TransientNetwork(RelaxingMaterial):
         return inner(C, A) + inner(cofactor(C), cofactor(A)) / determinant(A) - 6
 
     def _step(self, C, past, A, x):
-        return inner(C, self._kept(past, A, x)) - 3
+        return inner(C, self._past_tensor(past, A, x)) - 3
 
     def _advanced(self, C, past, A, x):
-        return plus(self._kept(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _bulge(x))
+        return plus(self._past_tensor(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _parabola_weight(x))
 
-    def _kept(self, past, A, x):
+    def _past_tensor(self, past, A, x):
         """Return M (entries) of the docstring of the class, for the result of `_past`, A_n and x = dt/tau."""
         before, change, share = past
-        decay, p = ufl.exp(-x), share * _bulge(x)
+        decay, p = ufl.exp(-x), share * _parabola_weight(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
 
     @staticmethod
@@ -185,7 +185,7 @@ def _mean_decay(x: Any) -> Any:
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
 
 
-def _bulge(x: Any) -> Any:
+def _parabola_weight(x: Any) -> Any:
     """Return [x - 2 + (x + 2) e^-x]/x^2 (UFL), by its series for small x."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)

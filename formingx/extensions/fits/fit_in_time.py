@@ -194,7 +194,8 @@ class _Data:
             raise InputError("fit: data: no test lasts any time: the times of each are all the same")
         low, high = np.log(steps[steps > 0].min() / 10), np.log(10 * longest)
         self.log_tau = np.linspace(low, high, 2 + int(_PER_DECADE * (high - low) / np.log(10)))
-        self._stretches = np.hstack([homogeneous.along(t.mode, t.stretches[m]) for t, m in zip(self.tests, measured)])
+        self._stretches = np.hstack([homogeneous.in_plane_stretches(t.mode, t.stretches[m])
+                                     for t, m in zip(self.tests, measured)])
         l1, l2 = self._stretches
         self.largest_I1 = float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2))
         from scipy.interpolate import CubicSpline

@@ -150,7 +150,7 @@ def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     if first.ndim != 1 or any(x.shape != first.shape for x in given) or not len(first):
         raise InputError(f"fit: data[{mode!r}]: stretch has the shape {first.shape}, stress {P.shape}: must be (n,),"
                          f" the same for both")
-    l = np.stack(given[:2]) if biaxial else homogeneous.along(mode, np.where(first > 0, first, 1.0))
+    l = np.stack(given[:2]) if biaxial else homogeneous.in_plane_stretches(mode, np.where(first > 0, first, 1.0))
     stresses = np.stack(given[2:]) if biaxial else np.stack([P, np.full(len(P), np.nan)])
     at = np.stack(given[:2]) if biaxial else first[None]
     missing = np.isnan(stresses).all(0) | np.isinf(stresses).any(0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite_array, instance, known
-from ...materials.homogeneous import MODES, along
+from ...materials.homogeneous import MODES, in_plane_stretches
 from ...materials.material import Material
 
 _NEAR = 0.1
@@ -66,7 +66,7 @@ class MeasuredRange:
             if l.size == 0 or not np.all(l > 0):
                 raise InputError(f"tests: {mode}: stretches must be above 0")
             ranges[mode] = (float(l.min()), float(l.max()))
-            strains.append(principal(l.reshape(2, -1) if mode == "biaxial" else along(mode, l.ravel())))
+            strains.append(principal(l.reshape(2, -1) if mode == "biaxial" else in_plane_stretches(mode, l.ravel())))
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:

@@ -77,7 +77,7 @@ class KBKZ(Relaxing):
             self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
         self.check()
 
-    of_flow = ("aT",)
+    flow_constants = ("aT",)
     stores_energy = False
 
     @classmethod
