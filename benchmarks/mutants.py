@@ -87,7 +87,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("materials/hyperelastic.py", "return c10 * (I1 - 3) + c01 * (I2 - 3)", "return c01 * (I1 - 3) + c10 * (I2 - 3)",
      "materials closed_forms"),
     ("materials/hyperelastic.py", "s / 2 - s**2 / 20 - s**3 / 15", "s / 2 - s**2 / 20 + s**3 / 15", "materials"),
-    ("materials/viscoelastic.py", "share * _bulge(x)\n", "0 * _bulge(x)\n", "viscoelastic"),
+    ("materials/viscoelastic.py", "share * _parabola_weight(x)\n", "0 * _parabola_weight(x)\n", "viscoelastic"),
     ("materials/viscoelastic.py", "return 3 * s / (q**2 + p * q + p**2) - 3", "return s / q**2 - 3", "viscoelastic"),
     ("materials/viscoelastic.py", "(_mean_decay(x) - decay + p) * c", "(1 - decay + p) * c", "viscoelastic"),
     ("materials/relaxing.py", "mu / (2 * tau) * ufl.max_value", "mu / tau * ufl.max_value", "viscoelastic time"),
