@@ -17,7 +17,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Slab:
-    """Slab from x = 0 to `thickness`, in consistent units.
+    """Slab from x = 0 to `thickness`, with heat conduction along x.
 
     Attributes:
         thickness: thickness d, length.
@@ -31,7 +31,7 @@ class Slab:
 
     @property
     def diffusivity(self) -> float:
-        """Thermal diffusivity k / (rho c), length^2/time."""
+        """Thermal diffusivity alpha = k / (rho c), length^2/time."""
         return self.conductivity / self.capacity
 
 
@@ -39,8 +39,11 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
            source: Callable | None = None, terms: int = 200) -> np.ndarray:
     r"""Return the temperatures of a slab with convection at both faces, as a sum over its modes.
 
-    T_s is the steady temperature, d the thickness, alpha the thermal diffusivity, b_0 and b_1 the Biot numbers of the
-    faces, A_m the amplitudes that give the initial temperature:
+    .. math::
+        k T'(0) = h_0 (T(0) - T_{air,0}), \qquad -k T'(d) = h_1 (T(d) - T_{air,1})
+
+    T_s is the steady temperature, d the thickness, k the conductivity and alpha the diffusivity of the slab. b_0 and
+    b_1 are the Biot numbers of the faces. The amplitudes A_m give the initial temperature:
 
     .. math::
         T(x, t) = T_s(x) + \sum_m A_m \, \phi_m(x/d) \, e^{-m^2 \alpha t/d^2}, \quad
@@ -56,7 +59,7 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
         air: temperatures of the air at the two faces.
         x: positions, shape (n,), length.
         times: times, shape (k,).
-        source: heat source per volume, power/length^3, a function of x, shape (...); default none.
+        source: heat source per volume, power/length^3, a function of x, any shape; None: no source.
         terms: number of modes.
 
     Returns:
@@ -89,13 +92,15 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
 
 
 def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callable:
-    """Return the steady temperature of a slab as a function of x: -k T'' = source, with convection at both faces.
+    r"""Return the steady temperature T_s of a slab as a function of x, with convection at both faces.
+
+    .. math:: -k T_s'' = q, \qquad k T_s'(0) = h_0 (T_s(0) - T_{air,0}), \qquad -k T_s'(d) = h_1 (T_s(d) - T_{air,1})
 
     Args:
         slab: the slab.
         h: heat transfer coefficients of the faces x = 0 and x = d.
         air: temperatures of the air at the two faces.
-        source: heat source per volume, a function of x, or None.
+        source: heat source q per volume, a function of x, power/length^3; None: no source.
     """
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
@@ -114,11 +119,16 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
 def sheet_on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, tool_start: float, h: float, air: float,
             x: Any, depths: Any, times: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
+    r"""Return the temperatures of a sheet and of the tool on which it is laid at t = 0.
 
-    The heat flux into the tool is conductance * (T_sheet - T_tool), with the temperatures of the touching faces. The
-    heat flux from the other face of the sheet to the air is h * (T - air). The back of the tool keeps its initial
-    temperature.
+    Let x be the distance into the sheet and y the distance into the tool, both from the touching faces. The
+    temperatures T of the sheet and T_w of the tool satisfy
+
+    .. math::
+        k T'(0) = -k_w T_w'(0) = c \, (T(0) - T_w(0)), \qquad -k T'(d) = h (T(d) - T_{air}), \qquad T_w(d_w) = T_{w,0}
+
+    with the conductivities k, k_w, the thicknesses d, d_w and the contact conductance c. The back of the tool keeps its
+    initial temperature. The Laplace transforms of both temperatures are inverted numerically.
 
     Args:
         sheet: the sheet.
@@ -128,8 +138,8 @@ def sheet_on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, too
         tool_start: initial temperature of the tool.
         h: heat transfer coefficient of the free face, power/(length^2 temperature).
         air: temperature of the air.
-        x: positions in the sheet from the touching face, shape (n,), length.
-        depths: positions in the tool from the touching face, shape (m,), length.
+        x: distances x into the sheet from the touching face, shape (n,), length.
+        depths: distances y into the tool from the touching face, shape (m,), length.
         times: times above 0, shape (k,).
 
     Returns:
@@ -155,9 +165,15 @@ def sheet_on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, too
 
 
 def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
-    """Return the inverse Laplace transform at a time t > 0, by a sum over n points of Talbot's contour.
+    r"""Return m inverse Laplace transforms at a time t > 0, shape (m,), by the fixed Talbot method with n points.
 
-    transformed: function of a complex number s that returns the transforms, shape (m,). The error is about 1e-9.
+    .. math::
+        f(t) = \frac{r}{n} \left\{\tfrac{1}{2} e^{r t} \hat f(r) + \sum_{k=1}^{n-1} \mathrm{Re}
+        \left[e^{s_k t} \hat f(s_k) \, (1 + i \sigma_k)\right]\right\}, \quad
+        s_k = r \theta_k (\cot\theta_k + i), \quad \sigma_k = \theta_k + (\theta_k \cot\theta_k - 1) \cot\theta_k,
+        \quad \theta_k = \frac{k \pi}{n}, \quad r = \frac{2 n}{5 t}
+
+    (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms.
     """
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
@@ -170,21 +186,24 @@ def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
 
 def method_of_lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable], times: Any, cells: int = 400,
           source: Callable | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the temperatures of a slab with given heat fluxes at its faces, by the method of lines.
+    r"""Return the temperatures of a slab with given heat fluxes at its faces, by the method of lines.
 
-    Nodes lie at both faces and between cells of equal size. The error of finite volumes is proportional to the square
-    of this size; Richardson's extrapolation from two sizes removes it.
+    .. math:: \rho c \, \dot T = k T'' + q, \qquad -k T'(0) = f_0(T(0)), \qquad k T'(d) = f_1(T(d))
+
+    Finite volumes of equal size divide the slab. Their error is proportional to the square of this size. Richardson's
+    extrapolation from two sizes removes it.
 
     Args:
         slab: the slab.
         start: uniform initial temperature.
-        fluxes: heat fluxes into the faces x = 0 and x = d, power/length^2, functions of the temperature of the face.
+        fluxes: heat fluxes f_0 and f_1 into the faces x = 0 and x = d, power/length^2, functions of the temperature of
+            the face.
         times: times in ascending order, shape (k,).
-        cells: number of cells of the finer division, even.
-        source: heat source per volume, power/length^3, a function of x, shape (n,); default none.
+        cells: number of intervals between nodes of the finer division, even.
+        source: heat source q per volume, power/length^3, a function of x, shape (n,); None: no source.
 
     Returns:
-        Positions x, shape (n,), length, and temperatures, shape (k, n).
+        Positions x of the n = cells/2 + 1 nodes, shape (n,), length, and temperatures, shape (k, n).
     """
     coarse, fine = (_finite_volumes(slab, start, fluxes, times, n, source) for n in (cells // 2, cells))
     x = np.linspace(0, slab.thickness, cells // 2 + 1)

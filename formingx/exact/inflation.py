@@ -71,14 +71,23 @@ class MembraneState:
 
 def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
                        c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
-    """Return a flat circular membrane with a fixed rim, inflated to a given stretch at its pole.
+    r"""Return a flat circular membrane with a fixed rim, inflated to a given stretch at its pole.
+
+    Equilibrium of the meridian, with its slope theta and arc length s (Adkins and Rivlin 1952):
+
+    .. math:: \frac{d(T_1 r)}{dr} = T_2, \qquad T_1 \frac{d\theta}{ds} + T_2 \frac{\sin\theta}{r} = p
+
+    The tensions T_1 and T_2 of the Mooney material are stated in `formingx.exact.inflation`.
 
     Args:
         pole_stretch: stretch at the pole, above 1.
         radius: reference radius, length.
         thickness: reference thickness, length.
-        c10: Mooney constant, stress; a number, or a smooth function of R (length).
-        c01: Mooney constant, stress.
+        c10: constant of I1, stress; a number, or a smooth function of the reference radius R, length.
+        c01: constant of I2, stress.
+
+    Returns:
+        The inflated membrane.
 
     Raises:
         InputError: a size or constant is not allowed, or no pressure gives this stretch.
@@ -128,9 +137,12 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
 def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
                       c01: float) -> MembraneState:
-    """Return the inflated membrane whose constant c10 is a function of R (arguments as in `membrane_inflation`).
+    r"""Return the inflated membrane whose constant c10 is a function of R (arguments as in `membrane_inflation`).
 
-    The pole stretch is raised in steps; the secant method finds the pressure of each.
+    .. math:: R N_1 \sin\theta = \frac{p r^2}{2}, \qquad \frac{d(R N_1 \cos\theta)}{dR} = N_2 - p r \lambda_1 \sin\theta
+
+    N_1 and N_2 are tensions per reference length. The pole stretch increases in steps. The secant method finds the
+    pressure of each step, for which the circumferential stretch is 1 at the rim.
 
     Raises:
         InputError: no pressure was found.
@@ -176,8 +188,11 @@ def meridional_stretch(n: Any, l2: Any) -> Any:
     .. math:: \lambda_1 - \lambda_1^{-3} \lambda_2^{-2} = n
 
     Args:
-        n: tension per reference length over 2 c10 h0 (h0: reference thickness), shape (k,) or a number.
+        n: meridional tension per reference length over 2 c10 h0 (h0: reference thickness), shape (k,) or a number.
         l2: circumferential stretch lambda_2, shape (k,) or a number.
+
+    Returns:
+        lambda_1, shape (k,) or a number.
     """
     l1 = n + l2**-0.5
     for _ in range(20):
@@ -189,16 +204,16 @@ def membrane_limit_point(*, radius: float, thickness: float, c10: float,
                          c01: float = 0.0) -> tuple[float, MembraneState] | None:
     """Return the first pressure maximum of an inflated circular membrane with a fixed rim.
 
-    The search ends at a pole stretch of 12.
+    The pole stretch is varied from 1.2 to 12.
 
     Args:
         radius: reference radius, length.
         thickness: reference thickness, length.
-        c10: Mooney constant, stress.
-        c01: Mooney constant, stress.
+        c10: constant of I1, stress.
+        c01: constant of I2, stress.
 
     Returns:
-        The pole stretch and the state at the maximum, or None if the pressure has no maximum up to there.
+        The pole stretch and the state at the maximum; None if the pressure has no maximum in this range.
 
     >>> from formingx.exact.inflation import membrane_limit_point
     >>> stretch, state = membrane_limit_point(radius=1.25, thickness=0.082, c10=2.0)
@@ -229,7 +244,7 @@ class ThickWallState:
     """Thick tube or sphere inflated to a given stretch of its inner face, at n points through the wall.
 
     Attributes:
-        pressure: inner pressure, stress.
+        pressure: pressure on the inner face, stress; the outer face is free.
         R: reference radii of the points, shape (n,), length.
         r: deformed radii, shape (n,), length.
         radial: radial Cauchy stress, shape (n,), stress.
@@ -246,15 +261,21 @@ class ThickWallState:
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
-        """Hydrostatic pressure: minus the mean of radial, hoop and third stress, shape (n,), stress."""
+        """Hydrostatic pressure: minus the mean of radial, hoop and third Cauchy stress, shape (n,), stress."""
         return -(self.radial + self.hoop + self.third) / 3
 
     def cauchy(self, direction: Any) -> np.ndarray:
-        """Return the Cauchy stresses at the points through the wall, in components r, z, hoop, shape (n, 3, 3), stress.
+        r"""Return the Cauchy stress tensors at the n points through the wall, in components r, z, hoop.
+
+        .. math:: \sigma = \sigma_\mathrm{radial} \, n \otimes n + \sigma_\mathrm{third} \, t \otimes t
+                  + \sigma_\mathrm{hoop} \, e_\theta \otimes e_\theta, \qquad t \perp n, e_\theta
 
         Args:
-            direction: vector (r, z) of any length that points outwards through the wall, shape (2,) or (n, 2); (1, 0)
-                for a tube.
+            direction: vector (r, z) along n of any length, which points outwards through the wall, shape (2,) or
+                (n, 2); (1, 0) for a tube.
+
+        Returns:
+            Stress tensors, shape (n, 3, 3), stress.
         """
         radial = np.broadcast_to(np.asarray(direction, dtype=float), (len(self.R), 2))
         radial = radial / np.linalg.norm(radial, axis=1)[:, None]
@@ -268,16 +289,33 @@ class ThickWallState:
 
 def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_radius: float, c10: float,
                c01: float = 0.0, R: Any = None) -> ThickWallState:
-    """Return the exact state of a thick tube (plane strain) or sphere with a given stretch of its inner face.
+    r"""Return the exact state of a thick tube (plane strain) or sphere with a given stretch of its inner face.
+
+    With n = 2 for a tube and 3 for a sphere, the reference radius R, the deformed radius r and the deformed inner
+    radius a (Green and Adkins 1970):
+
+    .. math:: r^n = R^n + a^n - A^n, \qquad \lambda = r/R, \qquad \sigma_{rr} = g(\lambda_B) - g(\lambda), \qquad
+              p = g(\lambda_A) - g(\lambda_B)
+
+    .. math:: g_\mathrm{tube} = 2 (c_{10} + c_{01}) (\ln\lambda - \tfrac{1}{2} \lambda^{-2}), \qquad
+              g_\mathrm{sphere} = -c_{10} (4 \lambda^{-1} + \lambda^{-4}) + c_{01} (4 \lambda - 2 \lambda^{-2})
+
+    The hoop stresses of tube and sphere are
+
+    .. math:: \sigma_{rr} + 2 (c_{10} + c_{01}) (\lambda^2 - \lambda^{-2}), \qquad
+              \sigma_{rr} + 2 c_{10} (\lambda^2 - \lambda^{-4}) + 2 c_{01} (\lambda^4 - \lambda^{-2})
 
     Args:
         kind: "tube" or "sphere".
         inner_stretch: deformed over reference inner radius.
         inner_radius: reference inner radius A, length.
         outer_radius: reference outer radius B, length.
-        c10: Mooney constant, stress.
-        c01: Mooney constant, stress.
-        R: reference radii at which the stresses are given, shape (n,), length; default both faces.
+        c10: constant of I1, stress.
+        c01: constant of I2, stress.
+        R: reference radii R at which the stresses are evaluated, shape (n,), length; None: the two faces.
+
+    Returns:
+        Pressure on the inner face, and radii and Cauchy stresses at the points R.
 
     Raises:
         InputError: a size or constant is not allowed.
@@ -315,13 +353,13 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
 def thick_sphere_limit_point(**wall: float) -> tuple[float, ThickWallState] | None:
     """Return the first pressure maximum of an inflated thick sphere.
 
-    The search ends at a stretch of 20 of the inner face.
+    The stretch of the inner face is varied from 1.01 to 20.
 
     Args:
         wall: arguments inner_radius, outer_radius, c10, c01 and R of `thick_wall`.
 
     Returns:
-        The inner stretch and the state at the maximum, or None if the pressure has no maximum up to there.
+        The stretch of the inner face and the state at the maximum; None if the pressure has no maximum in this range.
     """
     from scipy.optimize import minimize_scalar
 

@@ -49,11 +49,11 @@ class PlugState:
     """Membrane under a plug, at n points from the edge of the plug to the rim, in the units of the input.
 
     Attributes:
-        force: force on the plug, stress length^2.
-        face_stretch: equal biaxial stretch under the plug.
+        force: force of the plug along its travel, stress length^2.
+        face_stretch: equibiaxial stretch under the plug, 1 for a sticking membrane.
         R: reference radii of the points, shape (n,), length.
         r: deformed radii, shape (n,), length.
-        z: deformed heights, 0 at the rim, shape (n,), length.
+        z: deformed heights, from minus the travel at the plug to 0 at the rim, shape (n,), length.
         thickness_ratio: deformed over reference thickness, shape (n,).
     """
 
@@ -67,16 +67,27 @@ class PlugState:
 
 def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thickness: float, c10: float,
                         c01: float = 0.0, friction: str = "stick") -> PlugState:
-    """Return a circular membrane with a fixed rim that a flat plug with a sharp edge has pushed by a travel.
+    r"""Return a circular membrane with a fixed rim, stretched by a flat plug with a sharp edge.
+
+    Outside the plug, with the components H and V = F/(2 pi) of R N_1 along r and z, and the force F:
+
+    .. math:: \frac{dH}{dR} = N_2, \qquad \frac{dr}{dR} = \frac{\lambda_1 H}{R N_1}, \qquad
+              \frac{dz}{dR} = \frac{\lambda_1 V}{R N_1}, \qquad R N_1 = \sqrt{H^2 + V^2}
+
+    N_1 and N_2 are the meridional and the circumferential tension per reference length, stated in
+    `formingx.exact.plug`.
 
     Args:
-        travel: travel of the plug, above 0, length.
+        travel: travel of the plug from the plane of the rim, above 0, length.
         radius: reference radius of the membrane, length.
         plug_radius: radius of the plug, length.
         thickness: reference thickness, length.
-        c10: Mooney constant, stress.
-        c01: Mooney constant, stress.
+        c10: constant of I1, stress.
+        c01: constant of I2, stress.
         friction: "stick" or "none", between membrane and plug.
+
+    Returns:
+        The membrane outside the plug.
 
     Raises:
         InputError: a size or constant is not allowed. At this travel the membrane would touch the side of the plug, or
@@ -139,17 +150,17 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 
 def _continuation(derivatives: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float,
                   goal: float, radius: float) -> Any:
-    """Return the solution of a boundary value problem at a travel, reached in steps from a guess at a smaller travel.
+    """Return the solution of a boundary value problem at a travel by `solve_bvp`, in steps from a smaller travel.
 
     Args:
-        derivatives: function of (s, y, p) that returns the derivatives of y, as in `solve_bvp`.
-        ends: function of (travel, y at the first point, y at the last point, p) that returns the residuals there.
+        derivatives: function of (s, y, p) that returns dy/ds, shape (3, n).
+        ends: boundary conditions: function of (travel, y at s = 0, y at s = 1, p) that returns their residuals.
         s: points of the guess on [0, 1], shape (n,).
-        y: guess of the solution, shape (3, n); its second row is proportional to the travel.
-        p: guess of the unknown parameters.
+        y: guess of the unknowns y(s), shape (3, n); its second row is proportional to the travel.
+        p: guess of the unknown parameters of the problem.
         depth: travel of the guess, over the radius.
         goal: travel of the solution, over the radius.
-        radius: reference radius of the membrane, for the message, length.
+        radius: reference radius of the membrane, for the error message, length.
 
     Raises:
         InputError: a step of the continuation does not converge.
@@ -172,10 +183,10 @@ class SlidingState:
 
     Attributes:
         travel: travel of the plug, length.
-        force: force on the plug, stress length^2.
-        face_stretch: equal biaxial stretch under the flat of the plug.
-        wrap: angle of the touched part of the edge, up to pi/2, radians.
-        side: length of contact on the side of the plug.
+        force: force of the plug along its travel, stress length^2.
+        face_stretch: equibiaxial stretch under the flat face of the plug.
+        wrap: angle of the part of the rounded edge in contact, up to pi/2, radians.
+        side: length of contact along the side of the plug, length.
     """
 
     travel: float
@@ -187,16 +198,27 @@ class SlidingState:
 
 def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radius: float, fillet: float,
                                thickness: float, c10: float, mu: float) -> SlidingState:
-    """Return the neo-Hookean membrane under a flat plug with a rounded edge and Coulomb friction.
+    r"""Return the neo-Hookean membrane that slides over a flat plug with a rounded edge under Coulomb friction.
+
+    On the edge, with tensions T per deformed length, arc length s, slope phi and curvature kappa of the meridian:
+
+    .. math:: \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r} + \mu N \frac{f}{f + h/2}, \qquad
+              N = T_1 \kappa + T_2 \frac{\sin\phi}{r}, \qquad \kappa = \frac{1}{f + h/2}
+
+    Here f is the fillet radius, h the deformed thickness and N the contact pressure on the middle surface
+    (equilibrium: Song 1993, section 2.2; friction: eq. 5.9).
 
     Args:
-        face_stretch: stretch under the flat of the plug, above 1. It increases with the travel.
+        face_stretch: equibiaxial stretch under the flat face of the plug, above 1. It increases with the travel.
         radius: reference radius of the membrane, length.
         plug_radius: radius of the plug, length.
         fillet: radius of the edge of the plug, length.
         thickness: reference thickness, length.
         c10: neo-Hookean constant, stress.
-        mu: coefficient of friction.
+        mu: coefficient of friction between membrane and plug, 0 or larger.
+
+    Returns:
+        Travel, force and contact lengths at this stretch.
 
     Raises:
         InputError: a size or constant is not allowed, or this plug does not reach the stretch.
@@ -238,22 +260,25 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
 
 
 def _tensions(t: float, l2: float) -> tuple[float, float]:
-    """Return the meridional stretch and the circumferential tension T2 of a neo-Hookean membrane.
+    r"""Return the meridional stretch and the circumferential tension T2 of a neo-Hookean membrane.
+
+    .. math:: T_1 = \frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}, \qquad
+              T_2 = \frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}
 
     Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness).
 
     Args:
         t: meridional tension T1.
-        l2: circumferential stretch.
+        l2: circumferential stretch lambda_2.
     """
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
 def _state_after(length: float, y: np.ndarray, derivatives: Callable) -> np.ndarray:
-    """Return the state (R, r, z, phi, T1) of the meridian at a distance from a point with the state y.
+    """Return the state (R, r, z, phi, T1) of the meridian at a distance from a point with the state y, shape (5,).
 
-    Lengths are over the radius of the membrane, tensions over 2 c10 h0.
+    Lengths are over the reference radius of the membrane, tensions over 2 c10 h0 (h0: reference thickness).
 
     Args:
         length: distance, arc length or reference radius as in `derivatives`.
@@ -270,10 +295,11 @@ def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: A
 
 
 def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
-    """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length where the membrane touches.
+    """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length in the zone of contact.
 
     R and r are the reference and deformed radius, z is the height, phi the slope, T1 the meridional tension. Lengths
-    are over the radius of the membrane, tensions over 2 c10 h0.
+    are over the reference radius of the membrane, tensions over 2 c10 h0. The equations are stated in
+    `membrane_sliding_over_plug`.
 
     Args:
         mu: coefficient of friction.
@@ -290,12 +316,15 @@ def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> 
 
 
 def _free_derivatives(R: float, r: float, z: float, phi: float, t: float) -> list[float]:
-    """Return the derivatives of (R, r, z, phi, T1) by R on the free part of a membrane under a plug.
+    r"""Return the derivatives of (R, r, z, phi, T1) by R on the part of a membrane that is not in contact.
+
+    .. math:: \frac{d\phi}{ds} = -\frac{T_2}{T_1} \frac{\sin\phi}{r}, \qquad
+              \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r}, \qquad ds = \lambda_1 dR
 
     Args:
-        R: reference radius over that of the membrane.
-        r: deformed radius.
-        z: height.
+        R: reference radius over the reference radius of the membrane.
+        r: deformed radius over the same radius.
+        z: height over the same radius.
         phi: slope, radians.
         t: meridional tension T1 over 2 c10 h0.
     """

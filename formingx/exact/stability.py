@@ -25,16 +25,20 @@ from scipy.special import iv, ivp, jn_zeros
 
 
 def block(nu: float, kind: str) -> float:
-    r"""Return the stretch at which a compressed plane-strain block buckles in one half wave along the load.
+    r"""Return the stretch at which a compressed block in plane strain buckles in one half wave along the load.
 
-    The block lies between frictionless plates (Biot 1965). Let lambda be the stretch along the load, h half of the
-    deformed thickness and k = pi over the deformed length. For flexure, and for barrelling with coth in place of tanh:
+    The block is neo-Hookean and lies between frictionless plates. Let lambda be the stretch along the load, h half
+    of the deformed thickness and k = pi over the deformed length. For flexure and for barrelling (Biot 1965):
 
-    .. math:: 4 r \tanh(r k h) = (1 + r^2)^2 \tanh(k h), \qquad r = \lambda^2
+    .. math:: 4 r \tanh(r k h) = (1 + r^2)^2 \tanh(k h), \qquad 4 r \coth(r k h) = (1 + r^2)^2 \coth(k h), \qquad
+              r = \lambda^2
 
     Args:
         nu: slenderness pi H0/L0, with the reference length L0 along the load and the reference thickness 2 H0.
         kind: "flexure" or "barrelling".
+
+    Returns:
+        The first such stretch below 1; nan if the block is stable down to a stretch of 0.3.
     """
     def f(stretch):
         r, kh = stretch**2, nu / stretch**2
@@ -46,18 +50,24 @@ def block(nu: float, kind: str) -> float:
 def cylinder(nu: float, n: int) -> float:
     r"""Return the axial stretch at which a compressed solid cylinder buckles in one half wave along its axis.
 
-    The cylinder of the deformed length H lies between frictionless plates; its mode is cos(pi z/H) cos(n theta). Let v
-    be the displacement of the mode, q its pressure, mu the shear modulus, lambda the axial stretch and k = pi/H. Two
-    kinds of motion satisfy the equations below, with the modified Bessel function I_n. One is a gradient of I_n(k r).
-    The other is a curl of axial potentials I_n(k lambda^(3/2) r), for which q is 0:
+    The neo-Hookean cylinder of the deformed length H lies between frictionless plates. Its mode varies as
+    cos(pi z/H) cos(n theta). Let v be the displacement of the mode, q its pressure, mu the shear modulus, lambda the
+    axial stretch and k = pi/H. Incremental equilibrium is
 
     .. math:: \mathcal{L} v = \frac{\nabla q}{\mu}, \qquad
               \mathcal{L} = \lambda^{-1} \left(\frac{\partial^2}{\partial r^2} + \dots\right)
               + \lambda^2 \frac{\partial^2}{\partial z^2}
 
+    Three motions satisfy it, with the modified Bessel function I_n. The first is the gradient of I_n(k r). The others
+    are the curl, and the curl of the curl, of axial potentials I_n(k lambda^(3/2) r); for these q is 0. The determinant
+    of their tractions on the side vanishes at the returned stretch.
+
     Args:
         nu: slenderness pi R0/H0, with the reference radius R0 and the reference length H0.
         n: number of waves round the axis.
+
+    Returns:
+        The first such stretch below 1; nan if the cylinder is stable down to a stretch of 0.3.
 
     >>> from formingx.exact.stability import cylinder
     >>> round(cylinder(1.0, 1), 4)
@@ -87,14 +97,20 @@ def cylinder(nu: float, n: int) -> float:
 
 
 def tube(ratio: float, n: int) -> tuple[float, float]:
-    """Return the state at which a tube of constant length buckles under an outer fluid pressure.
+    r"""Return the state at which a neo-Hookean tube of constant length buckles under an outer fluid pressure.
+
+    The mode is constant along the axis. With the inner and outer reference radii A and B and the shear modulus mu the
+    pressure is
+
+    .. math:: \frac{P}{\mu} = -\int_A^B \left(\frac{r^2}{R^2} - \frac{R^2}{r^2}\right) \frac{R \, dR}{r^2}, \qquad
+              r^2 = R^2 + a^2 - A^2
 
     Args:
-        ratio: inner over outer reference radius.
-        n: number of waves round the axis.
+        ratio: inner over outer reference radius, A/B.
+        n: number of waves round the axis, 2 or larger.
 
     Returns:
-        Pressure over the shear modulus, and deformed over reference inner radius.
+        P over mu, and the deformed over the reference inner radius, a/A; nan if the tube is stable down to a/A = 0.4.
     """
     def f(inner):
         return _determinant(ratio, inner, n, 0.0, outside=True)
@@ -105,13 +121,15 @@ def tube(ratio: float, n: int) -> tuple[float, float]:
 def inflated_tube(ratio: float, kB: float, n: int) -> float:
     """Return the first inner stretch at which an inflated tube bulges or bends in one half wave along its axis.
 
-    The ends are frictionless, the length is constant. The inner stretch is deformed over reference inner radius. It is
-    nan if the tube is stable up to an inner stretch of 5.
+    The tube is neo-Hookean. Its ends are frictionless and its length is constant.
 
     Args:
         ratio: inner over outer reference radius.
-        kB: pi B over the length, with the outer radius B.
-        n: 0 for bulging, 1 for bending.
+        kB: pi B over the length, with the outer reference radius B.
+        n: number of waves round the axis, 0 for bulging, 1 for bending.
+
+    Returns:
+        Deformed over reference inner radius; nan if the tube is stable up to a value of 5.
     """
     def f(inner):
         return _determinant(ratio, inner, n, kB, outside=False)
@@ -126,15 +144,16 @@ def inflated_tube(ratio: float, kB: float, n: int) -> float:
 
 
 def clamped_plate(n: int) -> float:
-    r"""Return the buckling load N a^2/D of a thin clamped disc under radial compression.
+    r"""Return the dimensionless buckling load N a^2/D of a thin clamped disc under radial compression.
 
     .. math:: \frac{N a^2}{D} = j_{n+1,1}^2
 
-    j is the first zero of the Bessel function J_(n+1). For n = 0 see Timoshenko and Gere, Theory of Elastic Stability,
-    1961.
+    N is the compressive force per length of the edge, a the radius and D the bending stiffness of the disc. j_(n+1,1)
+    is the first positive zero of the Bessel function J_(n+1). For n = 0 see Timoshenko and Gere, Theory of Elastic
+    Stability, 1961.
 
     Args:
-        n: number of waves round the axis.
+        n: number of waves round the axis, 0 or larger.
 
     >>> from formingx.exact.stability import clamped_plate
     >>> round(clamped_plate(0), 2)
@@ -144,7 +163,7 @@ def clamped_plate(n: int) -> float:
 
 
 def _last_root(f: Callable[[float], float], low: float) -> float:
-    """Return the root of f nearest to 1 between `low` and 1, or nan if f has none."""
+    """Return the root of f nearest to 1 between `low` and 1; nan if f has none."""
     grid = 1 - np.geomspace(1e-5, 1 - low, 80)
     last = f(grid[0])
     for a, b in zip(grid, grid[1:]):
@@ -156,12 +175,15 @@ def _last_root(f: Callable[[float], float], low: float) -> float:
 
 
 def _pressure(ratio: float, inner: float, stretch: float) -> float:
-    """Return the outer minus the inner pressure of a tube, over its shear modulus.
+    r"""Return the outer minus the inner pressure of a tube, over its shear modulus.
+
+    .. math:: \frac{P_B - P_A}{\mu} = -\int_A^B (b_\theta - b_r) \frac{R \, dR}{\lambda r^2}, \qquad
+              b_\theta = \frac{r^2}{R^2}, \qquad b_r = \frac{R^2}{\lambda^2 r^2}
 
     Args:
-        ratio: inner over outer reference radius.
+        ratio: inner over outer reference radius, A/B.
         inner: deformed over reference inner radius.
-        stretch: axial stretch.
+        stretch: axial stretch lambda.
     """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     R, w = ratio + (1 - ratio) * (nodes + 1) / 2, weights * (1 - ratio) / 2
@@ -173,8 +195,8 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
     """Return the determinant that vanishes where a tube under pressure bifurcates, at an axial stretch of 1.
 
-    Its columns are three motions that satisfy the conditions on the inner face; its rows are the conditions on the
-    outer face.
+    Three motions satisfy the boundary conditions on the inner face. The columns of the determinant are their errors in
+    the three boundary conditions on the outer face.
 
     Args:
         ratio: inner over outer reference radius.
@@ -210,7 +232,10 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
         return np.append(np.array(found).T.ravel(), dbr - (bh - br) / r)
 
     def free(r, P):
-        """Return the rows whose products with (U, V, W, rr, rh, rz) vanish on a face of radius r under a pressure P."""
+        """Return the boundary conditions on a face of radius r under a fluid pressure P, as rows, shape (3, 6).
+
+        Their products with the amplitudes (U, V, W, rr, rh, rz) of displacement and traction must vanish.
+        """
         return np.array([[P / r, P * n / r, P * k, 1, 0, 0], [P * n / r, P / r, 0, 0, 1, 0], [P * k, 0, 0, 0, 0, 1]])
     start = np.hstack([np.eye(3), -free(a, P_in)[:, :3].T])         # tractions that follow from U, V, W
     p0 = state(a)[0] + P_in

@@ -42,19 +42,22 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 @dataclass
 class Body:
-    """Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
+    r"""Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
 
-    The load is the sum of c T over n points. T is the difference of the stresses in the principal directions 1 and 3.
+    The load is a sum over n points. T is the difference of the Cauchy stresses in the principal directions 1 and 3:
+
+    .. math:: \text{load} = \sum_{i=1}^n c_i(s) \, T_i, \qquad
+              T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum_k \mu_k \left(e^{2 w_{k1}} - e^{2 w_{k3}}\right)
 
     Attributes:
-        c10: material constant, stress.
-        branches: (shear modulus, relaxation time) of each branch.
-        direction: logarithmic strains in the three principal directions over a strain e, shape (3,).
-        strain: function of s that returns e and de/ds of all points, shape (n,) each.
-        weight: function of s that returns c and dc/ds of all points, shape (n,) each.
+        c10: neo-Hookean constant of the equilibrium, stress.
+        branches: (shear modulus mu, relaxation time tau) of each branch, stress and time.
+        direction: logarithmic strains in the three principal directions over the scalar strain e, shape (3,).
+        strain: function of s that returns the scalar strain e and de/ds at all points, shape (n,) each.
+        weight: function of s that returns the weight c of the load and dc/ds at all points, shape (n,) each.
         time: present time.
-        s: present degree of freedom.
-        w: elastic logarithmic strains of the branches, shape (n, branches, 3).
+        s: present value of the degree of freedom.
+        w: present elastic logarithmic strains of the branches, shape (n, branches, 3).
         mu: shear moduli of the branches, shape (branches,), stress.
         tau: relaxation times of the branches, shape (branches,), time.
 
@@ -80,7 +83,7 @@ class Body:
 
     @property
     def load(self) -> float:
-        """Load of the body in its present state: a nominal stress, a pressure, or p R0/H0 of a balloon, stress."""
+        """Load of the body in its present state, stress: nominal stress of a block, p of a wall, p R0/H0 of a balloon."""
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
@@ -89,19 +92,21 @@ class Body:
         self.s = s
 
     def jump_to_load(self, load: float, bracket: tuple[float, float]) -> None:
-        """Deform the body instantaneously to a given load.
+        """Deform the body instantaneously, without relaxation, until it carries a given load.
 
-        bracket: two degrees of freedom s, between which the load is reached.
+        Args:
+            load: the load, stress.
+            bracket: two values of the degree of freedom s, between which the load is reached.
         """
         from scipy.optimize import brentq
         self.jump(brentq(lambda s: self._load(s, self._after_jump(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
     def deform(self, path: Callable, times: Any) -> np.ndarray:
-        """Return the loads while the degree of freedom s follows a prescribed path, shape (n,).
+        """Return the loads at times, shape (n,), while the degree of freedom s is a prescribed function of time.
 
         Args:
             path: function of time that returns s and ds/dt.
-            times: times after the present one, ascending, shape (n,). The last one becomes the present time.
+            times: times after the present time, ascending, shape (n,). The last one becomes the present time.
         """
         def rate(t, y):
             s, ds = path(t)
@@ -113,12 +118,12 @@ class Body:
         return np.array([self._load(*state) for state in states])
 
     def relax(self, times: Any) -> np.ndarray:
-        """Return the loads at times, shape (n,), while the degree of freedom s is constant (relaxation)."""
+        """Return the loads at ascending times, shape (n,), while the degree of freedom s is constant (relaxation)."""
         s = self.s
         return self.deform(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
-        """Return the degree of freedom s at times, shape (n,), while the load is constant (creep)."""
+        """Return the degree of freedom s at ascending times, shape (n,), while the load is constant (creep)."""
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
@@ -129,17 +134,17 @@ class Body:
         return found[:, 0]
 
     def creep_times(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
-        """Return the times at which the degree of freedom s reaches given values under the present load.
+        """Return the times at which the degree of freedom s reaches given values in creep under the present load.
 
-        At no s before `end` may the relaxed body be in equilibrium under this load, because creep would end there.
+        At no s up to `end` may the relaxed body be in equilibrium under this load, because creep would stop there.
 
         Args:
             targets: values of s, shape (n,).
-            end: last s of the integration.
+            end: value of s at which the integration ends.
 
         Returns:
-            Times, shape (n,): the present time for a target below s, nan for one that is not reached. Then the time at
-            which equilibrium is lost, or None if s reaches `end`.
+            Times, shape (n,): the present time for a target below the present s, nan for a target that is not reached.
+            Then the time of the limit point, at which ds/dt becomes infinite; None if s reaches `end`.
         """
         from scipy.integrate import solve_ivp
 
@@ -162,7 +167,7 @@ class Body:
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """Return the difference of the stresses in directions 1 and 3 at all points, shape (n,), stress."""
+        """Return the differences T of the Cauchy stresses in directions 1 and 3 at all points, shape (n,), stress."""
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu
@@ -172,20 +177,29 @@ class Body:
         return self.w + (self.strain(s)[0] - self.strain(self.s)[0])[:, None, None] * self.direction
 
     def _strain_rate(self, s: float) -> np.ndarray:
-        """Return the derivative of the elastic strains by s without relaxation, flattened."""
+        """Return the derivatives of the elastic strains w by s without relaxation, shape (3 n branches,)."""
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _elastic_rate(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """Return the time derivative of the elastic strains w for the rate ds of s, flattened."""
+        """Return the time derivatives of the elastic strains w for the rate ds of s, shape (3 n branches,), 1/time."""
         return self._strain_rate(s) * ds - self._relaxation_rate(w).ravel()
 
     def _relaxation_rate(self, w: np.ndarray) -> np.ndarray:
-        """Return the rate at which the elastic strains w decrease by relaxation, shape (n, branches, 3), 1/time."""
+        r"""Return the rates at which the elastic strains w decrease by relaxation, shape (n, branches, 3), 1/time.
+
+        .. math:: \frac{1}{2 \tau} \left(e^{2 w_i} - \frac{1}{3} \sum_j e^{2 w_j}\right)
+        """
         m = np.exp(2 * w)
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 
     def _time_per_s(self, s: float, w: np.ndarray) -> float:
-        """Return the derivative of the time by the degree of freedom s in creep under a constant load."""
+        r"""Return the derivative of the time by the degree of freedom s in creep under a constant load.
+
+        .. math:: \frac{dt}{ds} = \frac{\sum (c' T + c \, e' \, \partial T / \partial e)}
+                  {\sum c \sum_k 2 \mu_k (e^{2 w_{k1}} \rho_{k1} - e^{2 w_{k3}} \rho_{k3})}
+
+        Here :math:`\rho` are the results of `_relaxation_rate`; sums without limits are over the points.
+        """
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])
@@ -195,7 +209,7 @@ class Body:
         return float((dc @ self._difference(s, w) + (c * de) @ stiffness) / (c @ relaxation))
 
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
-        """Return the solution of an initial value problem at times, shape (n, k), and update the present time.
+        """Return the solution of an initial value problem at n times, shape (n, k), and update the present time.
 
         Args:
             rate: function of (time, solution) that returns the time derivatives, shape (k,).
@@ -214,12 +228,16 @@ class Body:
 
 
 def block(mode: str, *, c10: float, branches: Any) -> Body:
-    """Return a block in a homogeneous test, with s = ln(lambda) and the nominal stress as load.
+    r"""Return a block in a homogeneous test, with s = ln(lambda) and the nominal stress P as load.
+
+    .. math:: P = T / \lambda
+
+    T is the difference of the Cauchy stresses along the load and in the stress-free direction (`Body`).
 
     Args:
-        mode: a key of `formingx.materials.homogeneous.MODES`, such as "uniaxial".
-        c10: material constant, stress.
-        branches: (shear modulus, relaxation time) of each branch.
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
+        c10: neo-Hookean constant of the equilibrium, stress.
+        branches: (shear modulus, relaxation time) of each branch, stress and time.
     """
     known("block: mode", mode, MODES)
     k = MODES[mode]
@@ -228,14 +246,19 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
 
 
 def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any, points: int = 40) -> Body:
-    """Return a thick tube or sphere under an inner pressure, with s = a^n - A^n for the inner radius a.
+    r"""Return a thick tube (plane strain) or sphere, with s = a^n - A^n and the inner pressure p as load.
+
+    Here a is the deformed inner radius, and n is 2 for a tube and 3 for a sphere. T is the difference of hoop and
+    radial Cauchy stress (`Body`):
+
+    .. math:: r^n = R^n + s, \qquad p = \int_A^B \frac{(n - 1) \, T \, R^{n-1}}{r^n} \, dR
 
     Args:
         kind: "tube" or "sphere".
         inner_radius: reference inner radius A, length.
-        outer_radius: reference outer radius, length.
-        c10: material constant, stress.
-        branches: (shear modulus, relaxation time) of each branch.
+        outer_radius: reference outer radius B, length.
+        c10: neo-Hookean constant of the equilibrium, stress.
+        branches: (shear modulus, relaxation time) of each branch, stress and time.
         points: number of Gauss points through the wall.
 
     Raises:
@@ -255,13 +278,16 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    """Return a thin spherical balloon under a pressure p, with s = ln(r/R0) and the load p R0/H0.
+    r"""Return a thin spherical balloon under a pressure p, with s = ln(lambda) and the load p R0/H0.
 
-    r and R0 are its deformed and reference radius, H0 is its reference thickness.
+    .. math:: \frac{p R_0}{H_0} = \frac{2 T}{\lambda^3}, \qquad \lambda = \frac{r}{R_0}
+
+    r and R0 are the deformed and the reference radius, H0 is the reference thickness. T is the difference of the Cauchy
+    stresses along and through the wall (`Body`).
 
     Args:
-        c10: material constant, stress.
-        branches: (shear modulus, relaxation time) of each branch.
+        c10: neo-Hookean constant of the equilibrium, stress.
+        branches: (shear modulus, relaxation time) of each branch, stress and time.
     """
     return Body(c10, branches, np.array([1, 1, -2.0]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([2 * math.exp(-3 * s)]), np.array([-6 * math.exp(-3 * s)])))

@@ -29,14 +29,17 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
     .. math:: \frac{dw_i}{dt} = \frac{d \ln l_i}{dt} - \frac{f_i(w)}{2 \tau}
 
+    Here :math:`l_i` is the principal stretch of the body, w_i the elastic strain of a branch, tau its relaxation time
+    and f the flow law of the material, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
+
     Args:
-        flow: function f, from w to f(w), shape (branches, 3) each.
+        flow: flow law f, a function from w to f(w), both of shape (branches, 3), dimensionless.
         tau: relaxation times, shape (branches,), time.
-        mode: a test of `homogeneous.MODES`.
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
         times: times, shape (n,), not descending.
         stretches: stretches in the loaded direction at these times, shape (n,). The first stretch is applied suddenly
             to a body in the reference configuration; a second stretch at the same time is a jump.
-        between: "stretch" or "strain", the quantity with a constant rate between two times, see `BETWEEN`.
+        between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
         accuracy: relative accuracy of a time step; the error of a test is about a hundred times larger.
 
     Returns:
@@ -75,11 +78,11 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
     """Check the arguments of a homogeneous test with given stretches over time.
 
     Args:
-        name: beginning of the messages.
-        mode: a test of `homogeneous.MODES`.
+        name: beginning of the error messages.
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
         times: times, shape (n,), not descending.
-        stretches: stretches at these times, shape (n,), positive.
-        between: "stretch" or "strain", see `BETWEEN`.
+        stretches: stretches in the loaded direction at these times, shape (n,), positive.
+        between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
 
     Returns:
         Times and stretches as arrays, shape (n,) each.
@@ -104,7 +107,7 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
 
 
 def _pieces(times: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield the numbers (first, last) of the ends of each piece of a table in which the values have a constant rate."""
+    """Yield the indices (first, last) of the end points of each part of a table in which the values change linearly."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.diff(values) / np.diff(times)
     scale = 1e-9 * np.abs(rates[np.isfinite(rates)]).max(initial=0)

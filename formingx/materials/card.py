@@ -66,7 +66,7 @@ def _shift(material: Any, temperature: float) -> float:
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
     """Return rows (quantity, value) of a table for a material at one temperature: moduli and limits of stretch.
 
-    `name` is the temperature as text, or "", and `shift` the factor of the relaxation times at this temperature.
+    `name` is the temperature as text, "" if none is given; `shift` is the factor of the relaxation times at it.
     """
     def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
@@ -94,7 +94,7 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """Return a PNG image, base64-encoded, with curves of true stress against stretch in the three tests.
+    """Return a PNG image, base64-encoded, with curves of true stress against stretch in the three tests of `MODES`.
 
     `cases` holds (temperature as text, material, factor of the relaxation times) for each temperature.
     """

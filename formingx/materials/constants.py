@@ -44,14 +44,17 @@ class Sample(NamedTuple):
 
 
 class Varying(ABC):
-    """Base class of material constants that vary over the body."""
+    """Base class of material constants that vary over the body, with position or temperature.
+
+    Subclasses define `values`, for checks before a run, and `expression`, for the forms.
+    """
 
     @abstractmethod
     def values(self, sample: Sample) -> np.ndarray:
         """Return the values of the constant at quadrature points, for checks, moduli and scales.
 
         Args:
-            sample: the n points.
+            sample: n quadrature points of a layer.
 
         Returns:
             Values, shape (n,).

@@ -15,7 +15,22 @@ import ufl
 
 
 class Energies:
-    """Energies and internal variables of a material; `Material` derives from it and describes the attributes."""
+    """Energies and internal variables of a material, the base class of `Material`.
+
+    By default a material has no internal variables, and all energies equal the strain energy.
+
+    Attributes:
+        parameters: {name: constant}.
+        internal: {name: value in the reference configuration} of the internal variables; empty: no history.
+        motion_variables: names of internal variables that describe the motion in the last step.
+        tensor_powers: {name: 1 or -1} of internal variables that are tensors like C (1) or like its inverse (-1).
+        rate_dependent: False if the history depends on the strain alone, and not on the time.
+        integral: law of a stress that depends on all past states (`IntegralLaw`), or None.
+        stores_energy: True if `stored_energy` is defined.
+        symmetric: True if the tangent is symmetric.
+        tested: tests from which the constants were fitted (a `MeasuredRange`), or None.
+        branches: pairs (shear modulus, relaxation time) of a relaxing material, stress and time; else empty.
+    """
 
     parameters: dict[str, Any]
     internal: dict[str, Any] = {}
@@ -53,7 +68,10 @@ class Energies:
 
     @property
     def flow_constants(self) -> tuple[str, ...]:
-        """Names of the constants that determine a rate of flow; a step uses their values at its middle."""
+        """Names of the constants that determine a rate of flow, such as relaxation times; by default none.
+
+        A step in time uses their values in the middle of the step.
+        """
         return ()
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
@@ -114,7 +132,7 @@ class Energies:
         return None if self.internal else self.strain_energy(F, **constants)
 
     def elastic_stretches(self, F: Any, internal: dict[str, Any], **constants: Any) -> list[Any]:
-        """Return the largest principal elastic stretch of each relaxing branch in a state; by default there is none.
+        """Return the largest principal elastic stretch of each relaxing branch in a state; by default an empty list.
 
         The stretch is 1 for a relaxed branch. Before any relaxation it is the largest isochoric stretch of F.
 
@@ -142,13 +160,13 @@ class Energies:
         return ufl.as_ufl(0.0)
 
     def damage_energy(self, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the energy per reference volume that damage has dissipated since the reference configuration.
+        """Return the energy per reference volume that damage has dissipated up to a state; by default 0.
 
         Args:
             internal: {name: internal variable in the state (UFL)}.
             constants: values of the constants by name.
 
         Returns:
-            Energy (UFL, stress); by default 0.
+            Energy (UFL, stress).
         """
         return ufl.as_ufl(0.0)

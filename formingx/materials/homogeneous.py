@@ -112,7 +112,7 @@ def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
     .. math:: l_1 = l, \qquad l_2 = l^k
 
     Args:
-        mode: a test of `MODES`, which gives the exponent k.
+        mode: "uniaxial" (k = -1/2), "pure_shear" (k = 0) or "equibiaxial" (k = 1).
         stretches: stretches l in the loaded direction, shape (n,).
 
     Returns:
@@ -129,9 +129,9 @@ def _three(stretches: Any) -> np.ndarray:
 
 
 class Stability(NamedTuple):
-    r"""Ranges of stretch in which a material is stable in homogeneous tests.
+    r"""Ranges of stretch in which a material is stable in uniaxial tension, pure shear and equibiaxial tension.
 
-    With the stretch l and the nominal stress P, the logarithmic strain and the Kirchhoff stress tau, the criteria are
+    Two criteria are examined. With the stretch l, the nominal stress P and the Kirchhoff stress tau they are
 
     .. math:: \frac{dP}{dl} > 0 \text{ (load)}, \qquad d\tau : d \ln l > 0 \text{ (Drucker)}
 
@@ -139,8 +139,8 @@ class Stability(NamedTuple):
 
     Attributes:
         stretches: the examined range.
-        finite: {test: range in which the stress is finite}.
-        load: {test: range in which the force increases}.
+        finite: {test, such as "uniaxial": range in which the stress is finite}.
+        load: {test: range in which the force increases with the stretch}.
         drucker: {test: range in which Drucker's criterion holds}.
     """
 
@@ -188,8 +188,8 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
         """Return the margins of three criteria at the stretches l of a test, shape (3, n): positive where one holds.
 
-        The first is 1 where the stress is finite, else not a number. The others are l^2 dP/dl and the smaller
-        eigenvalue of the Hessian, both divided by the size of Hessian and stress.
+        The first is 1 where the stress is finite, else not a number. The second is l^2 dP/dl, the third the smaller
+        eigenvalue of the Hessian of W in the logarithmic strains. Both are divided by the size of Hessian and stress.
         """
         tau, K = response.logarithmic(in_plane_stretches(mode, l), constants)
         size = np.abs(K).max((0, 1)) + np.abs(tau).max(0)
@@ -248,10 +248,10 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """Return programs for the first and for first and second derivatives of an energy W by the stretches.
+    """Return two programs: the 3 first derivatives of an energy W by the stretches, and these with the 6 second ones.
 
-    W is a UFL expression of `_STRETCHES` and of the first n entries of `_CONSTANTS`. The second derivatives are 11, 12,
-    13, 22, 23, 33.
+    W is a UFL expression of `_STRETCHES` and of the first n entries of `_CONSTANTS`. The second derivatives follow in
+    the order 11, 12, 13, 22, 23, 33.
     """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))
@@ -274,7 +274,7 @@ _OPERATIONS: dict[type, Callable] = {
 
 
 def _operation(node: Any) -> Callable:
-    """Return the numpy function of the operands that evaluates a node of a UFL expression."""
+    """Return the NumPy function that evaluates a node of a UFL expression from the values of its operands."""
     if isinstance(node, classes.Zero):
         return lambda: 0.0
     if isinstance(node, classes.ScalarValue):

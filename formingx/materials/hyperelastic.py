@@ -118,14 +118,14 @@ class Yeoh(Material):
         return [cls(c10=modulus / 2, c20=0, c30=0.1 * modulus / I1**2)]
 
     def coordinates(self):
-        r"""Return the variables of a fit with their bounds.
+        r"""Return the variables that a fit changes in place of the constants, with their bounds.
 
         .. math:: c_{10}, \qquad c_{20} + 0.99 \sqrt{3 \, c_{10} c_{30}}, \qquad \sqrt{c_{30}}
 
-        If no variable is negative the constants are admissible, with a margin of 1 %.
+        All lower bounds are 0: then the constants are admissible, with a margin of 1 % for c20.
 
         Returns:
-            List of (value, lowest, highest).
+            List of (value, lower bound, upper bound).
         """
         c10, c20, c30 = self.parameters.values()
         return [(x, 0, math.inf) for x in (c10, c20 + 0.99 * math.sqrt(3 * c10 * c30), math.sqrt(c30))]
@@ -279,12 +279,12 @@ class Ogden(Material):
 
     @classmethod
     def guesses(cls, modulus, I1, terms):
-        """Return the initial materials of a fit, one for every choice of `terms` exponents out of six.
+        """Return the initial materials of a fit, one for every choice of `terms` exponents.
 
         Args:
             modulus: approximate shear modulus of the data, stress.
             I1: not used.
-            terms: number of exponents, at most 6; None for 3.
+            terms: number of exponents, chosen from 1.3, 2, 5, 10, -2 and -5; None for 3.
 
         Returns:
             The materials.
@@ -301,12 +301,12 @@ class Ogden(Material):
                 for some in itertools.combinations(exponents, n)]
 
     def coordinates(self):
-        """Return the variables of a fit, all mu_k then all alpha_k, with bounds.
+        """Return the variables that a fit changes: all mu_k, then all alpha_k, with bounds.
 
-        Each keeps its sign, and alpha_k lies between -30 and 30.
+        Each variable keeps its sign, and alpha_k lies between -30 and 30.
 
         Returns:
-            List of (value, lowest, highest).
+            List of (value, lower bound, upper bound).
         """
         values = list(self.parameters.values())
         largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)
@@ -361,7 +361,7 @@ class Hyperelastic(Material):
 
 
 def _ln(x: Any) -> Any:
-    """Return ln x (UFL); for x < 0 its derivatives are not a number either, unlike those of UFL's ln."""
+    """Return ln x (UFL). For x < 0 its derivatives too are not a number, unlike the derivatives of `ufl.ln`."""
     return 2 * ufl.ln(ufl.sqrt(x))
 
 

@@ -15,7 +15,7 @@ def checked_shift(name: str, shift: Any) -> Callable:
     """Check that the temperature dependence of relaxation times is a function.
 
     Args:
-        name: beginning of the message.
+        name: beginning of the error message.
         shift: law aT(T), the factor of the relaxation times at the temperature T.
 
     Returns:
@@ -33,9 +33,9 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
     """Check a list of pairs of constants, such as moduli and relaxation times.
 
     Args:
-        name: beginning of the messages.
+        name: beginning of the error messages.
         pairs: the pairs, at least one.
-        what: names of the two entries of a pair, for the messages, such as "mu, tau".
+        what: names of the two entries of a pair, for the error messages, such as "mu, tau".
 
     Returns:
         The pairs as lists.
@@ -56,8 +56,9 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
 class Relaxing(Material):
     """Base class of materials that relax to an equilibrium.
 
-    Subclasses add their own constants to `parameters`, call `check`, and define `_modulus`. They also define
-    `stress(mode, stretches, times=, between=)`, the nominal stress of a homogeneous test over time.
+    Subclasses add their own constants to `parameters` and call `check`. They define `_modulus(times)`, the relaxation
+    modulus without the equilibrium, and `stress(mode, stretches, times=, between=)`, the nominal stress of a
+    homogeneous test over time.
 
     Args:
         equilibrium: material without history that describes the relaxed state; None if all stress relaxes.
@@ -107,7 +108,10 @@ class Relaxing(Material):
 
     @property
     def rest_stress(self) -> float:
-        """Stress dW/dF11 of the equilibrium energy at F = I, stress; relaxing branches have none."""
+        """Stress dW/dF11 of the equilibrium energy W at F = I, stress; 0 if all stress relaxes.
+
+        The forms remove it. Relaxing branches are stress-free at F = I.
+        """
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 
     @property
@@ -170,6 +174,8 @@ class Relaxing(Material):
         r"""Return the nominal stress in a test at a constant Hencky rate, from the reference configuration.
 
         .. math:: l(t) = \exp(\pm \dot\varepsilon t)
+
+        The sign is + for stretches above 1 and - for stretches below 1.
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial".

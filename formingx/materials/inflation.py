@@ -18,7 +18,7 @@ class Peak(NamedTuple):
     """First maximum of the pressure over the stretch in free inflation.
 
     Attributes:
-        stretch: stretch at the maximum.
+        stretch: hoop stretch of a tube, or equibiaxial stretch of a disc, at the maximum.
         pressure: pressure at the maximum, stress.
     """
 
@@ -27,7 +27,7 @@ class Peak(NamedTuple):
 
 
 class FreeInflation:
-    """Thin body in free inflation.
+    """Free inflation of a thin tube or disc of incompressible layers.
 
     Args:
         layers: pairs (material, reference thickness of the layer in units of length), one for each layer. All constants

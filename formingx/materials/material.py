@@ -114,13 +114,13 @@ class Material(Energies):
         return float(self._moduli(self._numbers(), 1)[1, 0])
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
-        """Return the shear moduli for all values that the constants have at quadrature points.
+        """Return the small-strain shear moduli for the values that varying constants have at quadrature points.
 
         Args:
-            sample: the points.
+            sample: quadrature points of a layer.
 
         Returns:
-            Modulus for each of the n distinct sets of values, shape (n,), stress.
+            Modulus for each of the n distinct sets of values of the constants, shape (n,), stress.
         """
         values = self._sampled(sample)
         return self._moduli(values, values.shape[1])[1]
@@ -199,7 +199,7 @@ class Material(Energies):
             mode: "uniaxial" (k = -1/2), "pure_shear" (k = 0) or "equibiaxial" (k = 1).
 
         Returns:
-            The stretch; infinity if there is none.
+            The stretch, above 1; infinity if the energy is finite for all stretches.
         """
         known(f"{self}: largest_stretch: mode", mode, MODES)
         if not math.isfinite(self.largest_I1):
@@ -209,13 +209,13 @@ class Material(Energies):
         return brentq(lambda l: l**2 + l**(2 * k) + l**(-2 - 2 * k) - self.largest_I1, 1, math.sqrt(self.largest_I1))
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the stretch beyond which the force decreases, when the material is stretched suddenly in a test.
+        """Return the stretch beyond which the force decreases, for a sudden stretch in a homogeneous test.
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial".
 
         Returns:
-            The stretch; infinity if there is none, as by default.
+            The stretch; infinity if the force always increases. The base class returns infinity.
         """
         return math.inf
 
@@ -345,10 +345,10 @@ class Material(Energies):
     def coordinates(self) -> list[tuple[float, float, float]]:
         """Return the variables that a fit changes in place of the constants; by default the constants.
 
-        All constants that follow from variables within their bounds are admissible.
+        All constants that follow from variables within their bounds are admissible (`constants_at`).
 
         Returns:
-            List of (value for the present constants, lowest, highest).
+            List of (value for the present constants, lower bound, upper bound).
         """
         return [(float(value), -math.inf, math.inf) for value in self._numbers()]
 

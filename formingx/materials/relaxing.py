@@ -92,7 +92,7 @@ class RelaxingMaterial(Relaxing):
 
     @property
     def tensor_powers(self) -> dict[str, int]:  # type: ignore[override]  # read only here
-        """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
+        """Internal variables that are tensors, {name: 1 for a tensor like C, -1 for one like its inverse}."""
         branches = {f"{self._tensor}_{k}": self._power for k, *_ in self._branches(self.parameters)}
         return {"C": 1} | branches if self._stores_C else branches
 
@@ -160,7 +160,12 @@ class RelaxingMaterial(Relaxing):
             for k, mu, _ in self._branches(constants))
 
     def dissipation(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the power per reference volume that the flow of all branches dissipates in a state.
+        r"""Return the power per reference volume that the flow of all branches dissipates in a state.
+
+        .. math:: \mathcal{D} = \sum_k \frac{\mu_k}{2 \tau_k} d_k(F, \text{internal variable})
+
+        For `Viscoelastic` :math:`d_k = |\mathrm{dev}(\bar F C_{v,k}^{-1} \bar F^T)|^2`, for `TransientNetwork`
+        :math:`d_k = \mathrm{tr}(\bar C A_k) + \mathrm{tr}(\bar C A_k)^{-1} - 6`. Bars denote isochoric parts.
 
         Args:
             F: deformation gradient in the state (UFL, shape (3, 3)).
@@ -195,7 +200,7 @@ class RelaxingMaterial(Relaxing):
     def updated(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> dict[str, Any]:
         """Return the internal variables at the end of a step in time.
 
-        They must be updated after steps of length 0 too, because the next step begins with the stored C.
+        They also change in steps of length 0, because the stored C is the value at the end of the step.
 
         Args:
             F: deformation gradient at the end of the step (UFL, shape (3, 3)).
@@ -323,7 +328,10 @@ class RelaxingMaterial(Relaxing):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the data of earlier states for a step of the branches: entries of the last C; None if not stored."""
+        """Return the data of earlier states that a step of the branches needs; None if no C is stored.
+
+        By default they are the entries of the isochoric C at the beginning of the step.
+        """
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:

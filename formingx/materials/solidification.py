@@ -100,7 +100,10 @@ class Solidification(Material):
 
     @property
     def flow_constants(self) -> tuple[str, ...]:
-        """Names of the constants that a step takes at its middle: flow constants of the base, and the fraction."""
+        """Names of the constants of which a step uses the values in its middle.
+
+        They are the flow constants of the base material, and the constant from which the solidified fraction follows.
+        """
         return (*self._base.flow_constants, "set_middle")
 
     @property
@@ -110,7 +113,7 @@ class Solidification(Material):
 
     @property
     def tensor_powers(self) -> dict[str, int]:  # type: ignore[override]  # read only here
-        """Internal variables that are positive definite tensors, {name: 1 if it is like C, -1 if like its inverse}."""
+        """Internal variables that are tensors, {name: 1 for a tensor like C, -1 for one like its inverse}."""
         return {**self._base.tensor_powers, _BEFORE: 1, _LAST: 1}
 
     @property
@@ -225,9 +228,9 @@ class _Fraction:
 
 
 def _fraction(between: Any, table: Any) -> _Fraction:
-    """Return the solidified fraction as a function; raise an InputError unless one argument is given and allowed.
+    """Return the solidified fraction phi(T) from the argument `between` or `fraction` of `Solidification`.
 
-    The arguments are `between` and `fraction` of `Solidification`.
+    Raise an InputError unless exactly one of them is given and allowed.
     """
     if (between is None) == (table is None):
         raise InputError(f"Solidification: between = {between!r}, fraction = {table!r}: give one of them: the"

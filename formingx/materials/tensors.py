@@ -17,7 +17,7 @@ def isochoric(F: Any) -> Entries:
         F: deformation gradient (UFL, shape (3, 3)).
 
     Returns:
-        Entries of the tensor.
+        Entries (11, 22, 12, 33) of the tensor.
     """
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
@@ -41,12 +41,12 @@ def plus(A: Entries, B: Entries, factor: Any) -> Entries:
     .. math:: A + c \, B
 
     Args:
-        A: entries of the first tensor.
-        B: entries of the second tensor.
+        A: entries (11, 22, 12, 33) of the first tensor.
+        B: entries (11, 22, 12, 33) of the second tensor.
         factor: factor c of the second tensor.
 
     Returns:
-        Entries of the sum.
+        Entries (11, 22, 12, 33) of the sum.
     """
     return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
 
@@ -57,8 +57,8 @@ def inner(A: Entries, B: Entries) -> Any:
     .. math:: A : B = \mathrm{tr}(A B) = A_{11} B_{11} + A_{22} B_{22} + 2 A_{12} B_{12} + A_{33} B_{33}
 
     Args:
-        A: entries of the first tensor.
-        B: entries of the second tensor.
+        A: entries (11, 22, 12, 33) of the first tensor.
+        B: entries (11, 22, 12, 33) of the second tensor.
 
     Returns:
         The inner product.
@@ -72,7 +72,7 @@ def determinant(A: Entries) -> Any:
     .. math:: \det A = A_{33} (A_{11} A_{22} - A_{12}^2)
 
     Args:
-        A: entries of the tensor.
+        A: entries (11, 22, 12, 33) of the tensor.
 
     Returns:
         The determinant.
@@ -86,10 +86,10 @@ def cofactor(A: Entries) -> Entries:
     .. math:: \mathrm{cof} \, A = \det(A) \, A^{-1}
 
     Args:
-        A: entries of the tensor.
+        A: entries (11, 22, 12, 33) of the tensor.
 
     Returns:
-        Entries of the cofactor.
+        Entries (11, 22, 12, 33) of the cofactor.
     """
     return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
 
@@ -100,8 +100,8 @@ def deviator_squared(C: Entries, B: Entries) -> Any:
     .. math:: |\mathrm{dev}(F B F^T)|^2 = \mathrm{tr}\,(C B)^2 - \tfrac{1}{3} (\mathrm{tr}\, C B)^2
 
     Args:
-        C: entries of the right Cauchy-Green tensor.
-        B: entries of a symmetric tensor in the reference configuration.
+        C: entries (11, 22, 12, 33) of the right Cauchy-Green tensor.
+        B: entries (11, 22, 12, 33) of a symmetric tensor in the reference configuration.
 
     Returns:
         The squared norm.

@@ -85,7 +85,11 @@ class Viscoelastic(RelaxingMaterial):
         return tuple(scale * g for g in grown)
 
     def _step_start(self, before, Cv, x):
-        """Return G (entries) and x' of the docstring of the class, from C_n, Cv_n and x = dt/tau."""
+        r"""Return G (entries) and x' of a step, see `Viscoelastic`, from C_n (or None), Cv_n and x = dt/tau.
+
+        .. math:: G = C_{v,n} + \frac{x}{2} C_n, \qquad
+                  x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
+        """
         if before is None:
             return Cv, x
         return plus(Cv, before, x / 2), x / 2 * (1 + x / 3 * inner(before, cofactor(Cv)))
@@ -137,9 +141,10 @@ class TransientNetwork(RelaxingMaterial):
         return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
 
     def _past(self, internal, time_step):
-        """Return (C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s)) with the symbols of the docstring of the class.
+        """Return C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s), the data of a step of `TransientNetwork`.
 
-        The last two are 0 if the previous motion is unknown; the last is reduced if BDF2 would be unstable.
+        Here n is the beginning of the step, and s its length over the length of the previous step. The last
+        two are 0 if the previous motion is unknown. The last is reduced if BDF2 would be unstable.
         """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow by more leave BDF2 unstable
@@ -168,7 +173,10 @@ class TransientNetwork(RelaxingMaterial):
         return plus(self._past_tensor(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _parabola_weight(x))
 
     def _past_tensor(self, past, A, x):
-        """Return M (entries) of the docstring of the class, for the result of `_past`, A_n and x = dt/tau."""
+        r"""Return the tensor M (entries) of a step, see `TransientNetwork`, from `_past`, A_n and x = dt/tau.
+
+        .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1})
+        """
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
@@ -179,14 +187,14 @@ class TransientNetwork(RelaxingMaterial):
 
 
 def _mean_decay(x: Any) -> Any:
-    """Return (1 - e^-x)/x (UFL), by its series for small x."""
+    """Return m(x) = (1 - e^-x)/x (UFL), by its series for x < 0.01."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
 
 
 def _parabola_weight(x: Any) -> Any:
-    """Return [x - 2 + (x + 2) e^-x]/x^2 (UFL), by its series for small x."""
+    """Return p(x) (1 + s)/s = [x - 2 + (x + 2) e^-x]/x^2 (UFL), by its series for x < 0.01."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
