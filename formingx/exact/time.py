@@ -83,7 +83,7 @@ class Body:
 
     @property
     def load(self) -> float:
-        """Load of the body in its present state, stress: nominal stress of a block, p of a wall, p R0/H0 of a balloon."""
+        """Load of the body in its present state, stress: nominal stress of a block, or p, or p R0/H0 of a balloon."""
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
