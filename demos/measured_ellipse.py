@@ -69,12 +69,13 @@ def predicted(path):
     The directions are those of the right stretch tensor; nowhere are the two strains alike.
     """
     wall = path.wall()
-    rest, now = (x[wall.triangles[:, 1:]] - x[wall.triangles[:, :1]] for x in (wall.rest, wall.now))
+    rest, now = (x[wall.triangles[:, 1:]] - x[wall.triangles[:, :1]]
+                 for x in (wall.reference_points, wall.deformed_points))
     F = np.einsum("mij,mjk->mki", np.linalg.inv(rest[..., :2]), now)
     C = np.einsum("mki,mkj->mij", F, F)
     found = {}
     for place in PLACES:
-        W = at(place, wall.now[:, :2], wall.now[:, 2:], np.ones(1), 12)[0]
+        W = at(place, wall.deformed_points[:, :2], wall.deformed_points[:, 2:], np.ones(1), 12)[0]
         xx, yy, xy = at(place, wall.middle[:, :2], C[:, [0, 1, 0], [0, 1, 1]], np.array([1, 1, -1]), 24)
         squares, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
         across = int(np.argmax(np.abs(axes[0])))               # the principal direction nearest x
@@ -93,7 +94,8 @@ def draw(path, rows, file):
     figure, axes = plots.figure(2, width=5)
     axes[0].get_gridspec().set_width_ratios([1, 2])         # the film is twice as long as wide
     wall = path.wall()
-    lines = axes[0].tricontourf(*wall.now[:, :2].T, wall.triangles, wall.now[:, 2], levels=np.arange(0, 13))
+    x, y, z = wall.deformed_points.T
+    lines = axes[0].tricontourf(x, y, wall.triangles, z, levels=np.arange(0, 13))
     axes[0].plot(*np.array(PLACES).T, "ko", markerfacecolor="w", markersize=5, clip_on=False)
     axes[0].set(xlabel="x, mm", ylabel="y, mm", aspect="equal", title="rise, mm")
     figure.colorbar(lines, ax=axes[0])

@@ -88,7 +88,7 @@ def form(sheet, mould):
 def minimum(wall):
     """Return the minimum over the part of the mean wall within a radius, and where."""
     near = cKDTree(wall.middle).query_ball_point(wall.middle, AROUND)
-    means = [np.average(wall.wall[rows], weights=wall.area_at_rest[rows]) for rows in near]
+    means = [np.average(wall.wall[rows], weights=wall.reference_area[rows]) for rows in near]
     k = int(np.argmin(means))
     return {"least_wall_around_mm": means[k], "least_around_at_mm": wall.middle[k].tolist()}
 
@@ -100,7 +100,7 @@ def numbers(path):
             "weight_g": part.weight, "draw_ratio": part.draw_ratio, "touching": path.filling("mould").touching[-1],
             "plug_force_N": float(np.abs(path["plug_force"]).max()), "states": len(path),
             "iterations": path.counts.iterations, "failures": path.counts.failures, "triangles": len(wall.wall),
-            "smallest_triangle_mm2": float(wall.area_at_rest.min()), "unknowns": path.problem.n_unknowns,
+            "smallest_triangle_mm2": float(wall.reference_area.min()), "unknowns": path.problem.n_unknowns,
             "seconds": path.counts.seconds}
 
 

@@ -222,11 +222,11 @@ def test_walls_of_a_rough_cup():
     """Mean walls of rings of the cup agree with the axisymmetric solid to 1 %."""
     sheet, solid = (fx.trace(scene, until=fx.pressure(0.4), progress=False) for scene in formed_in_cup(0.3, 0.05))
     wall, profile = sheet.wall(), solid.profile()
-    R = np.hypot(*wall.rest[wall.triangles].mean(1)[:, :2].T)
+    R = np.hypot(*wall.reference_points[wall.triangles].mean(1)[:, :2].T)
     exact = np.interp(R, profile.reference_radius, profile.thickness_ratio)
     for begin in np.arange(0.0, 1.0, 0.1):
         ring = (begin <= R) & (begin + 0.1 > R)
-        mean, should = (np.average(v[ring], weights=wall.area_at_rest[ring]) for v in (wall.ratio, exact))
+        mean, should = (np.average(v[ring], weights=wall.reference_area[ring]) for v in (wall.ratio, exact))
         assert mean == pytest.approx(should, rel=0.01)
 
 

@@ -185,7 +185,7 @@ def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
     for normal in ((0, 1, 0), (0, -1, 0)):                                          # along a plane of symmetry
         edge = wall.section((0, 0, 0), normal)
         assert edge["arc_length"][-1] == pytest.approx(cut["arc_length"][-1], abs=0.05) and np.ptp(edge["y"]) < 1e-8
-    assert wall.around((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.area_at_rest).sum() / 0.3)
+    assert wall.around((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.reference_area).sum() / 0.3)
     with pytest.raises(fx.InputError, match=r"normal = \(0, 0, 0\): must not be 0"):
         whole.wall().section((0, 0.15, 0), (0, 0, 0))
     whole.to_stl(tmp_path / "part.stl")
@@ -201,7 +201,7 @@ def test_trim_and_printed_squares_are_exact():
     d = np.array([(1, -1, -1), (-1, 1, 1), (3, -1, 3), (0, 1, 1), (1, 1, 1), (-1, 0, 0), (-1, -1, -1)], dtype=float)
     np.testing.assert_allclose(_positive_share(d), [1 / 4, 3 / 4, 15 / 16, 1, 1, 0, 0], atol=1e-15)
     path = fx.solve(disc(), to=0.001, increments=1)
-    wall, z = path.wall(), path.wall().now[:, 2]
+    wall, z = path.wall(), path.wall().deformed_points[:, 2]
     low, high = (path.part(trim=share * z[np.argmax(np.abs(z))]) for share in (0.2, 0.6))
     assert path.part().volume > low.volume > high.volume > 0 and low.scrap < high.scrap
     assert low.scrap == pytest.approx(1 - low.volume / path.part().volume, rel=1e-12)
@@ -351,7 +351,7 @@ def test_a_plug_goes_in_and_back_out(separates):
     end, begin = ([s for s in path.states if s.stage == stage][k].measures for stage, k in (("in", -1), ("out", 0)))
     assert begin["plug_force"] == pytest.approx(end["plug_force"], rel=1e-6) and end["plug_force"] > 0.01
     assert path.counts.failures < 3 and path.counts.iterations < 400
-    height, last = path.wall().now[:, 2], path.last.measures
+    height, last = path.wall().deformed_points[:, 2], path.last.measures
     if separates:
         assert np.abs(height).max() < 1e-9 and last["contact_area"] == last["plug_force"] == 0
         np.testing.assert_allclose(path.wall().ratio, 1.0, rtol=1e-9)
@@ -621,7 +621,7 @@ def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tm
     """The report warns of compression only without relaxed energy; without a screen it says that pictures lack."""
     path = fx.solve(disc(model=fx.Membrane(wrinkles=wrinkles)), to=0.001, increments=1)
     wall = path.wall()
-    monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, now=0.9 * wall.rest))
+    monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, deformed_points=0.9 * wall.reference_points))
     monkeypatch.setattr(shutil, "which", lambda program: None)
     monkeypatch.delenv("DISPLAY", raising=False)
     text = path.report(tmp_path / "report.html", density=1.0).read_text()

@@ -214,7 +214,7 @@ def test_nodes_of_a_sheet_in_space_are_written_and_compared(parts, tmp_path):
     found = fx.compare_nodes(path, file)
     assert found.maximum < 1e-12 and found.ours.shape == (len(rows) - 1, 3)
     lowest = found.ours[np.argmin(found.ours[:, 2])]
-    assert lowest[2] == pytest.approx(path.wall().now[:, 2].min(), rel=1e-9) and "(X, Y) = (" in str(found)
+    assert lowest[2] == pytest.approx(path.wall().deformed_points[:, 2].min(), rel=1e-9) and "(X, Y) = (" in str(found)
     assert found.plot() is not None
 
 

@@ -224,7 +224,7 @@ class Path(States):
         """Return the wall thickness of the part in a state (default: the last) as a table; collective.
 
         Returns:
-            A `Wall`, from the axis to the rim. In three dimensions a `WallInSpace`, triangle by triangle. Both have
+            A `Wall`, from the axis to the rim. In three dimensions a `SheetWall`, triangle by triangle. Both have
             `to_csv` and `to_excel`.
 
         Raises:

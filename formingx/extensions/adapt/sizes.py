@@ -33,7 +33,7 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
         wall = path.wall(state)
         if not len(factor):
             pairs, factor = _neighbours(wall.triangles), np.ones(len(wall.triangles))
-        a, b, c = (wall.now[wall.triangles[:, k]] for k in range(3))
+        a, b, c = (wall.deformed_points[wall.triangles[:, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normal[pairs.T]), -1, 1))
@@ -43,10 +43,10 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
                 part = np.maximum(allowed / np.maximum(found, allowed), _FINEST)
                 for triangle in pairs.T:
                     np.minimum.at(factor, triangle, part)
-    strictest = np.ones(len(wall.rest))
+    strictest = np.ones(len(wall.reference_points))
     np.minimum.at(strictest, wall.triangles.ravel(), np.repeat(factor, 3))
-    size = wall.to_nodes(np.sqrt(wall.area_at_rest / (np.sqrt(3) / 4)))         # equilateral ones
-    return wall.rest[:, :COORDINATES], _graded(wall.rest, wall.triangles, size * strictest)
+    size = wall.to_nodes(np.sqrt(wall.reference_area / (np.sqrt(3) / 4)))         # equilateral ones
+    return wall.reference_points[:, :COORDINATES], _graded(wall.reference_points, wall.triangles, size * strictest)
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:

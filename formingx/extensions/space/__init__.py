@@ -12,7 +12,7 @@ from .surface import Surface
 from .triangulated import solid
 
 
-class _OfFile(SolidTool):
+class _StoredFileTool(SolidTool):
     """Stand-in for a tool that was read from an STL file: a checkpoint stores only the name of the file."""
 
     def __init__(self, name: str):
@@ -25,7 +25,7 @@ class _OfFile(SolidTool):
 def _tool(shape: dict[str, Any]) -> SolidTool:
     """Return the tool that a checkpoint stores as {attribute of the tool: value}, such as {"name": "mould.stl"}."""
     if "profile" not in shape:
-        return _OfFile(shape["name"])
+        return _StoredFileTool(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
 
 

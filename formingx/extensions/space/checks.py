@@ -17,7 +17,7 @@ _SHARE = 1e-3              # share of the sheet's area in compression from which
 
 
 @register("end")
-def compressed(path: Any) -> Iterator[Finding]:
+def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
     """Find a membrane with compression in the last state that has no relaxed energy (tension field); collective.
 
     Args:
@@ -30,7 +30,7 @@ def compressed(path: Any) -> Iterator[Finding]:
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
         return
     wall = path.wall()
-    share = float(wall.area_at_rest[wall.wrinkled].sum() / wall.area_at_rest.sum())
+    share = float(wall.reference_area[wall.wrinkled].sum() / wall.reference_area.sum())
     if share >= _SHARE:
         place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
@@ -39,7 +39,7 @@ def compressed(path: Any) -> Iterator[Finding]:
 
 
 @register("start")
-def too_large(body: Any) -> Iterator[Finding]:
+def other_unit_of_length(body: Any) -> Iterator[Finding]:
     """Find tools from STL files that are more than 4 times as wide as the sheet: a file states no unit of length.
 
     Args:
@@ -91,7 +91,7 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
 
 
 @register("start")
-def across_planes(body: Any) -> Iterator[Finding]:
+def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
     """Find swept tools that lie across a plane of symmetry and are not symmetric about it; collective.
 
     Args:

@@ -13,11 +13,11 @@ from ...results.files.sheet import Sheet
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
-from .wall import WallInSpace
+from .wall import SheetWall
 
 
 @dataclass(frozen=True, repr=False)
-class PartInSpace(PartNumbers):
+class SheetPart(PartNumbers):
     """Numbers of a formed part in three dimensions, of the whole part also where a half or a quarter is modelled.
 
     Attributes:
@@ -62,8 +62,8 @@ class PartInSpace(PartNumbers):
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
-def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, units: Units,
-         planes: MirrorPlanes) -> PartInSpace:
+def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units: Units,
+         planes: MirrorPlanes) -> SheetPart:
     """Return the numbers of the formed part in a state.
 
     Args:
@@ -71,7 +71,7 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
         density: density in g/cm3, or None.
         trim: z of the plane at which the sheet is cut, length; the side away from the flat sheet is the part. None: no
             cut.
-        heights: must be empty: in three dimensions `WallInSpace.section` gives the wall along a cut.
+        heights: must be empty: in three dimensions `SheetWall.section` gives the wall along a cut.
         units: units of the labels.
         planes: mirror planes at which the modelled body ends.
 
@@ -85,23 +85,24 @@ def part(wall: WallInSpace, density: float | None, trim: Any, heights: Any, unit
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
     share = np.ones(len(wall.wall))
     if trim is not None:
-        level, z = finite("part: trim", trim), wall.now[:, 2]
+        level, z = finite("part: trim", trim), wall.deformed_points[:, 2]
         if not z.min() < level < z.max():
             raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
                              f" {z.max():.6g}")
         share = _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
     kept = share > 0
-    h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.area_at_rest * share)[kept]
+    h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.reference_area * share)[kept]
     volume, images = float((h * area).sum()), planes.factor
     mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
     whole = float((wall.wall * wall.area).sum())
     weight = None if density is None else units.mass(images * volume, positive("part: density", density))
-    return PartInSpace(images * volume, images * float(area.sum()), float(area.sum() / rest.sum()), mean,
-                       float(wall.wall[k]), tuple(wall.middle[k].tolist()),
-                       tuple(wall.rest[wall.triangles[k], :COORDINATES].mean(0).tolist()), float(wall.wall[k] / mean),
-                       float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
-                       weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
-                       planes.basis(None), units)
+    return SheetPart(images * volume, images * float(area.sum()), float(area.sum() / rest.sum()), mean,
+                     float(wall.wall[k]), tuple(wall.middle[k].tolist()),
+                     tuple(wall.reference_points[wall.triangles[k], :COORDINATES].mean(0).tolist()),
+                     float(wall.wall[k] / mean),
+                     float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
+                     weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
+                     planes.basis(None), units)
 
 
 def _positive_share(d: np.ndarray) -> np.ndarray:
@@ -118,7 +119,7 @@ def _positive_share(d: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, repr=False)
-class FillingInSpace(Sheet):
+class SheetFilling(Sheet):
     """Filling of a tool by a sheet in each of the n states of a run.
 
     Attributes:
@@ -140,7 +141,7 @@ class FillingInSpace(Sheet):
         return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
 
 
-def filling(path: Any, contact: Any) -> FillingInSpace:
+def filling(path: Any, contact: Any) -> SheetFilling:
     """Return the filling of a tool by the sheet in all states of a run; collective.
 
     Args:
@@ -161,4 +162,4 @@ def filling(path: Any, contact: Any) -> FillingInSpace:
         rows.append((sum(touching) / sum(whole), max(gap)))
     name = path.columns[0]
     touched, gaps = np.array(rows).T
-    return FillingInSpace((name, path[name]), touched, gaps, comm)
+    return SheetFilling((name, path[name]), touched, gaps, comm)

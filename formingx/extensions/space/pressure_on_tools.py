@@ -38,7 +38,7 @@ class PressureOnTools:
 
     def __init__(self, surface: Any):
         self._surface = surface
-        self._touches, self._displacement, self._normal, *self._hessian = (
+        self._sliding, self._displacement, self._normal, *self._hessian = (
             fem.Function(surface.space) for _ in range(6))
 
     def work(self, value: Any, area: Any) -> Any:
@@ -52,11 +52,11 @@ class PressureOnTools:
             Virtual work (UFL linear form).
         """
         surface, v = self._surface, self._surface.test_displacement()
-        touches, displacement, normal, *hessian = (ufl.split(f)[0] for f in (
-            self._touches, self._displacement, self._normal, *self._hessian))
+        sliding, displacement, normal, *hessian = (ufl.split(f)[0] for f in (
+            self._sliding, self._displacement, self._normal, *self._hessian))
         n = normal + sum(h * (u - a) for h, u, a in zip(hessian, surface.u, displacement))
         full = _FULL * abs(value)
-        share = touches[0] * ufl.conditional(ufl.lt(touches[1], full), touches[1] / full, 1)
+        share = sliding[0] * ufl.conditional(ufl.lt(sliding[1], full), sliding[1] / full, 1)
         tangential = ufl.inner(area, v) - ufl.inner(area, n) * ufl.inner(n, v)
         return value * share * tangential * surface.dx(
             metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
@@ -68,7 +68,7 @@ class PressureOnTools:
         """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
-        functions = (self._touches, self._normal, *self._hessian)
+        functions = (self._sliding, self._normal, *self._hessian)
         for function in functions:
             function.x.array[:] = 0
         self._displacement.x.array[:] = surface.length * surface.w.x.array
@@ -76,8 +76,8 @@ class PressureOnTools:
             if face.present and not face.contact.sticks and face.history is not None:
                 rows, distances = face.law.contact_distances(face.positions(fields, control), face.history)
                 pressure = face.law.pressure(face.history)[rows]
-                touches = np.column_stack([np.ones(len(rows)), pressure, np.zeros(len(rows))])
-                columns = (touches, distances.normal, *distances.hessian.transpose(2, 0, 1))
+                sliding = np.column_stack([np.ones(len(rows)), pressure, np.zeros(len(rows))])
+                columns = (sliding, distances.normal, *distances.hessian.transpose(2, 0, 1))
                 for function, values in zip(functions, columns):
                     function.x.array[face.rule.dofs[rows]] = values
         for function in functions:

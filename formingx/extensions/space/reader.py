@@ -13,8 +13,8 @@ from ...solve.state import State
 from ...units import Units
 from . import part as parts
 from . import show
-from .part import FillingInSpace, PartInSpace
-from .wall import WallInSpace, wall_of
+from .part import SheetFilling, SheetPart
+from .wall import SheetWall, wall_of
 
 
 class SheetReader:
@@ -27,7 +27,7 @@ class SheetReader:
     def __init__(self, path: Path):
         self._path = path
 
-    def wall(self, state: State) -> WallInSpace:
+    def wall(self, state: State) -> SheetWall:
         """Return the wall thickness of each triangle in a state; collective.
 
         Args:
@@ -38,7 +38,7 @@ class SheetReader:
         """
         return wall_of(self._path, state)
 
-    def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> PartInSpace:
+    def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> SheetPart:
         """Return numbers of the whole formed part in a state: volume, walls, weight; collective.
 
         Args:
@@ -53,7 +53,7 @@ class SheetReader:
         """
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
-    def filling(self, contact: FaceContact) -> FillingInSpace:
+    def filling(self, contact: FaceContact) -> SheetFilling:
         """Return the filling of a tool in all states: share of the area in contact, and largest gap; collective.
 
         Args:

@@ -97,7 +97,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     found: list[Edge] = []
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
-    def to(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
+    def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
         """Add a piece from the last point to `point`, an arc if it has a centre, unless both points coincide."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
@@ -106,20 +106,20 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     if part != "quarter":
         start = 0.0 if part == "half" else -a + r
         last = (start, -b)
-        to((a - r, -b))
-        to((a, -b + r), (a - r, -b + r))
-    to((a, b - r))
-    to((a - r, b), (a - r, b - r))
+        add_piece((a - r, -b))
+        add_piece((a, -b + r), (a - r, -b + r))
+    add_piece((a, b - r))
+    add_piece((a - r, b), (a - r, b - r))
     if part == "whole":
-        to((-a + r, b))
-        to((-a, b - r), (-a + r, b - r))
-        to((-a, -b + r))
-        to((-a + r, -b), (-a + r, -b + r))
+        add_piece((-a + r, b))
+        add_piece((-a, b - r), (-a + r, b - r))
+        add_piece((-a, -b + r))
+        add_piece((-a + r, -b), (-a + r, -b + r))
         return found
-    to((0.0, b))
-    to((0.0, 0.0 if part == "quarter" else -b), name="x0")
+    add_piece((0.0, b))
+    add_piece((0.0, 0.0 if part == "quarter" else -b), name="x0")
     if part == "quarter":
-        to((a, 0.0), name="y0")
+        add_piece((a, 0.0), name="y0")
     return found
 
 
@@ -186,7 +186,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
             raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
     x = _chords(edges)
     edge_length = _Size(size)
-    areas, sizes = edge_length.sampled(x)
+    areas, sizes = edge_length.area_and_size(x)
     lines = several("sheet: reflected", reflected, "names")
     for k, name in enumerate(lines):
         known("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
@@ -255,7 +255,7 @@ class _Size:
             self.refused = self.refused or error
             return 1e22
 
-    def sampled(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return areas that together cover an outline, and the edge length in each of them, shape (m,) each.
 
         Args:

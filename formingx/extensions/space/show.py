@@ -49,20 +49,21 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     def draw():
         """Draw the part and the lines of the grid into the file, on rank 0."""
         pyvista = figures.pyvista()
-        below = wall.now[:, 2].min() < -wall.now[:, 2].max()            # look into the part
+        below = wall.deformed_points[:, 2].min() < -wall.deformed_points[:, 2].max()            # look into the part
         camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
-        lift = 0.004 * np.ptp(wall.now, axis=0).max() * camera / np.linalg.norm(camera)         # else lines flicker
-        values = wall.at_nodes / wall.to_nodes(wall.thickness_at_rest)
+        size = np.ptp(wall.deformed_points, axis=0).max()
+        lift = 0.004 * size * camera / np.linalg.norm(camera)           # else lines flicker
+        values = wall.at_nodes / wall.to_nodes(wall.reference_thickness)
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
             for scale, shift in images:
-                surface = pyvista.PolyData(wall.now * scale + shift, faces)
+                surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
                 surface["ratio"] = values
                 plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
                                      line_width=1.5)
-            look(plotter, camera, np.vstack([wall.now * scale + shift for scale, shift in images]))
+            look(plotter, camera, np.vstack([wall.deformed_points * scale + shift for scale, shift in images]))
     files.on_root(path.problem.comm, draw)
 
 
@@ -80,9 +81,9 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         at the points, shape (n,).
     """
     wall, planes = wall_of(path, state), path.scene.symmetry
-    on = [np.abs(wall.rest[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
-    corners = wall.now[wall.triangles]
-    normal, n = np.zeros_like(wall.now), len(wall.now)
+    on = [np.abs(wall.reference_points[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
+    corners = wall.deformed_points[wall.triangles]
+    normal, n = np.zeros_like(wall.deformed_points), len(wall.deformed_points)
     each = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     np.add.at(normal, wall.triangles.ravel(), np.repeat(each, 3, axis=0))
     for plane, mask in zip(planes.planes, on):
@@ -93,7 +94,8 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),
                            np.column_stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n])])
     triangles = np.concatenate([wall.triangles[:, ::-1], wall.triangles + n, side[:, ::-1]])
-    points, ratio = np.vstack([wall.now - normal, wall.now + normal]), np.tile(wall.to_nodes(wall.ratio), 2)
+    points = np.vstack([wall.deformed_points - normal, wall.deformed_points + normal])
+    ratio = np.tile(wall.to_nodes(wall.ratio), 2)
     kept = [np.tile(mask, 2) for mask in on]
     for k, plane in enumerate(planes.planes):                # the image, which shares the nodes in the plane
         image, away = np.arange(len(points)), ~kept[k]
@@ -121,7 +123,7 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
     def write(stream):
         """Write nodes, elements and shell sections of the part to an open text file."""
         stream.write("** formed part: shells with the wall of each element\n*NODE\n")
-        stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.now, 1))
+        stream.writelines(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(wall.deformed_points, 1))
         stream.write("*ELEMENT, TYPE=S3, ELSET=PART\n")
         stream.writelines(f"{k}, {a}, {b}, {c}\n" for k, (a, b, c) in enumerate(wall.triangles + 1, 1))
         for k, h in enumerate(wall.wall, 1):
@@ -148,9 +150,9 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     wall, last, comm = path.wall(), path.last, path.problem.comm
     planes, record = path.scene.symmetry, of_path(path)
     found = part(wall, density, trim, (), units, planes)
-    record.drawn = int(np.clip(_DRAWN // len(wall.rest), *_FRAMES))
+    record.drawn = int(np.clip(_DRAWN // len(wall.reference_points), *_FRAMES))
     drawn = interactive.data([record], [title or "run"], units, {"mesh": _mesh(path, record, units)})
-    size = np.ptp(wall.rest[:, :COORDINATES], axis=0).max() / 12
+    size = np.ptp(wall.reference_points[:, :COORDINATES], axis=0).max() / 12
     pictures: list[str] = []
     with TemporaryDirectory() as folder:
         for caption, grid in (("The wall over the original thickness.", None),
@@ -207,5 +209,5 @@ def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
         images = [[*scale, *shift] for scale, shift in record.planes.images(3, contact.tool.bounds)]
         tools.append({"name": name, "points": rounded(points.T), "triangles": triangles.T.tolist(), "images": images,
                       "moves": contact.way.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
-    return {"triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.now.T) for wall in walls],
+    return {"triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.deformed_points.T) for wall in walls],
             "fields": {name: [rounded(values) for values in each] for name, each in shown.items()}, "tools": tools}

@@ -104,7 +104,7 @@ class Surface(Formulation):
         Returns:
             Object with the methods of `Admissible`.
         """
-        return _Always()
+        return _AlwaysAdmissible()
 
     def set_stiff(self) -> None:
         """Set the unknowns to a small stretch in all directions, whose tension makes the tangent regular."""
@@ -161,7 +161,7 @@ class Surface(Formulation):
         return energy
 
 
-class _Always:
+class _AlwaysAdmissible:
     """Check of the volume ratio that always holds, in place of `Admissible`: a membrane has J > 0."""
 
     def holds(self) -> bool:
@@ -195,11 +195,11 @@ def relaxed(F: Any) -> Any:
     l1 = ufl.sqrt(ufl.conditional(ufl.gt(largest, 1), largest, 1))
     l2 = 1 / ufl.sqrt(l1)
 
-    def either(a: Any, b: Any) -> Any:
+    def select(a: Any, b: Any) -> Any:
         """Return expression a where the membrane is taut, else expression b."""
         return ufl.conditional(taut, a, b)
-    return ufl.as_tensor([[either(F[0, 0], l1), either(F[0, 1], 0), 0], [0, either(F[1, 1], l2), 0],
-                          [0, 0, either(F[2, 2], l2)]])
+    return ufl.as_tensor([[select(F[0, 0], l1), select(F[0, 1], 0), 0], [0, select(F[1, 1], l2), 0],
+                          [0, 0, select(F[2, 2], l2)]])
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:

@@ -19,35 +19,35 @@ from .surface import wrinkled
 
 
 @dataclass(frozen=True, repr=False)
-class WallInSpace(Sheet):
+class SheetWall(Sheet):
     """Wall thickness of a sheet of m triangles and n nodes in one state of a run; the same on all ranks.
 
     Attributes:
-        rest: reference positions of the n nodes, shape (n, 3), length.
-        now: deformed positions of the nodes, shape (n, 3), length.
+        reference_points: reference positions of the n nodes, shape (n, 3), length.
+        deformed_points: deformed positions of the nodes, shape (n, 3), length.
         triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
         layers: {layer: reference thickness in the middle of each triangle, shape (m,), length}.
         comm: MPI communicator of the run.
     """
 
-    rest: np.ndarray
-    now: np.ndarray
+    reference_points: np.ndarray
+    deformed_points: np.ndarray
     triangles: np.ndarray
     layers: Mapping[str, np.ndarray]
     comm: Any
 
     @cached_property
-    def area_at_rest(self) -> np.ndarray:
+    def reference_area(self) -> np.ndarray:
         """Reference area of each triangle, shape (m,), length^2."""
-        return np.linalg.norm(_normals(self.rest[self.triangles]), axis=1)
+        return np.linalg.norm(_normals(self.reference_points[self.triangles]), axis=1)
 
     @cached_property
     def area(self) -> np.ndarray:
         """Deformed area of each triangle, shape (m,), length^2."""
-        return np.linalg.norm(_normals(self.now[self.triangles]), axis=1)
+        return np.linalg.norm(_normals(self.deformed_points[self.triangles]), axis=1)
 
     @property
-    def thickness_at_rest(self) -> np.ndarray:
+    def reference_thickness(self) -> np.ndarray:
         """Reference thickness of all layers together in each triangle, shape (m,), length."""
         return np.sum(list(self.layers.values()), axis=0)
 
@@ -57,22 +57,23 @@ class WallInSpace(Sheet):
 
         It equals the reference area over the deformed area, as the volume is constant.
         """
-        return self.area_at_rest / self.area
+        return self.reference_area / self.area
 
     @property
     def wall(self) -> np.ndarray:
         """Deformed thickness of each triangle, shape (m,), length."""
-        return self.thickness_at_rest * self.ratio
+        return self.reference_thickness * self.ratio
 
     @cached_property
     def middle(self) -> np.ndarray:
         """Deformed position of the centroid of each triangle, shape (m, 3), length."""
-        return self.now[self.triangles].mean(1)
+        return self.deformed_points[self.triangles].mean(1)
 
     @cached_property
     def stretches(self) -> np.ndarray:
         """Principal stretches of each triangle in the surface, the larger first, shape (m, 2)."""
-        a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]] for x in (self.rest, self.now))
+        a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]]
+                for x in (self.reference_points, self.deformed_points))
         inverse = np.linalg.inv(a[..., :COORDINATES])  # the sheet is flat in the reference configuration
         F = np.einsum("mij,mjk->mki", inverse, b)
         return np.linalg.svd(F, compute_uv=False)
@@ -90,7 +91,7 @@ class WallInSpace(Sheet):
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the written file, with a row for each triangle: {name: values, shape (m,)}."""
-        X, x = self.rest[self.triangles].mean(1), self.middle
+        X, x = self.reference_points[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
         return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
                 "wall": self.wall, "wall_ratio": self.ratio, "stretch_1": self.stretches[:, 0],
@@ -107,7 +108,7 @@ class WallInSpace(Sheet):
         Returns:
             Deformed wall thickness, length.
         """
-        away = np.hypot(*(self.rest[:, :COORDINATES] - pair("at", (x, y))).T)
+        away = np.hypot(*(self.reference_points[:, :COORDINATES] - pair("at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
     def around(self, point: tuple[float, float, float], radius: float) -> float:
@@ -127,7 +128,7 @@ class WallInSpace(Sheet):
         near = away <= positive("around: radius", radius)
         if not near.any():
             return float(self.ratio[np.argmin(away)])
-        return float(np.average(self.ratio[near], weights=self.area_at_rest[near]))
+        return float(np.average(self.ratio[near], weights=self.reference_area[near]))
 
     def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
         """Return the wall thickness along the curve in which a plane cuts the deformed part.
@@ -145,8 +146,8 @@ class WallInSpace(Sheet):
         Raises:
             InputError: the plane does not meet the part.
         """
-        d = (self.now - triple("section: point", point)) @ direction("section: normal", normal)
-        size = 1e-9 * np.ptp(self.now, axis=0).max()
+        d = (self.deformed_points - triple("section: point", point)) @ direction("section: normal", normal)
+        size = 1e-9 * np.ptp(self.deformed_points, axis=0).max()
         beyond = size if d.min() < -size else -size         # where nodes on the plane count to; it may be a symmetry's
         d = np.where(np.abs(d) < size, beyond, d)
         sides = d[self.triangles] > 0
@@ -166,7 +167,7 @@ class WallInSpace(Sheet):
             while edge is not None:
                 i, j = edge
                 s = d[i] / (d[i] - d[j])
-                x, h = (v[i] + s * (v[j] - v[i]) for v in (self.now, self.at_nodes))
+                x, h = (v[i] + s * (v[j] - v[i]) for v in (self.deformed_points, self.at_nodes))
                 step = np.inf if before is None else float(np.linalg.norm(x - before))
                 if step > size:
                     length += 0.0 if before is None else step
@@ -193,21 +194,21 @@ class WallInSpace(Sheet):
                 triangles.
         """
         size, found = positive("printed: size", size), []
-        sides = np.ptp(self.rest[:, :COORDINATES], axis=0)
+        sides = np.ptp(self.reference_points[:, :COORDINATES], axis=0)
         if np.prod(sides) > MAX_TRIANGLES * size * size:
             raise InputError(f"printed: size = {size!r}: would make more than {MAX_TRIANGLES} squares on the sheet,"
                              f" whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
         edges = edges_of(self.triangles)[1]
         for axis in (0, 1):
-            a, b = self.rest[edges[:, 0]], self.rest[edges[:, 1]]
-            low, high = self.rest[:, axis].min(), self.rest[:, axis].max()
+            a, b = self.reference_points[edges[:, 0]], self.reference_points[edges[:, 1]]
+            low, high = self.reference_points[:, axis].min(), self.reference_points[:, axis].max()
             for k in range(int(np.ceil(low / size)), int(np.floor(high / size)) + 1):
                 at = k * size + 1e-9 * size * (1 if k * size < (low + high) / 2 else -1)
                 cut = (a[:, axis] - at) * (b[:, axis] - at) < 0
                 s = ((at - a[cut, axis]) / (b[cut, axis] - a[cut, axis]))[:, None]
                 order = np.argsort((a[cut] + s * (b[cut] - a[cut]))[:, 1 - axis])
                 i, j = edges[cut].T
-                line = (self.now[i] + s * (self.now[j] - self.now[i]))[order]
+                line = (self.deformed_points[i] + s * (self.deformed_points[j] - self.deformed_points[i]))[order]
                 if len(line) > 1:
                     found.append(line)
         return found
@@ -221,13 +222,13 @@ class WallInSpace(Sheet):
         Returns:
             Values at the n nodes, shape (n,).
         """
-        total, weight = np.zeros(len(self.rest)), np.zeros(len(self.rest))
-        np.add.at(total, self.triangles.ravel(), np.repeat(values * self.area_at_rest, 3))
-        np.add.at(weight, self.triangles.ravel(), np.repeat(self.area_at_rest, 3))
+        total, weight = np.zeros(len(self.reference_points)), np.zeros(len(self.reference_points))
+        np.add.at(total, self.triangles.ravel(), np.repeat(values * self.reference_area, 3))
+        np.add.at(weight, self.triangles.ravel(), np.repeat(self.reference_area, 3))
         return total / weight
 
 
-def wall_of(path: Any, state: Any) -> WallInSpace:
+def wall_of(path: Any, state: Any) -> SheetWall:
     """Return the wall thickness of a sheet in a state; collective.
 
     The order of nodes and triangles does not depend on the number of ranks.
@@ -258,7 +259,7 @@ def wall_of(path: Any, state: Any) -> WallInSpace:
     turned = _normals(rest[first][triangles])[:, 2] < 0
     triangles[turned] = triangles[turned][:, ::-1]
     layers = {name: gathered(comm, values)[order] for name, values in h.items()}
-    return WallInSpace(rest[first], moved[first], triangles, layers, comm)
+    return SheetWall(rest[first], moved[first], triangles, layers, comm)
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:
