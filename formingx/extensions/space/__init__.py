@@ -13,7 +13,7 @@ from .triangulated import solid
 
 
 class _StoredFileTool(SolidTool):
-    """Stand-in for a tool that was read from an STL file: a checkpoint stores only the name of the file."""
+    """Tool of a checkpoint that stores only the name of the STL file from which the tool was read, not its surface."""
 
     def __init__(self, name: str):
         self.name = name
@@ -23,7 +23,7 @@ class _StoredFileTool(SolidTool):
 
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
-    """Return the tool that a checkpoint stores as {attribute of the tool: value}, such as {"name": "mould.stl"}."""
+    """Return a tool from the data of a checkpoint, {attribute of the tool: value}, such as {"name": "mould.stl"}."""
     if "profile" not in shape:
         return _StoredFileTool(shape["name"])
     return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])

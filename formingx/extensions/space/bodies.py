@@ -23,10 +23,10 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
         caller: name of the caller, for messages.
 
     Returns:
-        Triangles of each group as vertex numbers, shape (k, 3). The surface of a cavity belongs to the body around it.
+        For each group the vertex numbers of its triangles, shape (k, 3). A cavity belongs to the body around it.
 
     Raises:
-        InputError: a body is inside out, and is no cavity of another body.
+        InputError: the triangles of a body look inward, and the body is not a cavity of another body.
     """
     bodies = [triangles[part] for part in _parts(points, triangles)]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
@@ -69,7 +69,7 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
-    """Return, for each body, the numbers of its triangles, shape (k,).
+    """Return for each body the indices of its k triangles in `triangles`, shape (k,).
 
     A body is a set of triangles connected by edges. At an edge of more than two triangles, only the two triangles with
     the solid between them are connected (see `_wedges`).
@@ -89,11 +89,11 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
-    """Return the pairs of triangles at a common edge with the solid between them, as indices of `triangles`.
+    """Return the pairs of triangles at a common edge between which lies solid, as indices of `triangles`, shape (2,).
 
-    In the sense of rotation about the edge, from vertex edge[0] to edge[1], the solid begins at a triangle that
-    contains the edge reversed. It ends at the next triangle that contains the edge forward. Where two wedges of solid
-    meet in a face, the wedge that ends there comes first.
+    The triangles are sorted by their angle about the edge, counter-clockwise seen against its direction from edge[0] to
+    edge[1]. A wedge of solid begins at a triangle that contains the reversed edge. It ends at the next triangle that
+    contains the edge forward. Where a wedge ends and another begins at the same angle, the end comes first.
 
     Args:
         points: vertices, shape (n, 3), length.

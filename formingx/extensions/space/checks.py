@@ -18,7 +18,8 @@ _SHARE = 1e-3              # share of the sheet's area in compression from which
 
 @register("end")
 def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
-    """Find a membrane with compression in the last state that has no relaxed energy (tension field); collective.
+    """Find a membrane without relaxed energy (tension-field theory) that is in compression in the last state;
+    collective.
 
     Args:
         path: the computed `Path`.
@@ -63,8 +64,9 @@ def other_unit_of_length(body: Any) -> Iterator[Finding]:
 def coarse_fillets(body: Any) -> Iterator[Finding]:
     """Find concave fillets of tools on which a sheet slides, with a radius below the length of its edges; collective.
 
-    Half of the edges are longer than the radius. Such triangles are chords of about a radian, and the direction of the
-    pressure jumps from node to node. Newton's method may diverge, or the sheet snaps between positions on the chords.
+    A fillet is reported if its radius is below the median length of the edges of triangles. The direction of the
+    pressure then changes by about a radian from triangle to triangle. Newton's method may diverge, or the sheet snaps
+    from one position on the fillet to another.
 
     Args:
         body: the examined body, whose `scene` has the contacts.
@@ -92,7 +94,7 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
-    """Find swept tools that lie across a plane of symmetry and are not symmetric about it; collective.
+    """Find swept tools that cross a plane of symmetry of the scene without being symmetric about it; collective.
 
     Args:
         body: the examined body, whose `scene` has the contacts.

@@ -38,8 +38,8 @@ class Distances(NamedTuple):
 
     Attributes:
         distance: signed distances from the surface of the tool, positive inside, shape (n,), length.
-        normal: gradients of the distance by the position, shape (n, 3).
-        hessian: second derivatives of the distance by the position, shape (n, 3, 3), 1/length.
+        normal: gradients of the distance with respect to the position, unit vectors into the tool, shape (n, 3).
+        hessian: second derivatives of the distance with respect to the position, shape (n, 3, 3), 1/length.
     """
 
     distance: np.ndarray
@@ -50,13 +50,14 @@ class Distances(NamedTuple):
 class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
 
-    The history variables (`ContactHistory`) have this meaning: `position` is the position at the last accepted state,
-    and `slip` the elastic slip, shape (n, 3), length. For a point in contact `distance` is the pressure at that state
-    over k. The depth of the point `arrival` in the tool is N_0/k, with the pressure N_0 that limits friction.
+    The equations are stated in the module. The history variables (`ContactHistory`) have these meanings. `position` is
+    the position at the last accepted state, and `slip` the elastic slip there, shape (n, 3), length. For a point in
+    contact `distance` is the pressure at this state over the penalty k. `arrival` is a position at the depth N_0/k in
+    the tool, with the pressure N_0 that limits friction.
 
     Args:
-        tool: tool with a method `distances`, which returns distances with first and second derivatives.
-        mu: coefficient of friction, 0 for none.
+        tool: tool with a method `distances` (see `Distances`).
+        mu: coefficient of friction, 0 for contact without friction.
         k: penalty, stress/length.
         theta: a point is in contact where its signed distance exceeds -theta, length.
         elastic_slip: elastic slip at which a point begins to slide, length.
@@ -83,7 +84,7 @@ class LaggedFriction(LaggedStick):
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
     def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the points in contact that are in tension, because they lie outside the tool.
+        """Return the mask of the points in contact that are in tension: the points outside the tool.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
@@ -95,7 +96,14 @@ class LaggedFriction(LaggedStick):
         return self.in_contact(old) & (self.distance(x) < -SMALL_GAP * self.theta)
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the history variables of points that begin at positions x, shape (n, 3), length, without slip."""
+        """Return the history variables of points at the start of a run, without slip.
+
+        Args:
+            x: positions relative to the tool, shape (n, 3), length.
+
+        Returns:
+            History variables of the n points.
+        """
         return super().start(x)._replace(slip=np.zeros_like(x))
 
     def pressure(self, history: ContactHistory) -> np.ndarray:
@@ -105,15 +113,18 @@ class LaggedFriction(LaggedStick):
             history: history variables of the state.
 
         Returns:
-            Contact pressure of each point, shape (n,), stress; 0 for open points.
+            Contact pressure of each point, shape (n,), stress; 0 for open points and in tension.
         """
         return np.asarray(self.k * np.maximum(history.distance, 0.0))
 
     def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
-        """Return the constant contact pressure that limits friction during the next step.
+        """Return the contact pressure N_0 that limits friction during the next step, in which it is constant.
+
+        It is the penalty times the depth of `ContactHistory.arrival`, at most 10 times above or below the last
+        pressure.
 
         Args:
-            old: history variables of the last accepted state, with the predicted positions `ContactHistory.arrival`.
+            old: history variables of the last accepted state.
 
         Returns:
             Pressure of each point, shape (n,), stress.
@@ -127,34 +138,35 @@ class LaggedFriction(LaggedStick):
         return self._ahead[1]
 
     def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
-        """Return the predicted positions `ContactHistory.arrival` for which `pressure_ahead` returns a given pressure.
+        """Return the positions `ContactHistory.arrival` for which `pressure_ahead` returns a given pressure.
 
         Args:
             old: history variables of the last accepted state.
-            pressure: pressure of each point that is to limit friction, shape (n,), stress.
+            pressure: pressure N_0 of each point, shape (n,), stress.
 
         Returns:
-            Predicted positions, shape (n, 3), length.
+            Positions relative to the tool, shape (n, 3), length.
         """
         change = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + change[:, None] * self.tool.distances(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the contact tractions, linearised at the positions that the previous Newton iteration predicted.
+        """Compute the contact tractions at positions x, linearised at predicted positions.
 
-        A point that slid in the previous iteration and now moves backwards sticks for one iteration. Otherwise Newton's
-        method would oscillate over the narrow range of elastic slip.
+        A point that slid in the previous Newton iteration, and now slips in the opposite direction, sticks for one
+        iteration. Otherwise Newton's method would oscillate over the narrow range of elastic slip.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
             old: history variables of the last accepted state.
             sense: direction of sliding in the previous iteration, shape (n,): angle in the tangent plane, 0 for a point
                 that did not slide. None in the first iteration.
-            expected: predicted positions, with distances; None: linearised at x.
+            expected: positions predicted by the previous iteration, with distances to first order; None: linearise at
+                x.
 
         Returns:
-            Tractions with their stiffness and the new history variables.
+            Tractions per reference area, stress, with their stiffness and functions for the new history variables.
         """
         assert old is not None
         positions, zero = x if expected is None else expected.position, np.zeros(len(x))
@@ -172,7 +184,7 @@ class LaggedFriction(LaggedStick):
         stiff = self.mu * self.pressure_ahead(old)[rows] / np.where(slides, size, self.elastic_slip)
 
         def stiffness() -> np.ndarray:
-            """Return the derivative of the tractions by the positions, shape (n, 3, 3), stress/length."""
+            """Return the derivative of the tractions with respect to the positions, shape (n, 3, 3), stress/length."""
             hessian = distances.hessian
             bends = outer(n, np.einsum("nij,nj->ni", hessian, moved)) + along[:, None, None] * hessian
             dg = np.eye(3) - outer(n, n) - bends
@@ -183,7 +195,7 @@ class LaggedFriction(LaggedStick):
             return found
 
         def history() -> ContactHistory:
-            """Return the history variables of the state after it is accepted."""
+            """Return the history variables of the n points if the state at x is accepted."""
             slip = np.zeros_like(x)
             slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
             depth = self.distance(x)
@@ -214,14 +226,14 @@ class LaggedFriction(LaggedStick):
         return rows, self._distances(x[rows])
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and normals of the points in contact, to predict them to first order in the next iteration.
+        """Return distances and normals at x, from which the next Newton iteration predicts distances to first order.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
             old: history variables of the last accepted state.
 
         Returns:
-            Distances and normals at x; 0 for open points. All slips are 0.
+            `Motion` with distances and normals of points in contact; 0 for open points. All slips are 0.
         """
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
@@ -230,7 +242,7 @@ class LaggedFriction(LaggedStick):
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 
     def _distances(self, x: np.ndarray) -> Distances:
-        """Return distances, normals and Hessians of points x, shape (n, 3); the last result is stored."""
+        """Return distances, normals and Hessians at positions x, shape (n, 3), length; the last result is stored."""
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.tool.distances(x)
         return self._last[1]

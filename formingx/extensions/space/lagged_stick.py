@@ -37,11 +37,11 @@ SMALL_GAP = 1e-3
 class LaggedStick(ContactLaw):
     """Contact law of points that stick where they crossed a tool in three dimensions.
 
-    The history variables (`ContactHistory`) of a sticking point are its sticking position and the distance 0. Of an
-    open point they are its position at the last accepted state, and its signed distance there, below -theta.
+    The history variables (`ContactHistory`) of a sticking point are its sticking position and the distance 0. The
+    history variables of an open point are its position at the last accepted state, and a distance below -theta.
 
     Args:
-        tool: tool with a signed distance.
+        tool: tool with a method `signed_distance`.
         k: penalty, stress/length.
         theta: a point sticks where its signed distance exceeds -theta, length.
         separates: True if points in tension separate at the end of a step, see `pulling`.
@@ -77,7 +77,10 @@ class LaggedStick(ContactLaw):
         return old.distance > -self.theta
 
     def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the sticking points in tension, which lie outside the tool and may separate.
+        """Return the mask of the sticking points in tension, which separate at the end of a step.
+
+        A point is in tension if its distance outside the tool exceeds 0.01 of its distance from the sticking position,
+        and 0.001 theta. Without `separates` no point is in the mask.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
@@ -125,7 +128,7 @@ class LaggedStick(ContactLaw):
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions by which the penalty keeps sticking points at their sticking positions.
+        """Compute the tractions k (x - x_0) of sticking points with sticking positions x_0; 0 for open points.
 
         The law computes no normals: the normal traction (`Tractions.normal`) is 1 for a sticking point, 0 for an open
         one.
@@ -144,14 +147,14 @@ class LaggedStick(ContactLaw):
         force[sticking] = self.k * (x[sticking] - old.position[sticking])
 
         def stiffness() -> np.ndarray:
-            """Return the derivative of the tractions by the positions, shape (n, 3, 3), stress/length."""
+            """Return the derivative of the tractions with respect to the positions, shape (n, 3, 3), stress/length."""
             found = np.zeros((*x.shape, x.shape[1]))
             found[sticking] = self.k * np.eye(x.shape[1])
             return found
         return Tractions(force, sticking.astype(float), zero, zero, stiffness, lambda: self._history(x, old, sticking))
 
     def _history(self, x: np.ndarray, old: ContactHistory, sticking: np.ndarray) -> ContactHistory:
-        """Return the history variables after a state with positions x is accepted: new points stick where they crossed.
+        """Return the history variables if a state at x is accepted; points that closed stick where they met the tool.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.

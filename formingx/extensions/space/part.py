@@ -18,7 +18,7 @@ from .wall import SheetWall
 
 @dataclass(frozen=True, repr=False)
 class SheetPart(PartNumbers):
-    """Numbers of a formed part in three dimensions, of the whole part also where a half or a quarter is modelled.
+    """Numbers of a whole formed part in three dimensions, also if only a half or a quarter of it is modelled.
 
     Attributes:
         volume: volume, length^3.
@@ -32,10 +32,10 @@ class SheetPart(PartNumbers):
         variation: standard deviation of the wall thickness over the surface, over its mean.
         weight: weight in grams if a density in g/cm3 was given; else None.
         scrap: volume that is trimmed off over the volume of the sheet.
-        wrinkled: part of the reference area that is in compression.
-        basis: text that says of which part volume, area and weight are, such as the whole of a modelled quarter; "" if
-            the part was modelled as a whole.
-        units: units of the labels.
+        wrinkled: share of the reference area that is in compression.
+        basis: text that states from which modelled part volume, area and weight were computed, such as a quarter; ""
+            if the whole part was modelled.
+        units: units of the labels in `rows`.
     """
 
     volume: float
@@ -69,9 +69,9 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
     Args:
         wall: wall of the sheet in the state.
         density: density in g/cm3, or None.
-        trim: z of the plane at which the sheet is cut, length; the side away from the flat sheet is the part. None: no
-            cut.
-        heights: must be empty: in three dimensions `SheetWall.section` gives the wall along a cut.
+        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet.
+            None: no cut.
+        heights: must be empty, since `SheetWall.section` gives the wall along a cut.
         units: units of the labels.
         planes: mirror planes at which the modelled body ends.
 
@@ -79,7 +79,7 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
         Numbers of the whole part.
 
     Raises:
-        InputError: heights are given, a trim that the part does not pass, or a density that is not positive.
+        InputError: heights are given, the plane of `trim` does not meet the part, or the density is not positive.
     """
     if len(tuple(heights)):
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
@@ -106,10 +106,10 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
 
 
 def _positive_share(d: np.ndarray) -> np.ndarray:
-    """Return the share of each triangle's area on which a linear field is positive, shape (m,).
+    """Return the share of the area of each of m triangles on which a linear field is positive, shape (m,).
 
     Args:
-        d: values of the field at the corners of m triangles, shape (m, 3).
+        d: values of the field at the corners of the triangles, shape (m, 3).
     """
     alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
     a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
@@ -123,10 +123,10 @@ class SheetFilling(Sheet):
     """Filling of a tool by a sheet in each of the n states of a run.
 
     Attributes:
-        control: name of the first column of the run, such as "pressure", and its values, shape (n,).
+        control: name of the first column of the run, such as "pressure", and its value in each state, shape (n,).
         touching: share of the reference area that is in contact, or nearer to the tool than a tenth of the thickness,
-            shape (n,).
-        gap: largest distance of the sheet from the tool, shape (n,), length.
+            in each state, shape (n,).
+        gap: largest distance of the sheet from the tool in each state, shape (n,), length.
         comm: MPI communicator of the run.
     """
 

@@ -27,10 +27,14 @@ _FULL = 1 / 3              # contact over applied pressure from which on all of 
 
 
 class PressureOnTools:
-    """Virtual work that removes the tangential part of the pressure at the nodes that slide on tools.
+    r"""Virtual work that removes the tangential part of the pressure at the nodes that slide on tools.
 
-    The forms contain the normal of the tool as n + H (u - u_0), with the displacement u, the present displacement u_0,
-    and the derivative H of the normal. So its derivative at u = u_0 is exact.
+    The forms contain the normal n of the tool to first order in the displacement u,
+
+    .. math:: n(u) = n(u_0) + H (u - u_0)
+
+    with the present displacement u_0 and the Hessian H of the distance from the tool. The tangent of the forms is
+    therefore exact at u_0.
 
     Args:
         surface: forms of the sheet, a `Surface`.
@@ -45,7 +49,7 @@ class PressureOnTools:
         """Return the virtual work of the tangential part of a pressure, to be subtracted from the residual.
 
         Args:
-            value: the pressure (UFL scalar, stress).
+            value: applied pressure (UFL scalar, stress).
             area: deformed area vector per unit reference area (UFL, shape (3,)).
 
         Returns:
@@ -64,7 +68,8 @@ class PressureOnTools:
     def refresh(self) -> None:
         """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
 
-        They are a mask of the nodes that slide on tools, their contact pressures, and the normals of the tools.
+        The coefficients are a mask of the nodes that slide on tools, the contact pressures at these nodes, the normals
+        of the tools and their derivatives. The pressures are those of the last accepted state.
         """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)

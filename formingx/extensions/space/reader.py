@@ -18,7 +18,9 @@ from .wall import SheetWall, wall_of
 
 
 class SheetReader:
-    """Results of a run of a sheet in three dimensions, for the methods of `Path` (`formingx.results.reader.Reader`).
+    """Evaluation of a run of a sheet in three dimensions, which the methods of `Path` call.
+
+    It implements the interface `formingx.results.reader.Reader`.
 
     Args:
         path: the computed `Path`.
@@ -75,7 +77,7 @@ class SheetReader:
         show.view(self._path, state, file, grid)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the whole part in a state, with its wall thickness as distance of both sides.
+        """Return the closed surface of the whole part in a state, whose two sides are a wall thickness apart.
 
         Args:
             state: a `State` of the path.
@@ -107,9 +109,9 @@ class SheetReader:
 def shell_model(path: Path, file: Any, state: State | None = None) -> None:
     """Write a formed part in three dimensions as shell elements with their wall thickness, for a structural code.
 
-    The file is an input file for Abaqus or CalculiX (rank 0 writes). It contains the modelled part: a half or a quarter
-    must be constrained at its planes of symmetry. Each triangle is an S3 element whose section thickness is its wall.
-    The material must be added.
+    The file is an input file for Abaqus or CalculiX (rank 0 writes). It contains the modelled part. Each triangle is an
+    S3 element whose section thickness is its deformed wall thickness. The user adds the material POLYMER, and
+    constrains a half or a quarter at its planes of symmetry.
 
     Args:
         path: the computed `Path` of a sheet in three dimensions.

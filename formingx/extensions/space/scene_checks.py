@@ -86,7 +86,7 @@ def _check(name: str, function: Callable, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """Raise an InputError for models, heat, loads and supports that are not available in three dimensions.
+    """Raise an InputError for parts of a scene that are not available in three dimensions.
 
     Args:
         scene: the `Scene`.

@@ -32,8 +32,8 @@ class Sheet(Mesh):
     pressure. As boundaries of the mesh both faces contain all edges.
 
     Attributes:
-        of_size: function that returns a mesh of the same sheet with another edge length of triangles, a number or a
-            function of (x, y).
+        of_size: function that meshes the same sheet again; its argument is the edge length of the triangles, a number
+            or a function of (x, y).
     """
 
     of_size: Callable[[Any], Sheet] | None = None
@@ -45,7 +45,11 @@ class Sheet(Mesh):
                           f"layers: {', '.join(self.layers)}", f"boundaries: {', '.join(self.boundaries)}"])
 
     def facets_of(self, boundary: str) -> np.ndarray:
-        """Return the local numbers of the edges on a boundary; all local edges for the faces "bottom" and "top"."""
+        """Return the local numbers of the edges on a boundary, shape (k,); all edges for the faces "bottom" and "top".
+
+        Args:
+            boundary: name of the boundary.
+        """
         if boundary in ("bottom", "top"):
             edges = self.domain.topology
             edges.create_entities(1)
@@ -98,7 +102,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
     def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
-        """Add a piece from the last point to `point`, an arc if it has a centre, unless both points coincide."""
+        """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -226,10 +230,13 @@ def _chords(edges: list[Edge]) -> np.ndarray:
 
 
 class _Size:
-    """Edge length of triangles as a function for gmsh. As gmsh ignores errors, `refused` stores the first one.
+    """Edge length of triangles as a function for gmsh, which ignores exceptions.
 
     Args:
         size: edge length, a number or a function of (x, y).
+
+    Attributes:
+        refused: the first InputError of `size`, or None.
     """
 
     def __init__(self, size: Any):
@@ -256,7 +263,7 @@ class _Size:
             return 1e22
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return areas that together cover an outline, and the edge length in each of them, shape (m,) each.
+        """Return the areas of m pieces that together cover an outline, and the edge length in each, shape (m,) each.
 
         Args:
             x: corners of the outline, shape (n, 2), length.
@@ -276,7 +283,7 @@ class _Size:
 
 
 def _grid(edges: list[Edge], size: _Size) -> Grid:
-    """Return the triangles within an outline, by gmsh on one rank.
+    """Mesh the inside of an outline with triangles, by gmsh on one rank.
 
     Args:
         edges: pieces of the outline, in order.
@@ -327,7 +334,7 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
 
 
 def _reflected(grid: Grid, name: str) -> Grid:
-    """Return the triangles of a sheet together with their mirror image about a straight boundary, joined there.
+    """Return the mesh of a sheet joined with its mirror image about a straight boundary.
 
     Args:
         grid: triangles of the sheet.

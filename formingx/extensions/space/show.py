@@ -110,8 +110,8 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def shell_model(path: Any, file: Any, state: Any = None) -> None:
     """Write the modelled part as shell elements in an input file for Abaqus or CalculiX (rank 0 writes).
 
-    A half or a quarter must be constrained at its planes of symmetry. Each triangle is an S3 element whose section
-    thickness is its wall. The material must be added.
+    Each triangle is an S3 element whose section thickness is its deformed wall thickness. The user adds the material
+    POLYMER, and constrains a half or a quarter at its planes of symmetry.
 
     Args:
         path: the computed `Path`.
@@ -191,7 +191,7 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """Return data for the script `report.js` of a report: the sheet in each drawn state, and the tools.
+    """Return the data that the script `report.js` of a report draws: the sheet in each drawn state, and the tools.
 
     Args:
         path: the computed `Path`.

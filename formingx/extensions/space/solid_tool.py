@@ -30,7 +30,7 @@ class SolidTool:
 
     Attributes:
         components: number of coordinates, 3.
-        sized: False for a plane, whose drawing has no size.
+        sized: True if the surface is bounded; False for a plane, whose `bounds` have no meaning.
         shift: displacement (x, y, z) from the initial position, length, see `moved`.
     """
 
@@ -85,11 +85,11 @@ class SolidTool:
 
         Args:
             contact: the `Contact`, with its friction and regularisation.
-            k: penalty, stress/length, a number or one for each of n points, shape (n,).
+            k: penalty, stress/length, the same number at all points.
             thickness: thickness of the sheet, length, which scales the regularisation.
 
         Returns:
-            Contact law: sticking or sliding, lagged by a step.
+            `LaggedStick`, or `LaggedFriction` if the contact does not stick.
         """
         theta = contact.ramp * thickness
         if contact.sticks:
@@ -108,10 +108,11 @@ class SolidTool:
 class Swept(SolidTool):
     """Rigid tool whose profile (r, z) is swept along a curve in the plane of x and y.
 
-    The kind of the tool determines the coordinate r of a position. Of a revolved tool r is the distance from the axis
-    x = y = 0. Of a tool extruded along y it is x, along x it is y. Of a box it is min(half) on the outline of a
-    rectangle with rounded corners. There curves of constant r are parallel to this outline, and r is 0 on its middle
-    line.
+    The coordinate r of a position (x, y, z) depends on the kind of the tool:
+
+    * revolved: r is the distance from the axis x = y = 0;
+    * extruded along y: r is x; extruded along x: r is y;
+    * box: r is min(half) minus the distance inwards from the outline of a rectangle with rounded corners.
 
     Args:
         profile: profile in the plane (r, z), with the solid to its left.
@@ -133,7 +134,7 @@ class Swept(SolidTool):
             x: positions, shape (n, 3), length.
 
         Returns:
-            Distances, normals and Hessians at the n points.
+            Distances, normals and Hessians at the n points; normals point into the tool.
 
         >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).distances([[0.0, 0.0, -8.0]])
         >>> found.distance.tolist(), found.normal.tolist()
@@ -155,11 +156,11 @@ class Swept(SolidTool):
         return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the coordinate r of points x, shape (n, 3), that the profile is drawn over, with its derivatives.
+        """Return the profile coordinate r of points x, shape (n, 3), length, with its derivatives.
 
         Returns:
-            r, shape (n,), length; its gradient by x, shape (n, 3); curvature of the curve of constant r, shape (n,),
-            1/length.
+            r, shape (n,), length; gradient of r with respect to x, shape (n, 3); curvature of the curve of constant r
+            through each point, shape (n,), 1/length.
         """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
@@ -190,7 +191,7 @@ class Swept(SolidTool):
 
         Args:
             file: path of the STL file.
-            wall: distance of the flat bottom from the lowest point of the profile, length.
+            wall: distance of the flat bottom below the lowest point of the profile, length, positive.
 
         Raises:
             InputError: the tool is extruded, or its profile does not lead from r > 0 to r = 0.
@@ -220,7 +221,7 @@ class Swept(SolidTool):
         return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
 
     def _ring(self, r: float) -> np.ndarray:
-        """Return n points (x, y) of the curve that a point of the profile at r sweeps, shape (n, 2), length."""
+        """Return points (x, y) of the curve that the profile point at coordinate r sweeps, shape (n, 2), length."""
         turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2

@@ -99,7 +99,7 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return the admissibility check of a membrane (`Formulation.admissible`): every state passes, since J > 0.
+        """Return the check of the volume ratio (`Formulation.admissible`), which every state of a membrane passes.
 
         Returns:
             Object with the methods of `Admissible`.
@@ -107,7 +107,7 @@ class Surface(Formulation):
         return _AlwaysAdmissible()
 
     def set_stiff(self) -> None:
-        """Set the unknowns to a small stretch in all directions, whose tension makes the tangent regular."""
+        """Set the unknowns to a small equal stretch in both directions, whose tension makes the tangent regular."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
@@ -162,7 +162,7 @@ class Surface(Formulation):
 
 
 class _AlwaysAdmissible:
-    """Check of the volume ratio that always holds, in place of `Admissible`: a membrane has J > 0."""
+    """Check of the volume ratio in place of `Admissible`, which every state passes: a membrane has J > 0."""
 
     def holds(self) -> bool:
         """Return True: the volume ratio of a membrane is positive in every state."""
@@ -176,8 +176,8 @@ class _AlwaysAdmissible:
 def relaxed(F: Any) -> Any:
     """Return the deformation gradient whose energy is the relaxed energy of tension-field theory.
 
-    It is F where the membrane is taut, else simple tension in principal axes, or no deformation under compression in
-    both directions.
+    Where the membrane is taut, it is F. Where only the smaller principal stretch is compressive, it is simple tension
+    with the larger one, in principal axes. Where both are compressive, it is the identity.
 
     Args:
         F: deformation gradient of a membrane up to a rotation (UFL, shape (3, 3)), see `Surface`.
@@ -196,7 +196,7 @@ def relaxed(F: Any) -> Any:
     l2 = 1 / ufl.sqrt(l1)
 
     def select(a: Any, b: Any) -> Any:
-        """Return expression a where the membrane is taut, else expression b."""
+        """Return the UFL expression a where the membrane is taut, else b."""
         return ufl.conditional(taut, a, b)
     return ufl.as_tensor([[select(F[0, 0], l1), select(F[0, 1], 0), 0], [0, select(F[1, 1], l2), 0],
                           [0, 0, select(F[2, 2], l2)]])

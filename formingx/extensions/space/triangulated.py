@@ -15,9 +15,9 @@ from .solid_tool import SolidTool
 
 
 class Triangulated(SolidTool):
-    """Rigid tool that is a closed surface of triangles which look outward.
+    """Rigid tool bounded by a closed surface of triangles, whose normals point out of the tool.
 
-    VTK computes the exact distance to the triangles, with the sign of the normals at the nearest point.
+    VTK computes the exact distance to the triangles. The normal at the nearest point gives the sign.
 
     Args:
         points: vertices, shape (n, 3), length.
@@ -60,14 +60,15 @@ class Triangulated(SolidTool):
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
         """Compute the undercut area and the smallest draft of a mould for a direction of demoulding.
 
-        Only triangles inside the convex hull of the tool that lie in none of its other bodies count.
+        Only the triangles of the cavity count: inside the convex hull of the tool, and not inside another of its
+        bodies.
 
         Args:
-            along: direction in which the part leaves the mould, shape (3,).
+            along: direction in which the part leaves the mould, shape (3,), of any length.
 
         Returns:
             {"undercut_area": area of the triangles whose normal points against the direction, length^2, "least_draft":
-            smallest angle between the other triangles and the direction, degrees (90 for a floor)}.
+            smallest angle between another triangle and the direction, degrees; 90 if there is none}.
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)
@@ -99,8 +100,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
         The tool.
 
     Raises:
-        InputError: the file cannot be read, or is no closed surface whose triangles look outward; the message says
-            where it is open.
+        InputError: the file cannot be read, its surface is open (the message says where), or its triangles look inward.
 
     >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
     >>> cup.to_stl("mould.stl", wall=5.0)
@@ -120,7 +120,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
 
 
 def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices of all triangles of an STL file, shape (3 m, 3), and their numbers, shape (m, 3).
+    """Return the corners of the m triangles of an STL file, shape (3 m, 3), and their corner numbers, shape (m, 3).
 
     Raises:
         InputError: the file cannot be read, or is no STL file of a solid.

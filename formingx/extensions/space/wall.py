@@ -26,7 +26,7 @@ class SheetWall(Sheet):
         reference_points: reference positions of the n nodes, shape (n, 3), length.
         deformed_points: deformed positions of the nodes, shape (n, 3), length.
         triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
-        layers: {layer: reference thickness in the middle of each triangle, shape (m,), length}.
+        layers: {layer: reference thickness at the centroid of each triangle, shape (m,), length}.
         comm: MPI communicator of the run.
     """
 
@@ -55,7 +55,7 @@ class SheetWall(Sheet):
     def ratio(self) -> np.ndarray:
         """Deformed over reference thickness of each triangle, shape (m,).
 
-        It equals the reference area over the deformed area, as the volume is constant.
+        It equals the reference area over the deformed area, since the material is incompressible.
         """
         return self.reference_area / self.area
 
@@ -114,15 +114,18 @@ class SheetWall(Sheet):
     def around(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.
 
-        It is the mean over the triangles whose middle lies within a radius of the point, weighted with their reference
-        areas. If there is no such triangle, the nearest one counts.
+        The mean is taken over the triangles whose deformed centroid lies within a radius of the point, weighted with
+        their reference areas. If there is no such triangle, the ratio of the nearest triangle is returned.
 
         Args:
             point: position (x, y, z) on the deformed part, length.
-            radius: largest distance of the middle of a triangle from the point, length.
+            radius: radius about the point, length, positive.
 
         Returns:
             Deformed over reference thickness.
+
+        Raises:
+            InputError: a radius that is not positive.
         """
         away = np.linalg.norm(self.middle - triple("around: point", point), axis=1)
         near = away <= positive("around: radius", radius)
@@ -133,7 +136,7 @@ class SheetWall(Sheet):
     def section(self, point: tuple[float, float, float], normal: tuple[float, float, float]) -> dict[str, np.ndarray]:
         """Return the wall thickness along the curve in which a plane cuts the deformed part.
 
-        A cut may consist of several curves. The arc length of each then continues from the end of the curve before.
+        A cut may consist of several curves. The arc length then continues from one curve to the next.
 
         Args:
             point: a point (x, y, z) of the plane, length.
@@ -180,8 +183,8 @@ class SheetWall(Sheet):
     def printed(self, size: float) -> list[np.ndarray]:
         """Return the deformed lines of a square grid that is printed on the flat sheet.
 
-        On the flat sheet the lines are X = i size and Y = j size, with integers i and j. Each is a polyline with a
-        point where the line crosses an edge of a triangle.
+        On the flat sheet the lines are X = i size and Y = j size, with integers i and j. Each deformed line is a
+        polyline with a point at every edge of a triangle that it crosses.
 
         Args:
             size: edge length of the squares, length.
