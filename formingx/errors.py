@@ -360,7 +360,7 @@ def known(kind: str, name: Any, names: Any) -> None:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 
 
-def together(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
+def call_on_all_ranks(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
     """Call functions on all ranks, and raise an InputError on all ranks if one of them raises it; collective.
 
     Args:

@@ -338,9 +338,9 @@ def _tool_paths(body: Body) -> Found:
     for i, tool in enumerate(body.scene.items):
         if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
             continue
-        if body.scene.together(i)[0] != i:
+        if body.scene.same_tool(i)[0] != i:
             continue
-        contacts = [c for c in (body.scene.items[k] for k in body.scene.together(i)) if isinstance(c, Contact)]
+        contacts = [c for c in (body.scene.items[k] for k in body.scene.same_tool(i)) if isinstance(c, Contact)]
         travels = [entry.value for entry in body.prescribed if entry.item is tool]
         if any(value < 0 for value in travels):              # the tool is retracted, or pulls
             if travels[0] < 0 and tool.separates and tool is not body.scene.driven:     # otherwise refused by `trace`

@@ -153,7 +153,7 @@ class StepLimit:
     def __init__(self, problem: Any):
         self._n, heat = problem.n_owned, problem.scene.heat
         self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
-        self.several = not problem.scene.one_by_one
+        self.several = not problem.scene.one_node_per_step
         make = type(self).make_predictor
         self._predictor = make(self) if make else None
 

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
-from ..errors import together
+from ..errors import call_on_all_ranks
 from ..physics import kinematics as kin
 from .admissible import Admissible
 from .body_model import BodyModel
@@ -191,7 +191,7 @@ class Formulation(BodyModel):
             InputError: a material constant has no value at a temperature.
         """
         following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
-        together(self.comm, [entry.take_temperature for entry in following])
+        call_on_all_ranks(self.comm, [entry.take_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """Return the cells of some layers.

@@ -88,7 +88,7 @@ def force(value: float, *, of: str | None = None) -> Target:
                              f" driven" + ", say which with of=..." * bool(moving))
         number, item = next(iter(moving.items()))
         if item in scene.contacts:
-            tools = [scene.items[i] for i in scene.together(number)]
+            tools = [scene.items[i] for i in scene.same_tool(number)]
             return OfWholePart(_ToolForce(problem, [c for c in problem.contacts if c.contact in tools]),
                                tool_factor(scene, item))
         return OfWholePart(_SupportForce(problem, number), support_factor(scene, item))

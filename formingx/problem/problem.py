@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from ..contact.face import FaceContact
 from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
-from ..errors import InputError, together
+from ..errors import InputError, call_on_all_ranks
 from ..forms.admissible import WorstValue
 from ..forms.constraints import Constraints
 from ..forms.formulations import formulate
@@ -298,7 +298,8 @@ class Problem(Stages, Units):
         Raises:
             InputError: a constant or friction has no value at a temperature.
         """
-        together(self.comm, [self.forms.take_temperature, *(contact.take_temperature for contact in self.contacts)])
+        call_on_all_ranks(self.comm, [self.forms.take_temperature,
+                                      *(contact.take_temperature for contact in self.contacts)])
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..forms.schedule import StepData
-from ..scene.aims import beyond_all
+from ..scene.aims import implausible
 from ..scene.scene import Scene
 
 
@@ -42,7 +42,7 @@ class Units:
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
-        return beyond_all(self.scene, self.drives, self.shown(control)[1])
+        return implausible(self.scene, self.drives, self.shown(control)[1])
 
     @property
     def drives(self) -> str | None:

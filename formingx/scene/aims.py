@@ -63,25 +63,25 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
             and not driven.friction_by_temperature and driven.mu == 0:
         return f"{driven!r} can only push: the force must not be negative"
     if name.startswith("u_") and "_at_" in name and value != 0:
-        holds = _holder(scene, name, [t for t in active if t in scene.supports])
-        if holds is not None:
-            return f"{holds!r} holds that displacement"
+        found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
+        if found is not None:
+            return f"{found!r} holds that displacement"
     if name.endswith(("pressure", "travel")):
-        return beyond_all(scene, name.split("_")[-1], value)
+        return implausible(scene, name.split("_")[-1], value)
     if name == "pole_height":
         for contact in moulds:
-            if _beyond(scene, contact, value):
+            if _pole_in_tool(scene, contact, value):
                 return f"it lies inside the tool of {contact!r}"
     if name == "enclosed_volume" and driven is not None and driven.quantity == "pressure":
         for contact in moulds if scene.kinematics.components == 2 else ():
-            room, margin = _room(scene, contact)
+            room, margin = _mould_volume(scene, contact)
             room *= scene.symmetry_factor
             if value > margin * room:
                 return f"the tool of {contact!r} has room for {room:.4g}"
     return None
 
 
-def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
+def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     """Return the reason why a pressure or a travel is implausibly large for a scene.
 
     Args:
@@ -102,7 +102,7 @@ def beyond_all(scene: Scene, quantity: str | None, value: float) -> str | None:
     return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"
 
 
-def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
+def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
     """Return the support that constrains a displacement, or None; `name` is the name u_r_at_R_Z of a target."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
@@ -116,7 +116,7 @@ def _holder(scene: Scene, name: str, supports: list[Any]) -> Any:
     return None
 
 
-def _beyond(scene: Scene, contact: Any, height: float) -> bool:
+def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
     """Return True if a pole at this height would lie deeper in the tool of a contact than the thickness of the body."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
@@ -126,16 +126,16 @@ def _beyond(scene: Scene, contact: Any, height: float) -> bool:
     return float(depth) > Triangles(scene.mesh).thickness
 
 
-def _room(scene: Scene, contact: Any) -> tuple[float, float]:
+def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     """Return the volume between a body and its mould, and the largest plausible ratio of the true volume to it.
 
     For a flat body, squares outside the tool are counted if they are connected with the body in the reference
-    configuration. The volume is infinite if the mould is open. `_room_of_tube` treats a tube.
+    configuration. The volume is infinite if the mould is open. `_mould_volume_of_tube` treats a tube.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
     if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
-        return _room_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _MARGINS[1]
+        return _mould_volume_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _MARGINS[1]
     low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
     outline = contact.tool.bounds[1]
@@ -156,7 +156,7 @@ def _room(scene: Scene, contact: Any) -> tuple[float, float]:
     return volume, _MARGINS[0]
 
 
-def _room_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
+def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Return the volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if open.
 
     Args:

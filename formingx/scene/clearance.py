@@ -75,7 +75,7 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
-            if j <= i or j in scene.together(i) or not np.isfinite(where[i] + where[j]):
+            if j <= i or j in scene.same_tool(i) or not np.isfinite(where[i] + where[j]):
                 continue
             shift = where[i] * a.way - where[j] * b.way
             for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):

@@ -27,7 +27,7 @@ def check_start(scene: Any, contact: Contact) -> None:
     Raises:
         InputError: one of these conditions is violated, or the tool does not fit the kinematics.
     """
-    contact.friction_at(None if scene.temperature is None else scene.temperature.on(contact.on))
+    contact.friction_at(None if scene.temperature is None else scene.temperature.at_boundary(contact.on))
     mesh, near = scene.mesh, 1e-6 * max(scene.extent)
     if scene.kinematics.components != contact.tool.components:
         raise InputError(f"{contact!r}: a section takes tools drawn in its plane, a sheet in three dimensions"

@@ -133,7 +133,7 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     requested, spans = points[:, axes], np.ptp(nodes, axis=0)
     if len(axes) == 1:
         x, near = requested[:, 0], 1e-9 * spans[0]
-        _inside(table.name, points, names, (x >= nodes[0, 0] - near) & (x <= nodes[-1, 0] + near))
+        _check_inside(table.name, points, names, (x >= nodes[0, 0] - near) & (x <= nodes[-1, 0] + near))
         return np.interp(x, nodes[:, 0], low)
     if spans.min() <= 1e-9 * spans.max():
         name = names[int(np.argmin(spans))]
@@ -146,11 +146,11 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     except QhullError:
         raise InputError(f"{table.name}: its {len(nodes)} points lie on one line: give {names[0]} and T alone,"
                          f" {names[1]} and T alone, or points all around the body") from None
-    _inside(table.name, points, names, np.isfinite(found))
+    _check_inside(table.name, points, names, np.isfinite(found))
     return found
 
 
-def _inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
+def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
     """Raise an InputError unless the mask `inside` is True for all points; `name` is the name of a file."""
     if not np.all(inside):
         raise InputError(f"{name}: point {_first_false(points, inside, axes)} of the body lies outside the points of"

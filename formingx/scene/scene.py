@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, count, known, several, together
+from ..errors import InputError, call_on_all_ranks, count, known, several
 from ..materials.constants import OfMesh, Sample
 from ..materials.hyperelastic import Material
 from ..mesh.contact_columns import for_contacts
@@ -109,9 +109,9 @@ class Scene:
         self.mesh, self.preformed = mesh, preformed
         self._extent = np.ptp(span(mesh.domain, mesh.comm), axis=0)
         self.materials = dict(materials)
-        self.supports = _all_of(Support, "supports", supports, "supports, such as Clamped('rim')")
-        self.loads = _all_of(Load, "loads", loads, "loads, such as Pressure('bottom')")
-        self.contacts = _all_of(Contact, "contacts", contacts, "Contact(...)")
+        self.supports = _checked_items(Support, "supports", supports, "supports, such as Clamped('rim')")
+        self.loads = _checked_items(Load, "loads", loads, "loads, such as Pressure('bottom')")
+        self.contacts = _checked_items(Contact, "contacts", contacts, "Contact(...)")
         in_space = mesh.domain.geometry.dim == 3
         self.model: Any = model if model is not None else Membrane() if in_space else MixedPressure()
         if not isinstance(self.model, Model):
@@ -161,7 +161,7 @@ class Scene:
             heat.check(self)
             self.heat = heat
 
-    one_by_one = False
+    one_node_per_step = False
     """True if at most one node comes into contact in a step, for contacts with nodes_per_step=None."""
 
     temperature: GivenTemperature | None = None
@@ -208,9 +208,9 @@ class Scene:
     def drivable(self) -> list[Any]:
         """Loads, supports and contacts that a run can control; of a tool with several faces only the first contact."""
         return [item for i, item in enumerate(self.items)
-                if item.driven and self.together(i)[0] == i]
+                if item.driven and self.same_tool(i)[0] == i]
 
-    def together(self, number: int) -> list[int]:
+    def same_tool(self, number: int) -> list[int]:
         """Return the numbers of all contacts of the same moving tool: contacts with the same `direction` and name.
 
         Args:
@@ -322,7 +322,7 @@ class Scene:
             if not isinstance(name, str) or not name:
                 raise InputError(f"Scene: name = {name!r}: must be a word")
             called = [i for i, item in enumerate(self.items) if item.name == name]
-            if called != self.together(called[0]) and len(called) > 1:
+            if called != self.same_tool(called[0]) and len(called) > 1:
                 raise InputError(f"Scene: two items are called {name!r}: names must differ")
         columns = [self.column(item) for item in self.drivable]
         for column in columns:
@@ -371,7 +371,7 @@ class Scene:
         for layer, law in laws.items():
             known("Scene: expansion: layer", layer, self.mesh.layers)
             T: Any = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
-            together(self.mesh.comm, [partial(law.stretch, T)])
+            call_on_all_ranks(self.mesh.comm, [partial(law.stretch, T)])
         return dict(laws)
 
     def sample(self, layer: str) -> Sample:
@@ -432,7 +432,7 @@ class Scene:
         return "\n".join(f"{part:{width}}  {line}" for part, line in lines.items())
 
 
-def _all_of(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
+def _checked_items(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
     """Return an argument as a list; raise an InputError unless all entries are objects of the class `kind`.
 
     `name` is the name of the argument, `what` describes its entries in the message.

@@ -70,7 +70,7 @@ class MirrorPlanes:
         return 2 ** len(self.planes)
 
     @property
-    def words(self) -> str:
+    def part_name(self) -> str:
         """Name of the modelled part: "half", "quarter" or "eighth"; "" without a plane."""
         return _PARTS.get(len(self.planes), "")
 
@@ -83,7 +83,7 @@ class MirrorPlanes:
         Returns:
             The text; "" if the whole part is modelled, other than in plane strain.
         """
-        part = f"the whole part (a {self.words} was modelled)" if self.planes else "the part"
+        part = f"the whole part (a {self.part_name} was modelled)" if self.planes else "the part"
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
 
     def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:

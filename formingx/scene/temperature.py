@@ -70,7 +70,7 @@ class GivenTemperature:
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
-    def on(self, boundary: str) -> np.ndarray:
+    def at_boundary(self, boundary: str) -> np.ndarray:
         """Return the temperatures at the nodes of a boundary, gathered on all ranks; collective.
 
         Args:

@@ -242,7 +242,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
             cannot be met.
     """
     caller = stage.label
-    inactive = sorted({i for item in stage.inactive for i in scene.together(scene.number(f"{caller}: inactive", item))})
+    inactive = sorted({i for item in stage.inactive
+                       for i in scene.same_tool(scene.number(f"{caller}: inactive", item))})
     driven = [stage.control] if stage.control is not None else [item for item, _ in stage.tables]
     numbers = [scene.number(caller, item) for item in driven]
     for number in numbers:
@@ -252,7 +253,7 @@ def plan(scene: Scene, stage: Stage) -> Plan:
                              f" PrescribedDisplacement, or a Contact with a direction can")
         if number in inactive and item.direction is None:        # an inactive tool may return to its start
             raise InputError(f"{caller}: {item!r} is both driven and left out")
-    if len({scene.together(number)[0] for number in numbers}) < len(numbers):
+    if len({scene.same_tool(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{caller}: one item has two tables")
     present = [item for i, item in enumerate(scene.items) if i not in inactive]
     try:
@@ -264,8 +265,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         raise InputError(f"{caller}: {error}") from None
     for number, (_, table) in zip(numbers, stage.tables):
         item, most = scene.items[number], float(np.abs(table[:, 1]).max())
-        if (why := aims.beyond_all(scene, item.quantity, most)) is not None:
+        if (why := aims.implausible(scene, item.quantity, most)) is not None:
             raise InputError(f"{caller}: the table of {item!r} goes to {most:g}: {why}")
-    tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.together(number)]
-    return Plan(stage, scene.together(numbers[0]) if stage.control is not None else [], tables, inactive,
+    tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.same_tool(number)]
+    return Plan(stage, scene.same_tool(numbers[0]) if stage.control is not None else [], tables, inactive,
                 list(map(repr, scene.items)))

@@ -105,7 +105,7 @@ class Design:
         """Compute the run for the n numbers of the parameters, shape (n,)."""
         scene, end = self._make(vector)
         scene = copy.copy(scene)                             # the script's scene is left as it is
-        scene.one_by_one = True
+        scene.one_node_per_step = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._max_steps,
                                    "progress": False}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite, known, positive, together, values
+from ...errors import InputError, call_on_all_ranks, finite, known, positive, values
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode
 from ...ranks import gathered
@@ -54,7 +54,7 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     for name, h in each.items():
         if callable(h):
             found[name] = h
-            together(mesh.comm, [partial(_check, name, h, X)])
+            call_on_all_ranks(mesh.comm, [partial(_check, name, h, X)])
         else:
             found[name] = _Constant(positive(f"Scene: thickness of {name!r}", h))
     return found

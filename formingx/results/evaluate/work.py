@@ -226,7 +226,7 @@ class EnergyBalance:
                 if i in setting.inactive:
                     force = slope = 0.0
                 elif item in scene.contacts:
-                    together = [scene.items[k] for k in scene.together(i)]
+                    together = [scene.items[k] for k in scene.same_tool(i)]
                     tools = [c for c in p.present if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
                                  for c in tools)
