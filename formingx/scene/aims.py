@@ -17,11 +17,11 @@ _MARGINS = 1.05, 1.005  # largest ratio of a volume to its count in squares, ove
 
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
-    """Check that the targets of a run can be reached, as far as the scene tells without a run.
+    """Check that no target of a run contradicts the scene, before anything is solved (`unreachable`).
 
     Args:
         scene: the `Scene`.
-        targets: the targets.
+        targets: the targets, with `name` and `value`, see `formingx.measures.targets`.
         inactive: numbers in `Scene.items` of the items that a stage leaves out; None for a run from the unloaded state
             with one control.
 
@@ -36,6 +36,8 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
 
 def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None) -> str | None:
     """Return the reason why no run of a scene can reach a target.
+
+    For example a pole stretch may exceed the limit of the material, or a pole may lie inside a mould.
 
     Args:
         scene: the `Scene`.
@@ -84,10 +86,12 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
 def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     """Return the reason why a pressure or a travel is implausibly large for a scene.
 
+    The largest plausible absolute value is 1e9 times the shear modulus, or 1e9 times the extent of the body.
+
     Args:
         scene: the `Scene`.
         quantity: "pressure" or "travel"; another quantity is not checked.
-        value: value of the quantity, stress or length.
+        value: pressure, stress, or travel, length.
 
     Returns:
         The reason as text; None if the value is plausible.
@@ -103,7 +107,10 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 
 def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """Return the support that constrains a displacement, or None; `name` is the name u_r_at_R_Z of a target."""
+    """Return the support that constrains the displacement of a target to a constant, or None.
+
+    `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5).
+    """
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
     for support in supports:
@@ -117,7 +124,7 @@ def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
 
 
 def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
-    """Return True if a pole at this height would lie deeper in the tool of a contact than the thickness of the body."""
+    """Return True if a pole of this height would lie deeper inside the tool of a contact than the body is thick."""
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
@@ -127,10 +134,10 @@ def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
-    """Return the volume between a body and its mould, and the largest plausible ratio of the true volume to it.
+    """Return the volume between a body and its mould, and a bound of the true volume over this approximate one.
 
-    For a flat body, squares outside the tool are counted if they are connected with the body in the reference
-    configuration. The volume is infinite if the mould is open. `_mould_volume_of_tube` treats a tube.
+    The volume has the unit length^3, or length^2 in plane strain; it is infinite if the mould is open. For a flat body
+    squares outside the tool are counted, if they are connected with the body in the reference configuration.
     """
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
@@ -157,7 +164,9 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
 
 
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
-    """Return the volume that a tube, closed below, can sweep in its mould, up to its upper end; infinite if open.
+    """Return the volume between a tube, closed below, and its mould, up to the upper end of the tube, length^3.
+
+    It is infinite if the mould is open.
 
     Args:
         scene: the `Scene`.

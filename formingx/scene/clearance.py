@@ -16,8 +16,8 @@ _MOST = 1000           # largest number of points of a tool in three dimensions 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
     """Check that the tools do not overlap in the stages of a process, and that none passes a constrained boundary.
 
-    The travel of a tool may be unknown before the run, as in a stage that ends at a pole height. The tool is not
-    checked from there on.
+    The travel of a tool may be unknown before the run, as in a stage that ends at a pole height. The tool is then not
+    checked in this stage and the following ones.
 
     Args:
         scene: the `Scene`.
@@ -28,7 +28,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
         The plans with an unknown travel at their beginning, to be checked again when the run reaches them.
 
     Raises:
-        InputError: tools overlap, or a tool passes through a constrained boundary.
+        InputError: two tools overlap, or a constrained boundary would lie inside a tool.
     """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
@@ -91,9 +91,9 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
-    """Return points on the profile of a tool, shape (n, 2), length, `pieces` of them on each line of the profile.
+    """Return points on the profile of a tool without travel, shape (n, 2), length, `pieces` of them on each line.
 
-    In three dimensions the points lie on the surface of the tool, shape (n, 3).
+    In three dimensions they are at most about 1000 vertices of the surface of the tool, shape (n, 3).
     """
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:

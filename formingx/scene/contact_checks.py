@@ -18,7 +18,8 @@ OTHER_UNIT = 4.0
 def check_start(scene: Any, contact: Contact) -> None:
     """Check that the body starts outside a tool, and that the contact face is its boundary nearest to the tool.
 
-    The friction must have a value at the temperatures of the face, and no controlled pressure may act on the face.
+    The coefficient of friction must have a value at the temperatures of the face. No controlled pressure may act on the
+    face. The contact points must be dense enough to detect the tool (`tool_width.check`).
 
     Args:
         scene: the `Scene`.
@@ -71,7 +72,7 @@ def check_travel(scene: Any, contact: Contact, travel: float) -> None:
         travel: travel of the tool, length.
 
     Raises:
-        InputError: a constrained boundary would lie inside the tool as a whole.
+        InputError: all nodes of a constrained boundary would lie inside the tool.
     """
     moves = contact.way
     for support in scene.supports:

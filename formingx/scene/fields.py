@@ -19,7 +19,7 @@ _WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what 
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """Evaluate a given temperature at points of a mesh, which may differ between ranks; collective.
+    """Evaluate a given temperature at points of a mesh; collective. Each rank may give other points.
 
     Args:
         field: the temperature, in one of the following forms. For a sheet in three dimensions x and y replace R and Z.
@@ -48,7 +48,7 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """Return the result of `values_at` for points that are equal on all ranks; `axes` are the names of coordinates."""
+    """Return the result of `values_at` for points that are equal on all ranks; `axes` is "RZ" or "xy"."""
     if isinstance(field, type):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
     if isinstance(field, Table):
@@ -106,9 +106,9 @@ class PointReader:
 
 
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
-    """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file; `names` are its axes.
+    """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file, shape (n,).
 
-    The file has the column T and one or both axes as columns. The result has the shape (n,).
+    The file has the column T and one or both coordinates as columns. `names` is "RZ" or "xy", the names of these.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError

@@ -23,7 +23,7 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
         temperature: temperature of the scene, or None.
 
     Returns:
-        The points with the cells that contain them and the temperatures.
+        The points, the cells that contain them, and the temperatures.
     """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])

@@ -172,12 +172,12 @@ class Scene:
 
     @property
     def symmetry_factor(self) -> int:
-        """Number of images of the body in the whole part, such as 4 for a quarter (`Symmetry`)."""
+        """Number of images of the modelled body in the whole part, such as 4 for a quarter (`Symmetry`)."""
         return self.symmetry.factor
 
     @property
     def first(self) -> Scene:
-        """Scene on the first mesh of the run; this scene itself unless remeshing made it."""
+        """Scene on the first mesh of a run with remeshing; this scene itself unless remeshing made it."""
         return self if self.preformed is None else self.preformed.before[0].scene.first
 
     def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
@@ -201,12 +201,12 @@ class Scene:
 
     @property
     def items(self) -> list[Part]:
-        """Loads, then supports, then contacts of the scene; an item is addressed by its number in this list."""
+        """Loads, then supports, then contacts of the scene. The number of an item is its index in this list, from 0."""
         return [*self.loads, *self.supports, *self.contacts]
 
     @property
     def drivable(self) -> list[Any]:
-        """Loads, supports and contacts that a run can control; of a tool with several faces only the first contact."""
+        """Items whose pressure, displacement or travel a run can control; of a tool with several faces one contact."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.same_tool(i)[0] == i]
 
@@ -227,7 +227,7 @@ class Scene:
 
     @property
     def driven(self) -> Any:
-        """Load, support or contact that a run controls if it is the only one that can be controlled; else None."""
+        """Load, support or contact that a run controls, if exactly one can be controlled; else None."""
         drivable = self.drivable
         return drivable[0] if len(drivable) == 1 else None
 
@@ -274,7 +274,7 @@ class Scene:
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, item: Any) -> str:
-        """Return the name of the column of a path with the pressure or the travel of an item.
+        """Return the name of the column of a `Path` that contains the pressure or the travel of an item.
 
         Args:
             item: an item that can be controlled.
@@ -362,7 +362,7 @@ class Scene:
         return max(modulus for _, modulus in found)
 
     def _checked_expansion(self, given: Any) -> dict[str, Expansion]:
-        """Return {layer: law of thermal expansion} for the argument `expansion`, checked at all quadrature points."""
+        """Return {layer: law of thermal expansion} from the argument `expansion`, checked at all quadrature points."""
         laws = dict.fromkeys(self.mesh.layers, given) if isinstance(given, Expansion) else given
         if not isinstance(laws, Mapping) or not all(isinstance(law, Expansion) for law in laws.values()):
             raise InputError(f"Scene: expansion = {given!r}: must be ThermalExpansion(...), or {{layer: ...}}")
@@ -381,7 +381,7 @@ class Scene:
             layer: name of the layer.
 
         Returns:
-            The points with the cells that contain them and the temperatures.
+            The points, the cells that contain them, and the temperatures.
         """
         known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
@@ -417,7 +417,7 @@ class Scene:
             travel: travel of the tool, length.
 
         Raises:
-            InputError: a constrained boundary would lie inside the tool as a whole.
+            InputError: all nodes of a constrained boundary would lie inside the tool.
         """
         contact_checks.check_travel(self, contact, travel)
 

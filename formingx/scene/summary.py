@@ -41,7 +41,7 @@ def summary(scene: Any) -> dict[str, str]:
 
 
 def _temperatures(scene: Any) -> list[float]:
-    """Return the temperatures that a scene gives as numbers: of its tools, and of the body if it is uniform."""
+    """Return the distinct temperatures that a scene gives as numbers: tools, and the body if it is uniform."""
     tools = [given.tool for given in scene.heat.tools.values()] if scene.heat is not None else []
     first = scene.temperature.T.x.array if scene.temperature is not None else []
     even = len(first) and np.ptp(first) == 0
@@ -50,7 +50,7 @@ def _temperatures(scene: Any) -> list[float]:
 
 
 def _material(item: Any, temperatures: list[float]) -> str:
-    """Return a material as text, with values at some temperatures in place of unnamed functions of the temperature."""
+    """Return a material as text, with values at `temperatures` in place of lambda functions of the temperature."""
     found = text(item)
     for value in item.parameters.values():
         if isinstance(value, FunctionOfTemperature) and "<lambda>" in repr(value):

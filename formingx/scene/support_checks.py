@@ -94,7 +94,7 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 def check_hinges(scene: Any) -> None:
     """Check that no layer at a hinge is much softer than another layer at the same rim.
 
-    With weight="area" a hinge (`SimplySupported`) pulls all layers with one traction, so their shear moduli may differ
+    A hinge (`SimplySupported`) with weight="area" pulls all layers with one traction, so their shear moduli may differ
     at most by a factor of 100. The rim face of a hinge can bulge, so a pressure would squeeze out a loaded layer that
     is 50 times softer than another one.
 

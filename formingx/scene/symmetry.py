@@ -19,10 +19,10 @@ class MirrorPlane(NamedTuple):
     """Plane across which the part continues as the mirror image of the body.
 
     Attributes:
-        axis: number of the coordinate that is constant in the plane.
+        axis: index of the coordinate that is constant in the plane, 0 or 1.
         position: value of that coordinate, length.
-        above: True if the body lies on the side of larger coordinates.
-        on: name of the boundary in the plane.
+        above: True if the body lies on the side of larger values of this coordinate.
+        on: name of the boundary of the body that lies in the plane.
     """
 
     axis: int
@@ -75,13 +75,13 @@ class MirrorPlanes:
         return _PARTS.get(len(self.planes), "")
 
     def basis(self, depth: str | None) -> str:
-        """Return as text to which body the results belong, such as "the whole part (a half was modelled)".
+        """Return the body to which the results belong as text, such as "the whole part (a half was modelled)".
 
         Args:
             depth: unit of depth in plane strain, such as "mm", or "unit"; None for other kinematics.
 
         Returns:
-            The text; "" if the whole part is modelled, other than in plane strain.
+            The text; "" if the whole part is modelled and `depth` is None.
         """
         part = f"the whole part (a {self.part_name} was modelled)" if self.planes else "the part"
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)

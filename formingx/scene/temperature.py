@@ -14,7 +14,7 @@ from . import fields
 
 @runtime_checkable
 class Expansion(Protocol):
-    """Interface of a law of thermal expansion."""
+    """Interface of a law of thermal expansion, such as `ThermalExpansion`."""
 
     def stretch(self, temperature: ArrayLike) -> np.ndarray:
         """Return the stress-free stretch of the material at given temperatures.
@@ -55,7 +55,7 @@ class GivenTemperature:
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures at points of some cells.
+        """Return the temperatures at the same q points of each of m cells.
 
         Args:
             cells: local numbers of the cells, shape (m,).
@@ -71,13 +71,13 @@ class GivenTemperature:
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def at_boundary(self, boundary: str) -> np.ndarray:
-        """Return the temperatures at the nodes of a boundary, gathered on all ranks; collective.
+        """Return the temperatures at the nodes of a boundary, of all ranks one after the other; collective.
 
         Args:
             boundary: name of the boundary.
 
         Returns:
-            Temperatures of n nodes, shape (n,).
+            Temperatures, shape (n,), equal on all ranks. A node that ranks share occurs more than once.
         """
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
         return gathered(self.mesh.comm, self.T.x.array[nodes])

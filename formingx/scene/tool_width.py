@@ -26,13 +26,13 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
     """Check that the contact points of a face are dense enough to detect a tool.
 
     Args:
-        mesh: the `Mesh`.
+        mesh: the `Mesh` of the body.
         contact: the `Contact` of the face with the tool.
         axisymmetric: True for an axisymmetric body, False in plane strain.
 
     Raises:
-        InputError: the tool could pass between contact points, or penetrate the face by more than 10 % (`CUT`) of the
-            thickness before it meets one.
+        InputError: the tool could pass between two contact points, or penetrate the face by more than 10 % (`CUT`) of
+            the thickness before it meets a contact point.
     """
     ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
@@ -63,8 +63,8 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     """Raise an InputError if a tool would be deep in the undeformed face before it meets a contact point.
 
     The tool moves repeatedly by its distance from the nearest contact point (sphere tracing), so it passes no point. A
-    fixed tool is assumed to approach the middle of an edge along the normal. `ends` are the end points of the element
-    edges of the face, shape (n, 2, 2), and `thickness` is the thickness of the body, length.
+    fixed tool is assumed to approach the nearest middle of an edge along its normal. `ends` are the end points of the
+    element edges of the face, shape (n, 2, 2), length, and `thickness` is the thickness of the body, length.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))
