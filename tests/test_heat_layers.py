@@ -41,8 +41,8 @@ def test_presets_promise_the_temperature(accuracy, thickness, conductance, metal
     """The promise of docs/heat.md, right after the sheet was laid on the tool."""
     with caplog.at_level(logging.WARNING, "formingx"):
         run, errors = chilled(accuracy, thickness, conductance, metal, [0.05, 0.1, 0.2], start)
-    assert errors.max() < running.PROMISE * (start - 30) and not caplog.records
-    assert run.errors_in_space.max() < running.PROMISE * (start - 30)
+    assert errors.max() < running.WARNED_ERROR * (start - 30) and not caplog.records
+    assert run.errors_in_space.max() < running.WARNED_ERROR * (start - 30)
 
 
 @pytest.mark.parametrize("accuracy", ["draft", "standard"])
@@ -66,7 +66,7 @@ def test_a_deformed_sheet_has_layers_too():
     x = np.linspace(0, 1, 9)
     exact = reference.series(reference.Slab(1e-3, 0.17, 1050 * 1800.0), 150.0, (500.0, 0.0), (20.0, 25.0),
                              1e-3 * x, [0.5, 1.0])
-    assert run.at(np.column_stack([0 * x, 4e-3 * (1 - x)])) == pytest.approx(exact, abs=running.PROMISE * 130)
+    assert run.at(np.column_stack([0 * x, 4e-3 * (1 - x)])) == pytest.approx(exact, abs=running.WARNED_ERROR * 130)
 
 
 def bodies():

@@ -155,7 +155,7 @@ def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
 
 def test_sudden_chill_is_the_limit_of_a_large_conductance(chilled, monkeypatch):
     part = chilled("sets").springback(20.0, accuracy="draft")
-    monkeypatch.setattr(cooling, "_CONTINUOUS", 1e3)
+    monkeypatch.setattr(cooling, "_SUDDEN_CONDUCTANCE", 1e3)
     slower = chilled("sets").springback(boundaries=[fx.FixedTemperature(face, temperature=20.0) for face in (
         "bottom", "top")], duration=part.path.last.time - 20.5, accuracy="draft")
     assert slower.shrinkage == pytest.approx(part.shrinkage, rel=0.01)

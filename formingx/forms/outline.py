@@ -17,7 +17,7 @@ from ..ranks import gathered
 FINE_PIECES = 16
 """Straight pieces that replace a curved edge where distances and lengths are measured."""
 
-_PARTS = 8
+_SEARCH_PIECES = 8
 """Straight pieces of an edge in the search for self-intersections."""
 
 
@@ -126,9 +126,9 @@ class Outline:
         """
         if crossing(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
-        points, pieces = self.pieces(edges, _PARTS)
+        points, pieces = self.pieces(edges, _SEARCH_PIECES)
         for i, j in itertools.chain.from_iterable(crossings(points, pieces)):
-            if not self._near(i // _PARTS, j // _PARTS):
+            if not self._near(i // _SEARCH_PIECES, j // _SEARCH_PIECES):
                 return points[pieces[i]].mean(0)
         return None
 
@@ -142,7 +142,7 @@ class Outline:
         return values if comm.size == 1 else gathered(comm, values)
 
 
-def edge_points(edges: np.ndarray, parts: int = _PARTS) -> np.ndarray:
+def edge_points(edges: np.ndarray, parts: int = _SEARCH_PIECES) -> np.ndarray:
     """Return points on parabolic edges, at equal intervals of the parameter from start to end.
 
     Args:

@@ -15,7 +15,7 @@ from ..physics import kinematics as kin
 from .formulation import Formulation
 from .material_terms import MaterialTerms
 
-_THIN = 5e-4  # volume over length^3 (a disc of r0/h0 = 6000) below which the bending stiffness is round-off
+_THIN_VOLUME = 5e-4  # volume over length^3 (a disc of r0/h0 = 6000) below which the bending stiffness is round-off
 _FIRST_STRETCH = 1e-4      # u = _FIRST_STRETCH X, at which the first direction of a path is taken
 
 
@@ -108,7 +108,7 @@ class Solid(Formulation):
         The stretch is interpolated because the unknowns of bubbles are no nodal values.
         """
         super().set_stiff()
-        if self.volume < _THIN * self.length**self.scene.kinematics.dimension_of_volume:
+        if self.volume < _THIN_VOLUME * self.length**self.scene.kinematics.dimension_of_volume:
             space, dofs = self.space.sub(0).collapse()
             u = fem.Function(space)
             stretched = self.constant(_FIRST_STRETCH / self.length) * self.X

@@ -16,10 +16,10 @@ from mpi4py import MPI
 
 from .. import _compat
 
-_NO_STRESS = 1e-6
+_STRESS_FREE = 1e-6
 """Stress over the largest modulus below which a body counts as stress-free."""
 
-_SYSTEMATIC = 4.0
+_SYSTEMATIC_WEIGHT = 4.0
 """Weight of errors that have the same sign in every step, as the error of a backward difference.
 
 Such errors add up over a run; others partly cancel. With weight 1 a creeping disc of `demos/kbkz.py` is 1 % too thin at
@@ -42,7 +42,7 @@ class StepError:
         terms = [terms for terms in forms.terms if terms.has_history or heat and terms.follows_temperature]
         self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
         systematic = any(entry.material.motion_variables or entry.material.integral for entry in terms)
-        self._weight = _SYSTEMATIC if systematic else 1.0
+        self._weight = _SYSTEMATIC_WEIGHT if systematic else 1.0
         self._relaxed = [_Stress(forms, entry, entry.equilibrium_energy) for entry in terms
                          if entry.has_history and entry.equilibrium_energy(forms.elastic_F) is not None]
 
@@ -88,7 +88,7 @@ class StepError:
         self._at_time(end)
         forms.clock = clock
         relaxed = [stress.values() for stress in self._relaxed]     # branches may turn the sum through 0
-        scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _NO_STRESS * forms.stress)
+        scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _STRESS_FREE * forms.stress)
         once, lasting = [*(self._norm([a - b for a, b in zip(*pair)]) / scale for pair in errors), 0.0][:2]
         return self._weight * once, self._weight * lasting
 

@@ -13,7 +13,7 @@ from ..mesh.nodes import of_cells, own_cells
 from ..ranks import gathered
 from .probes import Probe
 
-_NEIGHBOURS = 12
+_FITTED_POINTS = 12
 """Number of points of a fit: twice the six coefficients of a quadratic polynomial in the plane."""
 
 
@@ -43,7 +43,7 @@ class MovingLeastSquares:
         from scipy.spatial import cKDTree
         self._comm = comm
         points = gathered(comm, source)
-        k = min(_NEIGHBOURS, len(points))
+        k = min(_FITTED_POINTS, len(points))
         away, self._rows = (found.reshape(len(target), k) for found in cKDTree(points).query(target, k))
         self.nearest = self._rows[:, 0]
         scale = np.maximum(away[:, -1:], 1e-300)

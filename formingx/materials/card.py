@@ -17,7 +17,7 @@ from .homogeneous import MODES
 _LARGEST_STRETCH = 6.0
 """Largest stretch of the curves, if the material has no smaller limit."""
 
-_SHARE = 0.97
+_STRETCH_FRACTION = 0.97
 """Largest stretch of the curves over the largest stretch of the material."""
 
 
@@ -85,7 +85,7 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
         rest = material.equilibrium
         rows.append(("relaxed shear modulus", with_unit(rest.shear_modulus if rest else 0.0, unit)))
     elif not material.internal and material.equilibrium is material:
-        top = min(_LARGEST_STRETCH, _SHARE * material.largest_stretch("equibiaxial"))
+        top = min(_LARGEST_STRETCH, _STRETCH_FRACTION * material.largest_stretch("equibiaxial"))
         stable = material.check_stability((0.5, top))
         low, high = stable.drucker["equibiaxial"]
         rows.append(("stable (Drucker), equibiaxial",
@@ -101,7 +101,7 @@ def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str,
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):
         for k, (name, material, shift) in enumerate(cases):
-            l = np.linspace(1.0, min(_LARGEST_STRETCH, _SHARE * material.largest_stretch(mode)), 40)[1:]
+            l = np.linspace(1.0, min(_LARGEST_STRETCH, _STRETCH_FRACTION * material.largest_stretch(mode)), 40)[1:]
             label = f"{name}: " * bool(name)
             if not rates:
                 axis.plot(l, material.stress(mode, l, true=True), color=f"C{k}", label=name)

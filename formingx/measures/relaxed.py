@@ -11,10 +11,10 @@ from mpi4py import MPI
 from .. import _compat
 from ..mesh.nodes import own_cells
 
-_NONE = 1e-10
+_ZERO_STRESS = 1e-10
 """Stress over the shear modulus below which a stress counts as zero."""
 
-_STRAIN = 1e-6
+_ADDED_STRAIN = 1e-6
 """Equibiaxial strain that is added if the stresses are zero: the ratio of stresses is then the ratio of the moduli."""
 
 
@@ -67,8 +67,8 @@ class PoleStressRatio:
             The ratio.
         """
         stored, relaxed, modulus = self._integrals()
-        if relaxed < _NONE * modulus:
-            self._strain.value = _STRAIN
+        if relaxed < _ZERO_STRESS * modulus:
+            self._strain.value = _ADDED_STRAIN
             stored, relaxed, _ = self._integrals()
             self._strain.value = 0.0
         return float(stored / relaxed)

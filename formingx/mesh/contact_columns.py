@@ -49,21 +49,21 @@ _POSITION_ERROR = 0.03
 """Largest error of the estimated ends of a fillet in the sheet, over the length of the sheet. Towards the start of the
 sheet the error may be three times larger."""
 
-_END = 0.5
+_END_COLUMN_LENGTH = 0.5
 """Length of a column at a constrained end over the height of an element there, of at most `Fineness.through` elements
 through the sheet. Shorter columns lock, longer ones miss the bending."""
 
-_BENDING = 0.04
+_WEAK_BENDING = 0.04
 """Wall over fillet radius, times 1 - cos of the angle of the arc, below which two elements through the sheet are
 enough."""
 
-_WALL = 0.25
+_MAX_WALL = 0.25
 """Largest wall over fillet radius that enters the geometric mean: a thicker wall allows no longer columns."""
 
 _TURN = 1 / 8
 """Exponent of 1 - cos of the angle of the arc: the sheet bridges a short arc less, and its columns may be longer."""
 
-_SAMPLES = 2000            # points of the sheet at which sizes are computed
+_SHEET_SAMPLES = 2000            # points of the sheet at which sizes are computed
 
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
@@ -80,7 +80,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
-    coordinates = np.linspace(columns.ends[0], columns.ends[-1], _SAMPLES)
+    coordinates = np.linspace(columns.ends[0], columns.ends[-1], _SHEET_SAMPLES)
     rows = columns.place(coordinates)
     s = length_along(rows[[0, -1]].mean(0))
     faces = dict(zip(columns.faces, rows[[0, -1]]))
@@ -94,19 +94,20 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     for item in touching:
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
             wall = thickness * fillet.area_ratio
-            column_length = fineness.fillet * fillet.stretch * np.sqrt(fillet.radius * min(wall, _WALL * fillet.radius))
+            mean = np.sqrt(fillet.radius * min(wall, _MAX_WALL * fillet.radius))
+            column_length = fineness.fillet * fillet.stretch * mean
             column_length *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
             column_length = max(column_length, _SHORTEST * longest)
             shortest = min(shortest, column_length)
             size = np.minimum(size, column_length + GROWTH * _distance(s, fillet))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
-    through = max(fineness.through if bending >= _BENDING else min(fineness.through, 2),
+    through = max(fineness.through if bending >= _WEAK_BENDING else min(fineness.through, 2),
                   int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
     for end in (0, -1):
         if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
             distance = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
-            size = np.minimum(size, _END * thickness / min(through, fineness.through) + GROWTH * distance)
+            size = np.minimum(size, _END_COLUMN_LENGTH * thickness / min(through, fineness.through) + GROWTH * distance)
     ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 

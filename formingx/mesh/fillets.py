@@ -41,13 +41,13 @@ class FilletInSheet(NamedTuple):
 _PIECE = 1 / 60
 """Distance between successive points of a tool over the size of the tool."""
 
-_LEVELS = 80
+_SURFACE_RADII = 80
 """Number of radii of the free surface at which the sheet is examined."""
 
-_LARGEST = 30.0
+_MAX_SURFACE_RADIUS = 30.0
 """Largest radius of the free surface over the length of the sheet."""
 
-_UNDER_PLUG = 0.6
+_MIN_RADIUS_RATIO = 0.6
 """Smallest reference radius over present radius of a point of the sheet at the edge of a moving tool. (The largest
 is 1.)"""
 
@@ -69,11 +69,11 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
     if moving:
         for group in groups:
             r = x[group, 0].max()
-            first, last = np.interp([_UNDER_PLUG * r, r], face[:, 0], s)
-            stretch = (1 + _UNDER_PLUG) / 2
+            first, last = np.interp([_MIN_RADIUS_RATIO * r, r], face[:, 0], s)
+            stretch = (1 + _MIN_RADIUS_RATIO) / 2
             yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, stretch, stretch, False)
         return
-    free = _free_radii(tool, x, normal, _LARGEST * s[-1])
+    free = _free_radii(tool, x, normal, _MAX_SURFACE_RADIUS * s[-1])
     place, along = _positions(x, free, face, s), length_along(x)
     reference = np.interp(place, s, face[:, 0])
     for group in groups:
@@ -156,7 +156,7 @@ def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray)
     on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]
     place, sticks = np.full(len(points), np.nan), np.zeros(len(points), bool)
     place[[0, -1]], sticks[[0, -1]] = s[[0, -1]], True
-    for radius in np.geomspace(max(free.max(), 1e-12 * s[-1]), max(free.min(), 1e-6 * s[-1]), _LEVELS):
+    for radius in np.geomspace(max(free.max(), 1e-12 * s[-1]), max(free.min(), 1e-6 * s[-1]), _SURFACE_RADII):
         touches = sticks.copy()
         touches[1:-1] |= free >= (1 - 1e-9) * radius
         line = points[touches]

@@ -42,7 +42,7 @@ from .contact_law import ContactLaw
 from .part import Part
 from .penalty import RAMP_EDGE, STICKS, Law
 
-_ROUGH = 1000.0
+_STICKING_RATIO = 1000.0
 """Ratio T/N above which a sticking point that may separate slides: it carries no shear traction without pressure."""
 
 _ELASTIC_SLIP = 1e-3
@@ -237,7 +237,7 @@ class Contact(Part):
         mu = self.friction_at(temperature, clamped=True)
         shear_limit = self.shear_limit if type(self).shear_limit is not Contact.shear_limit else None
         if self.separates and isinstance(mu, float) and mu == math.inf:
-            mu, shear_limit = _ROUGH, None
+            mu, shear_limit = _STICKING_RATIO, None
         return Law(self.tool, mu, k, theta, elastic_slip, shift, not self.separates, shear_limit)
 
     def __repr__(self) -> str:

@@ -7,7 +7,7 @@ from ..errors import InputError, count, non_negative
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 
-_MOST_POINTS = 100
+_MAX_POINTS = 100
 """Largest number of Gauss points on a facet."""
 
 
@@ -54,6 +54,6 @@ def contact_points(name: str, points: Any) -> str | int:
     if isinstance(points, str) and points == "nodes":
         return points
     number = count(name, points)
-    if number > _MOST_POINTS:
-        raise InputError(f"{name} = {points!r}: must be at most {_MOST_POINTS} on a facet")
+    if number > _MAX_POINTS:
+        raise InputError(f"{name} = {points!r}: must be at most {_MAX_POINTS} on a facet")
     return number

@@ -15,8 +15,8 @@ from ..forms.elements import Body, body
 from ..mesh.nodes import of_space
 from ..mesh.triangles import Place, place
 
-_SHORTENED = 0.9       # stretch along the section below which a sheet is compressed
-_COLUMNS = 3           # smallest number of columns of elements of a compressed piece
+_COMPRESSED_STRETCH = 0.9       # stretch along the section below which a sheet is compressed
+_MIN_COLUMNS = 3           # smallest number of columns of elements of a compressed piece
 
 
 class Examination:
@@ -80,8 +80,8 @@ class Examination:
         near = np.array([np.argmin(np.hypot(*(middles - centre).T)) for centre in shape.points.mean(1)])
         stretch = np.linalg.norm(np.einsum("mkij,mj->mki", shape.section, tangents[near]), axis=-1).mean(1)
         found = np.bincount(near, stretch, len(middles)) / np.maximum(np.bincount(near, minlength=len(middles)), 1)
-        short = np.flatnonzero((found > 0) & (found < _SHORTENED))
-        pieces = [k for k in np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(k) >= _COLUMNS]
+        short = np.flatnonzero((found > 0) & (found < _COMPRESSED_STRETCH))
+        pieces = [k for k in np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(k) >= _MIN_COLUMNS]
         if pieces:
             piece = max(pieces, key=lambda k: lengths[k].sum())
             self.facts["shortened"] = (float(found[piece] @ lengths[piece] / lengths[piece].sum()),

@@ -25,7 +25,7 @@ from .evaluate.dissipation import dissipated_energy
 from .evaluate.profile import Profiles
 from .evaluate.stress import Stresses
 
-_WRITTEN = 5e-6
+_ROUNDING_ERROR = 5e-6
 """Largest relative error of a number that is rounded to six digits."""
 
 
@@ -241,7 +241,8 @@ class States:
                         return self._between(segment, left, right, target, bound)
                     values += ends
                     piece = segment, left, right, bound
-        if piece is not None and piece[2] is self.last and 0 < (target.value - b) * np.sign(b - a) < _WRITTEN * abs(b):
+        if piece is not None and piece[2] is self.last and (
+                0 < (target.value - b) * np.sign(b - a) < _ROUNDING_ERROR * abs(b)):
             segment, left, right, bound = piece
             with segment.problem.state_context(left), contextlib.suppress(ConvergenceError):
                 found = self._between(segment, left, right, target, bound)

@@ -10,10 +10,10 @@ from ..mesh.triangles import Triangles
 from ..physics.supports import Constrained
 from .scene import Scene
 
-_NEAR = 1e-5           # distance over the body's length up to which a point is on a boundary
-_MOST = 1e9            # largest plausible pressure over shear modulus, or travel over the body's length
-_SQUARES = 200         # number of squares along a mould's larger side
-_MARGINS = 1.05, 1.005  # largest ratio of a volume to its count in squares, over a flat body and around a tube
+_BOUNDARY_DISTANCE = 1e-5           # distance over the body's length up to which a point is on a boundary
+_LARGEST_TARGET = 1e9            # largest plausible pressure over shear modulus, or travel over the body's length
+_GRID_SQUARES = 200         # number of squares along a mould's larger side
+_VOLUME_MARGINS = 1.05, 1.005  # largest ratio of a volume to its count in squares, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
@@ -101,7 +101,7 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     if quantity not in units:
         return None
     what, unit = units[quantity]
-    if abs(value) <= _MOST * unit:
+    if abs(value) <= _LARGEST_TARGET * unit:
         return None
     return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"
 
@@ -112,7 +112,7 @@ def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
     `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5).
     """
     component, place = name.removeprefix("u_").split("_at_")
-    point, near = np.array([float(x) for x in place.split("_")]), _NEAR * max(scene.extent)
+    point, near = np.array([float(x) for x in place.split("_")]), _BOUNDARY_DISTANCE * max(scene.extent)
     for support in supports:
         for constraint in scene.kinematics.in_axes(support, support.constraints()):
             if isinstance(constraint, Constrained) and not constraint.driven \
@@ -142,14 +142,14 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     from scipy.ndimage import label
     face = scene.mesh.nodes_of(contact.on)
     if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
-        return _mould_volume_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _MARGINS[1]
+        return _mould_volume_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _VOLUME_MARGINS[1]
     low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
     outline = contact.tool.bounds[1]
-    if np.ptp(face[:, 1]) > _NEAR * edge or face[:, 0].min() > 0 or outline[1] <= top:
+    if np.ptp(face[:, 1]) > _BOUNDARY_DISTANCE * edge or face[:, 0].min() > 0 or outline[1] <= top:
         return np.inf, 1.0
     corner = np.maximum(outline, face.max(0))
-    size = max(corner[0], corner[1] - low) / _SQUARES
+    size = max(corner[0], corner[1] - low) / _GRID_SQUARES
     r, z = (start + (np.arange(np.ceil((end - start) / size) + 1) + 0.5) * size
             for start, end in ((0.0, corner[0]), (low, corner[1])))
     points = np.stack(np.meshgrid(r, z, indexing="ij"), -1)
@@ -160,7 +160,7 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     if inside[-1].any() or inside[:, -1].any():
         return np.inf, 1.0
     volume = float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
-    return volume, _MARGINS[0]
+    return volume, _VOLUME_MARGINS[0]
 
 
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
@@ -177,9 +177,9 @@ def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]
     (r, top), (low, width) = line[-1], (contact.tool.bounds[0, 1], contact.tool.bounds[1, 0])
-    if line[0, 0] > _NEAR * width or width < r or low > line[0, 1]:
+    if line[0, 0] > _BOUNDARY_DISTANCE * width or width < r or low > line[0, 1]:
         return np.inf
-    n = int(np.ceil(_SQUARES * (top - low) / max(width, top - low)))
+    n = int(np.ceil(_GRID_SQUARES * (top - low) / max(width, top - low)))
     size = (top - low) / n
     R, Z = (np.arange(np.ceil(width / size) + 2) + 0.5) * size, low + (np.arange(-2, n) + 0.5) * size
     points = np.stack(np.meshgrid(R, Z, indexing="ij"), -1)

@@ -9,8 +9,8 @@ from ..errors import InputError
 from ..physics.contact import Contact
 from .scene import Scene
 
-_POSITIONS = 50        # number of positions of the tools that are checked in each piece of a stage
-_MOST = 1000           # largest number of points of a tool in three dimensions that are checked
+_CHECKED_POSITIONS = 50        # number of positions of the tools that are checked in each piece of a stage
+_MAX_TOOL_POINTS = 1000           # largest number of points of a tool in three dimensions that are checked
 
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
@@ -43,7 +43,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
                     scene.check_travel(tools[i], where[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.label}: {error}") from None
-            for part in np.linspace(0, 1, _POSITIONS) if where != travels else [1.0]:
+            for part in np.linspace(0, 1, _CHECKED_POSITIONS) if where != travels else [1.0]:
                 now = {i: travels[i] + part * (where[i] - travels[i]) for i in tools}
                 _check_overlap(scene, plan.stage.label, present, outlines, now)
             travels = where
@@ -97,7 +97,7 @@ def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
     """
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
-        return points[:: max(1, len(points) // _MOST)]
+        return points[:: max(1, len(points) // _MAX_TOOL_POINTS)]
     (a, b), parts = points[lines.T][..., None, :], np.linspace(0, 1, pieces, endpoint=False)[:, None]
     return np.concatenate([*(a + parts * (b - a)), points[-1:]])
 

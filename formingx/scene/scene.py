@@ -32,7 +32,7 @@ from .temperature import Expansion, GivenTemperature
 
 log = logging.getLogger("formingx")
 
-_HIGHEST = 30
+_MAX_DEGREE = 30
 """Largest degree of a quadrature rule: higher degrees are mistakes, and their points would fill the memory."""
 
 
@@ -129,8 +129,8 @@ class Scene:
         usual = 1 if in_space else 5
         self.quadrature_degree = count("Scene: quadrature_degree",
                                        usual if quadrature_degree is None else quadrature_degree)
-        if self.quadrature_degree > _HIGHEST:
-            raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_HIGHEST}")
+        if self.quadrature_degree > _MAX_DEGREE:
+            raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_MAX_DEGREE}")
         if temperature is not None:
             self.temperature = GivenTemperature(temperature, mesh)
         if expansion is not None:

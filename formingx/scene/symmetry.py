@@ -9,7 +9,7 @@ import numpy as np
 from ..mesh.nodes import COORDINATES, span
 from ..physics.supports import Symmetry
 
-_NEAR = 1e-6
+_PLANE_TOLERANCE = 1e-6
 """Tolerance for nodes in a plane and tools that reach it, over the largest extent of the body."""
 
 _PARTS = {1: "half", 2: "quarter", 3: "eighth"}
@@ -147,7 +147,7 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
     if scene.preformed is not None:
         return scene.first.symmetry
     mesh, kinematics, found = scene.mesh, scene.kinematics, []
-    body, near = span(mesh.domain, mesh.comm), _NEAR * float(max(scene.extent))
+    body, near = span(mesh.domain, mesh.comm), _PLANE_TOLERANCE * float(max(scene.extent))
     for support in scene.supports:
         if not isinstance(support, Symmetry) or support.guide:
             continue

@@ -15,10 +15,10 @@ _DIRECTIONS = 90           # number of directions in which the width of a closed
 CUT = 0.1
 """Largest allowed penetration of a tool between contact points, over the thickness of the body."""
 
-_PLACES = 33
+_EDGE_POINTS = 33
 """Number of points of an element edge at which the penetration is computed."""
 
-_MOVES = 200
+_MAX_MOVES = 200
 """Largest number of moves of a tool towards a face."""
 
 
@@ -74,9 +74,9 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     fractions = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
     points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1])
-                      for s in (fractions, np.linspace(0, 1, _PLACES)))
+                      for s in (fractions, np.linspace(0, 1, _EDGE_POINTS)))
     travel, furthest = 0.0, 2 * (tool.size + float(np.ptp(ends, axis=(0, 1)).max()))
-    for _ in range(_MOVES):
+    for _ in range(_MAX_MOVES):
         gap = -float(tool.signed_distance(points.reshape(-1, points.shape[-1]) - travel * way).max())
         if gap < 1e-6 * thickness:
             break

@@ -21,7 +21,7 @@ from . import cad_process
 from .arcs import arcs_along, in_plane, piece_through
 from .pieces import Arc, Line
 
-_SECONDS = 10               # computing time allowed for a file, s
+_BASE_SECONDS = 10               # computing time allowed for a file, s
 _BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
 _CLOCK_FACTOR = 20          # allowed elapsed over computing time: the machine may be busy
 
@@ -60,7 +60,7 @@ class _Reader:
     """
 
     def __init__(self, file: str, kind: str):
-        self._file, self._seconds = file, _SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
+        self._file, self._seconds = file, _BASE_SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
         # not a rank of a run under mpirun
         environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_COMM", "PMIX_", "PMI_", "PRTE_"))}
         self._process = subprocess.Popen(

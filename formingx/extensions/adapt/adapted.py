@@ -15,7 +15,7 @@ from .sizes import wanted_sizes
 _SHORTEST = 1 / 8
 """Smallest length of a new column over its length in the run: finer sizes are unreliable on coarse columns."""
 
-_SAMPLES = 16
+_COLUMN_SAMPLES = 16
 """Number of sampling points of a column for sizes."""
 
 _MAX_COLUMNS = 20_000
@@ -129,10 +129,11 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
         InputError: too many columns would be needed.
     """
     old = columns.ends
-    samples = np.append((old[:-1, None] + np.diff(old)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), old[-1])
+    fractions = np.arange(_COLUMN_SAMPLES) / _COLUMN_SAMPLES
+    samples = np.append((old[:-1, None] + np.diff(old)[:, None] * fractions).ravel(), old[-1])
     faces = columns.place(samples)[[0, -1]]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(faces, axis=1), axis=2).mean(0))])
-    joints = s[::_SAMPLES]
+    joints = s[::_COLUMN_SAMPLES]
     length = np.diff(joints)
     requested = np.minimum(np.maximum(factors, _SHORTEST) * length, length.max())
     distance = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)

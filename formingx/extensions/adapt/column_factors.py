@@ -11,16 +11,16 @@ from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...results.extend import method_of
 from ...results.path import Path
 
-_STATES = 12
+_EXAMINED_STATES = 12
 """Number of states whose stresses are examined, evenly spaced."""
 
-_NEAR = 0.25
+_FILLET_GAP = 0.25
 """Gap over the fillet radius up to which a face lies on the fillet: the gap of a chord of 80 degrees."""
 
 _MAX_ROTATION = 1.0
 """Upper bound of the rotation of a column, radians: a larger one belongs to a coarse or a crushed element."""
 
-_ORDER = 2
+_STRESS_ORDER = 2
 """Order of the stress error."""
 
 
@@ -99,7 +99,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
                 bend = np.abs(nearest.curvature)
                 radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(
                     nearest.curvature) * nearest.distance
-                on_fillet = (radius > 0) & (-nearest.distance < _NEAR * radius)
+                on_fillet = (radius > 0) & (-nearest.distance < _FILLET_GAP * radius)
                 smallest = np.where(on_fillet, radius, np.inf).reshape(-1, FINE_PIECES + 1).min(1)
                 np.minimum.at(found, column[face], share * smallest / length[face])
     return found
@@ -142,11 +142,12 @@ def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
         path.problem.scene.mesh.columns.ends)[[0, -1]], axis=1), axis=2).mean(0)
     found = np.full(n, np.inf)
     states = [state for state in path.states if state.kind != "start"]
-    for state in {id(s): s for s in (states[k] for k in np.linspace(0, len(states) - 1, _STATES).astype(int))}.values():
+    examined = np.unique(np.linspace(0, len(states) - 1, _EXAMINED_STATES).astype(int))
+    for state in (states[k] for k in examined):
         estimate = path.stress(state).error()
         squares = np.bincount(_column_of(estimate.points, middles), estimate.cells**2, n)
         allowed = (error * np.linalg.norm(estimate.stress)) ** 2
-        q = 2 * _ORDER + 1
+        q = 2 * _STRESS_ORDER + 1
         density = (squares / length**q) ** (1 / q)           # C^(2/q)
         with np.errstate(divide="ignore"):
             h = (allowed / max((density * length).sum(), 1e-300)) ** (1 / (q - 1)) / density

@@ -10,7 +10,7 @@ from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES
 from ...mesh.sizes import GROWTH
 
-_FINEST = 0.25
+_MIN_SIZE_RATIO = 0.25
 """Smallest required over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
 
@@ -40,7 +40,7 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
         change = np.abs(np.diff(np.log(wall.ratio[pairs]), axis=1)[:, 0])
         for allowed, found in ((share, turn), (error, change)):
             if allowed is not None:
-                part = np.maximum(allowed / np.maximum(found, allowed), _FINEST)
+                part = np.maximum(allowed / np.maximum(found, allowed), _MIN_SIZE_RATIO)
                 for triangle in pairs.T:
                     np.minimum.at(factor, triangle, part)
     strictest = np.ones(len(wall.reference_points))

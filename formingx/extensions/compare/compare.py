@@ -16,7 +16,7 @@ from ...results import files
 from ...results.show import plots
 from .curves import SampledCurve, arc_length, paired, paired_at_equal_values, ranges, resolution_of
 
-_LARGEST = 1e100                   # largest ratio of the two ranges: its square stays finite
+_MAX_RANGE_RATIO = 1e100                   # largest ratio of the two ranges: its square stays finite
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     for name, size, other in zip(names, scale, ranges(b)):
         if not size > 0 or not other > 0:
             raise InputError(f"compare: column {name!r} does not vary on {'our' if not size > 0 else 'their'} side")
-        if not min(size, other) > max(size, other) / _LARGEST:
+        if not min(size, other) > max(size, other) / _MAX_RANGE_RATIO:
             raise InputError(f"compare: column {name!r}: ours changes by {size:.3g}, theirs by {other:.3g}: no curves"
                              f" to compare; are columns and units right?")
     curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a

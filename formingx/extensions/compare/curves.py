@@ -11,9 +11,9 @@ import numpy as np
 
 from ...errors import InputError
 
-_SAMPLES = 2000                    # samples of a curve over its arc length
-_FINE = 33                         # points of the two pieces of the curve that meet at a sample
-_MOST = 10_000                     # largest number of points to pair: each is compared with every sample
+_CURVE_SAMPLES = 2000                    # samples of a curve over its arc length
+_PIECE_POINTS = 33                         # points of the two pieces of the curve that meet at a sample
+_MAX_POINTS = 10_000                     # largest number of points to pair: each is compared with every sample
 
 
 @np.errstate(over="ignore")
@@ -61,7 +61,7 @@ class SampledCurve:
         grows = np.concatenate([[True], np.diff(s) > 0])
         points, s = points[grows], s[grows]
         self.at = Akima1DInterpolator(s, points, axis=0) if len(points) > 3 else interp1d(s, points, axis=0)
-        self.s = np.linspace(0, s[-1], _SAMPLES)
+        self.s = np.linspace(0, s[-1], _CURVE_SAMPLES)
         self.line = self.at(self.s)
 
     def foot(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
@@ -74,8 +74,8 @@ class SampledCurve:
         Returns:
             The closest point of the curve, shape (c,); True if `point` lies beyond an end of the curve.
         """
-        low, high = max(k - 1, 0), min(k + 1, _SAMPLES - 1)
-        line = self.at(np.linspace(self.s[low], self.s[high], _FINE))
+        low, high = max(k - 1, 0), min(k + 1, _CURVE_SAMPLES - 1)
+        line = self.at(np.linspace(self.s[low], self.s[high], _PIECE_POINTS))
         d = np.diff(line, axis=0)
         t = ((point - line[:-1]) * d).sum(1) / (d * d).sum(1)
         feet = line[:-1] + np.clip(t, 0, 1)[:, None] * d
@@ -83,7 +83,7 @@ class SampledCurve:
         past = 0.0
         if low == 0 and j == 0:
             past = -t[j]
-        elif high == _SAMPLES - 1 and j == len(t) - 1:
+        elif high == _CURVE_SAMPLES - 1 and j == len(t) - 1:
             past = t[j] - 1
         beyond = float(past * np.linalg.norm(d[j]))
         across = float(np.linalg.norm(point - line[j] - t[j] * d[j]))
@@ -105,8 +105,8 @@ def paired(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndar
         InputError: too many points, or points in the reverse order of the curve.
     """
     n, line = len(points), curve.line
-    if n > _MOST:
-        raise InputError(f"compare: theirs has {n} points; at most {_MOST} can be compared: thin it out")
+    if n > _MAX_POINTS:
+        raise InputError(f"compare: theirs has {n} points; at most {_MAX_POINTS} can be compared: thin it out")
     cost = _costs(points, line)
     if 100 * _costs(points[::-1], line)[-1].min() < cost[-1].min():
         raise InputError("compare: theirs runs along our curve backwards: put its rows in order along the path")

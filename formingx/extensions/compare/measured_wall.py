@@ -15,9 +15,9 @@ from ...io.csv_files import read
 from ...results import files
 from ...results.path import Path
 
-_FAR = 1.0
+_REPORTED_DISTANCE = 1.0
 """Distance of a measured point from the computed middle line, over the wall there, above which the table shows it."""
-_BEYOND = 0.1
+_MAX_OVERHANG = 0.1
 """Distance of a measured point beyond the end of the computed part, over its length, up to which it is accepted."""
 _WALL = ("wall", "thickness", "wall_thickness")
 _LENGTH = ("length", "arc_length")
@@ -156,7 +156,7 @@ class MeasuredWall:
             line = profile.arc_length if self.length is not None else profile.reference_length
             places = getattr(self, name)
             beyond = np.maximum(np.maximum(-places, places - line[-1]), 0.0)
-            for k in np.flatnonzero(beyond > _BEYOND * line[-1])[:1]:
+            for k in np.flatnonzero(beyond > _MAX_OVERHANG * line[-1])[:1]:
                 raise InputError(f"MeasuredWall: {name}[{k}] = {places[k]:.6g}: the computed part goes from 0 to"
                                  f" {line[-1]:.6g}")
             return np.interp(places, line, numbers), beyond
@@ -206,8 +206,8 @@ class WallComparison:
     def __str__(self) -> str:
         lines = [f"{'length':>10}{'measured':>12}{'computed':>12}{'deviation':>12}"]
         lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed section" * bool(
-            a > _FAR * c)) for s, m, c, d, a in zip(self.length, self.measured, self.computed, self.deviation_percent,
-                                                    self.away)]
+            a > _REPORTED_DISTANCE * c)) for s, m, c, d, a in zip(
+                self.length, self.measured, self.computed, self.deviation_percent, self.away)]
         worst = int(np.abs(self.deviation_percent).argmax())
         return "\n".join([*lines, f"mean {self.mean_percent:+.1f} %, root mean square {self.rms_percent:.1f} %, largest"
                                   f" {self.deviation_percent[worst]:+.1f} % at length {self.length[worst]:.4g}"])

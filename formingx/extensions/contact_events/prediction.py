@@ -19,7 +19,7 @@ from .response import Response
 
 log = logging.getLogger("formingx")
 
-SHARE = 0.05
+MAX_CLOSURES = 0.05
 """Largest part of the points of a face that close their gaps in one step."""
 
 
@@ -43,7 +43,7 @@ class ContactEventPredictor:
         face, most = approach.face, approach.at_once
         if not self._limit.several or not face.law.has_friction or face.contact.nodes_per_step or face.contact.lagged:
             return most
-        return max(most, round(SHARE * approach.points))
+        return max(most, round(MAX_CLOSURES * approach.points))
 
     @property
     def active(self) -> bool:

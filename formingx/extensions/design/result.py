@@ -15,7 +15,7 @@ from ...units import NONE, Units
 from .confidence import Confidence, confidence
 from .run import DesignRun
 
-_SCATTER = 6e-5
+_WALL_SCATTER = 6e-5
 """Relative scatter of the wall between runs that take different steps."""
 
 
@@ -112,7 +112,7 @@ class DesignResult:
         """
         jacobian = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
-        return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < _SCATTER]
+        return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < _WALL_SCATTER]
 
     def attainable(self) -> float:
         """Return the lowest unevenness of the wall that the parameters can reach within their bounds, for any volume.

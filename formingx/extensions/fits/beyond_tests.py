@@ -18,7 +18,7 @@ from ...mesh.triangles import place
 from ...ranks import gathered
 from .tested import MeasuredRange, nearest_test, principal
 
-_SHARE = 0.005             # share of a layer's volume that may lie outside the tests without a warning
+_MAX_UNTESTED_VOLUME = 0.005             # share of a layer's volume that may lie outside the tests without a warning
 
 
 @register("scene")
@@ -64,7 +64,7 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
             strains, points, volumes = _deformation(problem, terms)
         outside = tested.outside(strains)
         share = float(volumes[outside].sum() / volumes.sum())
-        if share < _SHARE:
+        if share < _MAX_UNTESTED_VOLUME:
             continue
         far = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
         largest, middle = strains[far]

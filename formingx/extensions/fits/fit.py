@@ -22,10 +22,10 @@ from .tested import MeasuredRange
 from .uncertainty import Uncertainty, uncertainty
 from .weights import numbered_weights
 
-_FIRST = 20
+_FIRST_EVALUATIONS = 20
 """Largest number of evaluations of the residual from each first guess."""
 
-_LAST = 400
+_LAST_EVALUATIONS = 400
 """Largest number of evaluations from each of the best three results, to refine them."""
 
 IN_TIME: list[tuple[type, Callable]] = [(RelaxingMaterial, fitted_in_time)]
@@ -253,8 +253,8 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         """Return the first element of a result of `refined`, its cost, to sort by it."""
         return trial[0]
 
-    trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST) for g in guesses), key=cost)
-    least, guess, x = min((refined(g, x, _LAST) for _, g, x in trials[:3]), key=cost)
+    trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST_EVALUATIONS) for g in guesses), key=cost)
+    least, guess, x = min((refined(g, x, _LAST_EVALUATIONS) for _, g, x in trials[:3]), key=cost)
     if not np.isfinite(least):
         raise InputError(f"fit: {guess} has no finite stress at some stretch of the data: start with constants whose"
                          f" limit lies beyond them")

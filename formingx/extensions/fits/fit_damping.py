@@ -15,9 +15,9 @@ from .fit_in_time import TimedTest, checked_tests
 from .uncertainty import Uncertainty, uncertainty
 from .weights import divisors
 
-_PER_DECADE = 2.0
+_TIMES_PER_DECADE = 2.0
 """Number of relaxation times for each decade of frequency."""
-_BEYOND = 1.5
+_RANGE_FACTOR = 1.5
 """Factor by which the range of relaxation times exceeds the range of inverse frequencies at both ends."""
 
 
@@ -73,8 +73,8 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
     if not (np.all(w > 0) and np.all(G1 > 0) and np.all(G2 > 0)):
         raise InputError("fit_spectrum: frequencies, storage and loss must be above 0")
     decades = math.log10(w.max() / w.min())
-    n = max(2, math.ceil(_PER_DECADE * decades) + 1) if terms is None else count("fit_spectrum: terms", terms)
-    tau = np.geomspace(1 / (_BEYOND * w.max()), _BEYOND / w.min(), n)
+    n = max(2, math.ceil(_TIMES_PER_DECADE * decades) + 1) if terms is None else count("fit_spectrum: terms", terms)
+    tau = np.geomspace(1 / (_RANGE_FACTOR * w.max()), _RANGE_FACTOR / w.min(), n)
     x = w[:, None] * tau
     rows = np.vstack([x**2 / (1 + x**2) / G1[:, None], x / (1 + x**2) / G2[:, None]])
     G, misfit = nnls(rows, np.ones(2 * len(w)))

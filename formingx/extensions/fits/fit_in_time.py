@@ -21,7 +21,7 @@ from ...materials.relaxing import RelaxingMaterial
 from .uncertainty import Uncertainty, uncertainty
 from .weights import divisors, in_range
 
-_PER_DECADE = 16
+_TIMES_PER_DECADE = 16
 """Number of relaxation times per decade at which the stress of a branch is computed; a cubic spline connects them."""
 
 
@@ -193,7 +193,7 @@ class _Data:
         if not longest > 0:
             raise InputError("fit: data: no test lasts any time: the times of each are all the same")
         low, high = np.log(steps[steps > 0].min() / 10), np.log(10 * longest)
-        self.log_tau = np.linspace(low, high, 2 + int(_PER_DECADE * (high - low) / np.log(10)))
+        self.log_tau = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE * (high - low) / np.log(10)))
         self._stretches = np.hstack([homogeneous.in_plane_stretches(t.mode, t.stretches[m])
                                      for t, m in zip(self.tests, measured)])
         l1, l2 = self._stretches

@@ -14,12 +14,12 @@ from ...errors import InputError, finite_array, instance, known
 from ...materials.homogeneous import MODES, in_plane_stretches
 from ...materials.material import Material
 
-_NEAR = 0.1
+_TESTED_DISTANCE = 0.1
 """Distance of strains from the tested ones, over their norm, up to which a deformation counts as tested."""
-_SMALL = 0.02
+_TESTED_STRAIN = 0.02
 """Distance of logarithmic strains from the tested ones up to which every deformation counts as tested."""
 
-_STRAIGHT = 1e-8
+_COLLINEAR_AREA = 1e-8
 """Twice the area of a triangle of strains below which its corners count as points of a line."""
 
 
@@ -99,7 +99,7 @@ class MeasuredRange:
             Mask, shape (m,).
         """
         size = np.hypot(*strains.T)
-        return self.distance(strains) > np.maximum(_NEAR * size, _SMALL)
+        return self.distance(strains) > np.maximum(_TESTED_DISTANCE * size, _TESTED_STRAIN)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return rows of a table about the tests, for the report of a material.
@@ -196,7 +196,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])
-                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= _STRAIGHT:
+                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= _COLLINEAR_AREA:
                 found.pop()
             found.append((x, y))
         return found[:-1]

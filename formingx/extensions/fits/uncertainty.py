@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-_NOISE = 0.01
+_ASSUMED_NOISE = 0.01
 """Relative noise of a measurement that is assumed if the misfit is smaller."""
-_OPEN = 0.5
+_UNDETERMINED_ERROR = 0.5
 """Standard error over the value of a constant above which the tests do not determine the constant."""
-_VISIBLE = 1e-6
+_MIN_STRESS_CHANGE = 1e-6
 """Change of some stress, over its size in the fit, that the step of a difference quotient must reach."""
 
 
@@ -62,8 +62,9 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     spread = np.sqrt(np.diag(inverse))
     squares, excess = float(np.sum(((first - measured) / sizes) ** 2)), len(measured) - len(values)
     error = math.sqrt(squares / excess) if excess > 0 else math.nan
-    noise = max(_NOISE, math.sqrt(squares / len(measured)))
-    open_ = [name for name, value, each in zip(constants, values, spread) if noise * each > _OPEN * abs(value)]
+    noise = max(_ASSUMED_NOISE, math.sqrt(squares / len(measured)))
+    open_ = [name for name, value, each in zip(constants, values, spread)
+             if noise * each > _UNDETERMINED_ERROR * abs(value)]
     with np.errstate(invalid="ignore"):
         covariance = np.where(inverse == 0, 0.0, error**2 * inverse)
     return Uncertainty({name: float(error * each) for name, each in zip(constants, spread)}, tuple(open_), covariance)
@@ -88,7 +89,7 @@ def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, size
             break
         for change in (step, -step)[:1 + (abs(step) < abs(values[i]))]:             # it may be at the upper bound
             moved = (stress(values + change * np.eye(len(values))[i]) - first) / sizes
-            if np.all(np.isfinite(moved)) and np.abs(moved).max() > _VISIBLE:
+            if np.all(np.isfinite(moved)) and np.abs(moved).max() > _MIN_STRESS_CHANGE:
                 return moved / change
         step *= 10
     return np.zeros(len(first))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError, instance, non_negative, pair, several
 
-_LEAST = 0.02
+_MIN_DIVISOR = 0.02
 """Smallest divisor of a relative misfit, over the largest stress of its test."""
 
 
@@ -32,7 +32,7 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np
     found = []
     for P, weight in zip(parts, weights):
         own = float(np.abs(P).max(initial=0.0)) or largest
-        size = np.maximum(np.abs(P), _LEAST * own) if relative else np.full(len(P), largest)
+        size = np.maximum(np.abs(P), _MIN_DIVISOR * own) if relative else np.full(len(P), largest)
         found.append(size / np.sqrt(weight))
     return np.concatenate(found)
 

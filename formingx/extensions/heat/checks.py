@@ -16,20 +16,20 @@ from .run import checked_materials
 
 _FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
            " glass")
-_RISES = 2.0
+_MODULUS_RATIO = 2.0
 """Equilibrium modulus at the lowest temperature over the modulus at the highest, above which a check warns."""
 
-_ALLOWED = 0.01
+_ALLOWED_ERROR = 0.01
 """Error of the temperature, over the span of temperatures, for which `layers_needed` asks."""
-_ONE_LAYER = 0.14
+_ERROR_OF_ONE_LAYER = 0.14
 """Error over the span of temperatures with one layer of elements, for a face that is chilled suddenly.
 
 This and the next two constants were measured with one to eight equal layers, after a hundredth of wall^2/diffusivity
 (tests/test_heat_layers.py).
 """
-_ORDER = 1.75
+_LAYER_ORDER = 1.75
 """Order of the error in the number of layers."""
-_WEAK = 2.0
+_HALF_ERROR_BIOT = 2.0
 """Biot number (conductance times wall over conductivity) at which the error is half the error at an infinite one."""
 
 
@@ -48,7 +48,7 @@ def error_of_layers(layers: float, biot: float) -> float:
     Returns:
         Error e over the difference between the highest and the lowest temperature.
     """
-    return _ONE_LAYER * _biot_factor(biot) * layers ** -_ORDER
+    return _ERROR_OF_ONE_LAYER * _biot_factor(biot) * layers ** -_LAYER_ORDER
 
 
 def layers_needed(biot: float) -> int:
@@ -60,12 +60,12 @@ def layers_needed(biot: float) -> int:
     Returns:
         Number of layers through the thickness.
     """
-    return max(1, int(np.ceil((_ONE_LAYER * _biot_factor(biot) / _ALLOWED) ** (1 / _ORDER))))
+    return max(1, int(np.ceil((_ERROR_OF_ONE_LAYER * _biot_factor(biot) / _ALLOWED_ERROR) ** (1 / _LAYER_ORDER))))
 
 
 def _biot_factor(biot: float) -> float:
     """Return the temperature error of coarse layers at a Biot number over the error at an infinite Biot number."""
-    return 1.0 if np.isinf(biot) else biot / (biot + _WEAK)
+    return 1.0 if np.isinf(biot) else biot / (biot + _HALF_ERROR_BIOT)
 
 
 @register("scene")
@@ -130,7 +130,7 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
                 cold, hot = value.clamped(np.array([low, high]))
             except InputError:                              # the run raises it, if it reaches the temperature
                 continue
-            if cold > _RISES * hot > 0:
+            if cold > _MODULUS_RATIO * hot > 0:
                 yield Finding("warning", f"layer {layer!r}",
                               f"{name}, of the relaxed material, is {cold / hot:.3g} times as large at {low:.4g}"
                               f" degrees as at {high:.4g}: as the stretched part cools, it pulls back with that much"

@@ -33,7 +33,7 @@ from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, HeatContact
 from .vectors import HeatVectors
 
-_MOST_ITERATIONS = 20
+_MAX_ITERATIONS = 20
 """Largest number of Newton iterations in an implicit stage."""
 
 
@@ -187,7 +187,7 @@ class Conduction(HeatVectors):
         T = state[0]
         responses = [touch.response(lines, k, c) for touch, lines, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
-        for iteration in range(_MOST_ITERATIONS):
+        for iteration in range(_MAX_ITERATIONS):
             R = self._body_rate(T + change)
             for touch, response in zip(self.tool_contacts, responses):
                 T_face = (T + change)[touch.dofs]

@@ -15,7 +15,7 @@ from .contact import ConductingTool, ContactWithTool
 from .cooling_history import CoolingHistory
 from .run import checked_boundaries, checked_materials
 
-_CONTINUOUS = 1e4
+_SUDDEN_CONDUCTANCE = 1e4
 """Conductance that replaces a suddenly prescribed temperature, over conductivity/thickness.
 
 The shrinkage of a part differs by 0.1 % from the limit of an infinite conductance (with 1e3: 0.6 %, with 1e2: 2.5 %;
@@ -123,7 +123,7 @@ class Cooling:
         """Return the heat conduction of a part after demoulding: without tools, with other laws at the faces.
 
         A prescribed temperature of a face would change the stress at once by a finite amount. It is replaced by
-        convection with the large conductance `_CONTINUOUS` conductivity/thickness.
+        convection with the large conductance `_SUDDEN_CONDUCTANCE` conductivity/thickness.
 
         Args:
             mesh: `Mesh` of the body.
@@ -139,7 +139,8 @@ class Cooling:
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
             boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
                                               "boundaries, such as Convection(...)")
-        h = _CONTINUOUS * max(m.conductivity for m in checked_materials(mesh, self.materials).values()) / thickness
+        conductivity = max(m.conductivity for m in checked_materials(mesh, self.materials).values())
+        h = _SUDDEN_CONDUCTANCE * conductivity / thickness
         laws = [Convection(law.on, h=h, air=law.parameters["temperature"]) if isinstance(law, FixedTemperature) else law
                 for law in laws]
         return Cooling(self.materials, laws, unit=self.unit, tolerance=self.tolerance, work_to_heat=self.work_to_heat)

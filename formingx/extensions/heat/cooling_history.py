@@ -20,17 +20,17 @@ from .layers import graded
 from .run import checked_boundaries, checked_materials
 from .space_error import SpaceError
 
-_MOST_STEPS = 10_000
+_MAX_STEPS = 10_000
 """Largest number of steps of the heat equation in one step of the run."""
 
-_WARNS = 2e-3
+_WARNED_ERROR = 2e-3
 """Discretisation error of the temperature, over its span, above which a run warns: the promised accuracy of stresses.
 """
 
 _CHECKED_STATES = 8
 """Number of states in which the discretisation error is estimated, besides the ends of stages."""
 
-_NEAR = 1e-2
+_CONTACT_DISTANCE = 1e-2
 """Distance to a tool over the thickness of the body within which a node exchanges heat with it.
 
 A layer of air of this thickness conducts as well as a contact. A sheet that is drawn over a flat face lifts off its
@@ -145,7 +145,7 @@ class CoolingHistory:
         ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
         worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
         duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])    # since it was looked at last
-        allowed = max(self._cooling.tolerance, _WARNS * span)
+        allowed = max(self._cooling.tolerance, _WARNED_ERROR * span)
         if errors[worst] <= allowed:
             return []
         low, high = self._cooling.extremes(scene)
@@ -201,7 +201,7 @@ class CoolingHistory:
     def _integrate(self, until: float) -> None:
         """Solve the heat equation up to the time `until`, with the body at a fixed position."""
         dt, tolerance = self._dt or 1e-3 * (until - self._time), self._cooling.tolerance
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MAX_STEPS):
             trial = stepping.fitted(dt, until - self._time)
             found = stepping.step(self._body, self._state, trial)
             dt = stepping.next_length(trial, found.error, tolerance)
@@ -211,7 +211,7 @@ class CoolingHistory:
             if self._time == until:
                 self._dt = max(dt, trial)
                 return
-        raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MOST_STEPS} steps")
+        raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MAX_STEPS} steps")
 
     def get(self) -> HeatState:
         """Return the present state of the heat equation.
@@ -325,7 +325,7 @@ def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, 
     u = body.displacements()
     for touch, contact, conductance in tool_contacts:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.travelled(control))
-        touch.conductance[:] = conductance * (contact.present & (depth > -_NEAR * contact.thickness))
+        touch.conductance[:] = conductance * (contact.present & (depth > -_CONTACT_DISTANCE * contact.thickness))
 
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:

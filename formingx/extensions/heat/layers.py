@@ -17,11 +17,11 @@ from ...errors import InputError
 from ...mesh import Mesh
 from ...mesh.grid import Grid, gathered, to_mesh
 
-_PART = 0.3
+_LAYER_THICKNESS = 0.3
 """Thickness of a layer over the penetration depth of heat: errors are then some 1e-5 of the span of temperatures."""
-_REACH = 7.0
+_MAX_DEPTH = 7.0
 """Largest depth of heat over the penetration depth at the last time: 1 - erf(7/2) is 7e-7."""
-_SPARE = 0.2
+_ROUNDING_MARGIN = 0.2
 """Part of a layer by which the required number of layers is reduced before it is rounded up."""
 _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 """Positions along an edge, from 0 to 1, at which the required thickness of layers is integrated."""
@@ -56,14 +56,14 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
         mesh: mesh of the sheet.
         faces: "bottom", "top" or both.
         part: largest allowed thickness of the layer at a face, over the thickness of the present elements there.
-        depth: penetration depth of heat, length; the layer at a face is at most `_PART` of it.
+        depth: penetration depth of heat, length; the layer at a face is at most `_LAYER_THICKNESS` of it.
 
     Returns:
         Sizes, dimensionless, as the argument `elements=(n, sizes)` of a mesh takes them.
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
-    thinnest, longest = min([_PART * depth, *(part * height for height in heights)]), max(lengths)
+    thinnest, longest = min([_LAYER_THICKNESS * depth, *(part * height for height in heights)]), max(lengths)
     n = int(np.ceil(3 * np.log2((2 ** (1 / 3) - 1) * area[0] / longest / len(faces) / thinnest + 1)))
     sizes = [2 ** (k / 3) for k in range(n)]
     return sizes + sizes[::-1] if len(faces) > 1 else sizes if "bottom" in faces else sizes[::-1]
@@ -111,14 +111,14 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
                                       for i, j in ((0, 1), (1, 2), (2, 0))]), axis=0)
     ends = below[:, edges]                                   # shape (faces, edges, 2)
     across, nearest = np.abs(np.diff(ends)[..., 0]), ends.min(2)
-    at_most = (across / (_PART * np.maximum(first, nearest / 3)) * (nearest < _REACH * last)).sum(0)
+    at_most = (across / (_LAYER_THICKNESS * np.maximum(first, nearest / 3)) * (nearest < _MAX_DEPTH * last)).sum(0)
     found = {}
-    for k in np.flatnonzero(at_most > 1 + _SPARE):
+    for k in np.flatnonzero(at_most > 1 + _ROUNDING_MARGIN):
         y = ends[:, k, :1] * (1 - _SAMPLES) + ends[:, k, 1:] * _SAMPLES
-        size = np.where(y < _REACH * last, _PART * np.maximum(first, y / 3), np.inf)
+        size = np.where(y < _MAX_DEPTH * last, _LAYER_THICKNESS * np.maximum(first, y / 3), np.inf)
         density = np.where(size == size.min(0), across[:, k, None] / size, 0.0).max(0)
         layers = np.concatenate([[0.0], np.cumsum(np.diff(_SAMPLES) * (density[1:] + density[:-1]) / 2)])
-        n = int(np.ceil(layers[-1] - _SPARE))
+        n = int(np.ceil(layers[-1] - _ROUNDING_MARGIN))
         if n > 1:
             found[tuple(edges[k].tolist())] = np.interp(np.arange(1, n) / n * layers[-1], layers, _SAMPLES)
     return found

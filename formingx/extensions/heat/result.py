@@ -11,7 +11,7 @@ from ...results import files
 from ...scene.fields import PointReader
 from .conduction import Conduction
 
-_POINTS = 201
+_LINE_POINTS = 201
 """Number of points on a line through the body."""
 
 
@@ -148,7 +148,8 @@ class HeatRun:
         reader = PointReader(self._body.space, points)
         return np.array([reader.read(self.temperature(t).x.array) for t in self._times_or_outputs(times)])
 
-    def through(self, times: Any = None, *, line: Any = None, points: int = _POINTS) -> tuple[np.ndarray, np.ndarray]:
+    def through(self, times: Any = None, *, line: Any = None,
+                points: int = _LINE_POINTS) -> tuple[np.ndarray, np.ndarray]:
         """Return temperatures along a straight line through the body.
 
         Args:
@@ -181,7 +182,7 @@ class HeatRun:
             InputError: as in `through`.
         """
         _, T = self.through(times, line=line)
-        weights = np.full(_POINTS, 2.0)
+        weights = np.full(_LINE_POINTS, 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
         return T @ (weights / weights.sum())
 

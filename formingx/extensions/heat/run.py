@@ -23,9 +23,9 @@ from .layers import layered
 from .result import HeatRun
 from .space_error import SpaceError
 
-PROMISE = 3e-4
+WARNED_ERROR = 3e-4
 """Discretisation error, over the span of temperatures in a run, above which a warning is logged."""
-_EARLY = 0.01
+_FIRST_ACCURATE_TIME = 0.01
 """Earliest time, over the duration of a run, at which temperatures are as accurate as at the output times."""
 
 _log = logging.getLogger(__name__)
@@ -101,7 +101,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
     """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
-    first = np.sqrt(slowest * min(times[0], _EARLY * times[-1]))
+    first = np.sqrt(slowest * min(times[0], _FIRST_ACCURATE_TIME * times[-1]))
     last = np.sqrt(fastest * times[-1])
     depths: dict[str, tuple[float, float]] = {}
     for law in boundaries:
@@ -186,13 +186,13 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
-    """Estimate the discretisation error at the output times; log a warning if it exceeds `PROMISE` and `tolerance`."""
+    """Estimate the discretisation error at the output times; warn if it exceeds `WARNED_ERROR` and `tolerance`."""
     try:
         run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])
     finally:
         estimator.destroy()
-    allowed = max(tolerance, PROMISE * (max(run.hottest(t).temperature for t in run.times)
+    allowed = max(tolerance, WARNED_ERROR * (max(run.hottest(t).temperature for t in run.times)
                                         - min(run.coldest(t).temperature for t in run.times)))
     worst = int(np.argmax(run.errors_in_space))
     if run.errors_in_space[worst] > allowed:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import InputError, finite, positive
 
-_NEAR = 1e-4
+_MIN_ROOT = 1e-4
 """Smallest square root s in Wagner's exponent for the slope of h, which is infinite at s = 0."""
 
 
@@ -178,7 +178,7 @@ class SoskeyWinter(Damping):
         J = self.alpha * I1 + (1 - self.alpha) * I2 - 3
         power = self.a * np.maximum(J, 0) ** (self.b / 2)
         h = 1 / (1 + power)
-        slope = -h**2 * self.b / 2 * self.a * np.maximum(J, _NEAR**2) ** (self.b / 2 - 1)
+        slope = -h**2 * self.b / 2 * self.a * np.maximum(J, _MIN_ROOT**2) ** (self.b / 2 - 1)
         return h, self.alpha * slope, (1 - self.alpha) * slope
 
 
@@ -189,7 +189,7 @@ def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: An
     """
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]
-    slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _NEAR))
+    slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _MIN_ROOT))
     return sum(each), alpha * slope, (1 - alpha) * slope
 
 

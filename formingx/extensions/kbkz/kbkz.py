@@ -28,9 +28,9 @@ from .damping import Damping
 from .integral import Integral
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-_PANELS = 1.5
+_PANEL_AGE_RATIO = 1.5
 """Ratio of the ages at the ends of a panel of the memory integral; up to half the shortest relaxation time is one."""
-_STRAIN = 0.25
+_PANEL_STRAIN = 0.25
 """Largest change of logarithmic strain in a panel of the memory integral."""
 
 
@@ -273,10 +273,10 @@ class KBKZ(Relaxing):
         """Return ends of the panels of the memory integral of a test, as ages before its last time, ascending from 0.
         """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
-        count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANELS)) + 1)
-        ages = [np.array([0, whole]), shortest / 2 * _PANELS ** np.arange(count), times[-1] - times]
+        count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
+        ages = [np.array([0, whole]), shortest / 2 * _PANEL_AGE_RATIO ** np.arange(count), times[-1] - times]
         for i in np.flatnonzero(np.diff(times) > 0):
-            parts = int(np.abs(np.log(stretches[i + 1] / stretches[i])) / _STRAIN) + 1
+            parts = int(np.abs(np.log(stretches[i + 1] / stretches[i])) / _PANEL_STRAIN) + 1
             if parts > 1:
                 ages.append(times[-1] - np.linspace(times[i], times[i + 1], parts + 1))
         found = np.unique(np.concatenate(ages))

@@ -18,7 +18,7 @@ from ...forms.transfer import MovingLeastSquares, fitted_tensors, isochoric_grad
 from ...materials.tensors import IDENTITY, cofactor, deviator_squared, entries, inner, isochoric
 from ...ranks import gathered
 
-_NEGLIGIBLE = 3e-7
+_DROPPED_STATE_ERROR = 3e-7
 """Relative error of the present stress up to which a past state is dropped and interpolated from its neighbours.
 
 In a fine run of a thousand states the errors add up to 3e-4 of the stress (with 3e-6 to 4e-3).
@@ -207,7 +207,7 @@ class PastStates:
         squares = comm.allreduce(np.array([*np.sum(deviation, axis=1), np.sum(total)]), MPI.SUM)
         jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(times, axis=0) <= 0, axis=1)]).astype(int),
                               MPI.SUM)                                      # a state that begins or ends one is needed
-        small = squares[:-1] < _NEGLIGIBLE**2 * squares[-1]
+        small = squares[:-1] < _DROPPED_STATE_ERROR**2 * squares[-1]
         chosen, left_out = [0], False
         for k in range(1, len(states) - 1):
             left_out = bool(k < len(states) - 2 and small[k - 1] and not left_out and not jump[k] and not jump[k + 1])

@@ -30,7 +30,7 @@ from ...solve.stepping import allowed as allowed_error
 from ...units import NONE, Units
 from .part import part_along
 
-_THROUGH = 1.0
+_COOLING_TIME = 1.0
 """Default cooling time over thickness^2/diffusivity: a temperature difference decreases by exp(-pi^2)."""
 
 
@@ -220,7 +220,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
         faces, finite("Path.springback: temperature", temperature)))
     if duration is not None:
         return heat, positive("Path.springback: duration", duration)
-    return heat, _THROUGH * heat.time_through(scene.mesh, thickness)
+    return heat, _COOLING_TIME * heat.time_through(scene.mesh, thickness)
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:

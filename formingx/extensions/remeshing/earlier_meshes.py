@@ -16,7 +16,7 @@ from ...forms.probes import Probe
 from ...forms.transfer import MovingLeastSquares
 from ...mesh.nodes import of_mesh, of_space
 
-_NEAR = 0.02
+_OUTLINE_DISTANCE = 0.02
 """Distance from the outline over the length of an edge below which a point is moved onto it: new edges differ from old.
 """
 
@@ -109,7 +109,7 @@ class _Onto:
 
     def __init__(self, problem: Any):
         self._edges = Outline(problem.forms).rest
-        self._near = _NEAR * np.linalg.norm(self._edges[:, 1] - self._edges[:, 0], axis=1)
+        self._near = _OUTLINE_DISTANCE * np.linalg.norm(self._edges[:, 1] - self._edges[:, 0], axis=1)
 
     @cached_property
     def _tree(self) -> Any:

@@ -34,13 +34,13 @@ _LOCAL_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0],
 _LATTICE = np.array([(i, j) for i in range(5) for j in range(5 - i)]) / 4
 """Local coordinates of the points of a triangle at which `_flattened` and the search of cells sample it."""
 
-_DEGREE = 12
+_QUADRATURE_DEGREE = 12
 """Quadrature degree of means over new elements, which old edges cross."""
 
-_CANDIDATES = 8
+_CANDIDATE_ELEMENTS = 8
 """Number of old elements in which a point is searched."""
 
-_FLATTENED_BELOW = 0.3
+_MIN_DETERMINANT_RATIO = 0.3
 """Smallest det b and hoop entry of b in an element, over those of the mean; a field below is moved towards the mean."""
 
 
@@ -175,7 +175,7 @@ class Preformed(NamedTuple):
 
         forms: the `Formulation` on the new mesh. Shapes of the results: (cells, 6, 6) and (cells, 3, fields).
         """
-        rule: Any = basix.make_quadrature(basix.CellType.triangle, _DEGREE)
+        rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
         at, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
         sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), at)
@@ -227,7 +227,7 @@ class Preformed(NamedTuple):
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
         tree = cKDTree(np.concatenate(_tabulated(_POSITIONS, inside)[0] @ self.x))
-        rows = tree.query(points, _CANDIDATES)[1]
+        rows = tree.query(points, _CANDIDATE_ELEMENTS)[1]
         cells, found = rows[:, 0] // len(inside), inside[rows[:, 0] % len(inside)]
         least, size = np.full(len(points), -np.inf), np.ptp(points, axis=0).max()
         for column in rows.T:
@@ -287,8 +287,9 @@ def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     deviation, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):
         rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ deviation, -1, 0)
-        bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _FLATTENED_BELOW)
-               | (hoop < _FLATTENED_BELOW * mean[..., 3]) | (np.hypot(along, turned) < _FLATTENED_BELOW)).any(1)
+        bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _MIN_DETERMINANT_RATIO)
+               | (hoop < _MIN_DETERMINANT_RATIO * mean[..., 3])
+               | (np.hypot(along, turned) < _MIN_DETERMINANT_RATIO)).any(1)
         if not bad.any():
             break
         deviation[bad] *= 0.7 if k < 10 else 0.0

@@ -11,7 +11,7 @@ from ...mesh import with_gmsh
 from ...mesh.grid import Grid, to_mesh
 from ...mesh.mesh import Mesh
 
-_GROWTH = 0.3
+_SIZE_GROWTH = 0.3
 """Growth of the element size per distance from a corner."""
 
 
@@ -134,7 +134,7 @@ def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -
         return np.einsum("nk,nki->ni", shapes, edges[k])
     x = place(parameter)
     away = np.linalg.norm(x[:, None] - corners[None], axis=2).min(1) if len(corners) else np.full(len(x), np.inf)
-    h = np.minimum(size, corner + _GROWTH * away)
+    h = np.minimum(size, corner + _SIZE_GROWTH * away)
     steps = np.linalg.norm(np.diff(x, axis=0), axis=1)
     number = np.concatenate([[0.0], np.cumsum(steps * (1 / h[1:] + 1 / h[:-1]) / 2)])
     n = max(int(np.ceil(number[-1] - 0.3)), 1)

@@ -37,25 +37,25 @@ from .remeshed import enclosed, remeshed
 
 log = logging.getLogger("formingx")
 
-_SHARES = (1.0, 0.9, 1.1, 0.8)
+_SIZE_FACTORS = (1.0, 0.9, 1.1, 0.8)
 """Element sizes to try, relative to the requested size."""
 
-_GOOD = 0.4
+_GOOD_MARGIN = 0.4
 """Distance of J from its limits, over the distance of 1, above which a new mesh is good at once."""
 
-_FEWEST = 3
+_MIN_STATES = 3
 """Number of states on a mesh from which its quality may be the cause of a failed step."""
 
-_CHANGED = 0.1
+_VOLUME_CHANGE = 0.1
 """Volume change |J - 1| above which the mesh may be the cause of a failed step."""
 
-_FAILED = 4
+_MAX_FAILURES = 4
 """Maximum number of successive states without a new mesh."""
 
-_CRUSHED = 0.5
+_MIN_VOLUME_MARGIN = 0.5
 """Smallest J over its lower limit, below which the run ends if no new mesh is found."""
 
-_POCKET = 0.25
+_POCKET_DEPTH = 0.25
 """Depth over the element size up to which a gap between body and tool is closed."""
 
 _OWN_ENTRIES = "step", "counts", "until", "column"
@@ -175,8 +175,8 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
                 _start_new_mesh(path, remesh, tolerances)
                 failed = []
             except ConvergenceError as error:                # a mesh may succeed at the next state
-                crushed = _ratios(record, record.last)[0] < _CRUSHED * remesh.volume_ratio[0]
-                if crushed or len(failed) == _FAILED or any(record.last is state for state in failed):
+                crushed = _ratios(record, record.last)[0] < _MIN_VOLUME_MARGIN * remesh.volume_ratio[0]
+                if crushed or len(failed) == _MAX_FAILURES or any(record.last is state for state in failed):
                     raise
                 failed.append(record.last)
                 log.info("the old mesh is kept for a state: %s", error)
@@ -185,7 +185,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
             part()
         except ConvergenceError as error:
             low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
-            if len(record.segments[-1].states) < _FEWEST or low > 1 - _CHANGED and high < 1 + _CHANGED:
+            if len(record.segments[-1].states) < _MIN_STATES or low > 1 - _VOLUME_CHANGE and high < 1 + _VOLUME_CHANGE:
                 raise                                        # the mesh is not the cause
             log.info("a new mesh, as no state was found: %s", error)
             record.ended = _POOR_MESH
@@ -242,7 +242,7 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
     """
     low, high = remesh.volume_ratio
     found, reason = [], ""
-    for share in _SHARES:
+    for share in _SIZE_FACTORS:
         try:
             segment, start = _new_mesh(path, remesh, tolerances, share)
         except (ConvergenceError, Failure, InputError) as error:
@@ -252,11 +252,11 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
         segment.problem.set_fields_and_control(start.x, start.control)
         least, largest = segment.problem.admissible.volume_ratios()
         found.append((min((least - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
-        if found[-1][0] > _GOOD:
+        if found[-1][0] > _GOOD_MARGIN:
             break
     if not found:
-        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh ({len(_SHARES)} sizes were tried):"
-                               f" {reason}")
+        raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh ({len(_SIZE_FACTORS)} sizes were"
+                               f" tried): {reason}")
     _, segment, start = max(found, key=lambda entry: entry[0])
     return segment, start
 
@@ -317,7 +317,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed(edges[order], scene.kinematics.axisymmetric)
     on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
-    edges = _without_pockets(edges[order], on_tools, _POCKET * sizes[1])
+    edges = _without_pockets(edges[order], on_tools, _POCKET_DEPTH * sizes[1])
     corners = _corners(edges, names, touched)
     layer, = scene.mesh.layers
     mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,

@@ -13,7 +13,7 @@ from ...tools.pieces import Arc
 from .solid_tool import Swept
 from .triangulated import Triangulated
 
-_SHARE = 1e-3              # share of the sheet's area in compression from which on a finding is made
+_COMPRESSED_AREA = 1e-3              # share of the sheet's area in compression from which on a finding is made
 
 
 @register("end")
@@ -32,7 +32,7 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
         return
     wall = path.wall()
     share = float(wall.reference_area[wall.wrinkled].sum() / wall.reference_area.sum())
-    if share >= _SHARE:
+    if share >= _COMPRESSED_AREA:
         place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
                       f" one place at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"

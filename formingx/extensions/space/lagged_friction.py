@@ -29,7 +29,7 @@ import numpy as np
 from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
 from .lagged_stick import SMALL_GAP, LaggedStick
 
-_MOST = 10.0               # factor, up or down, from the last pressure to the pressure that limits friction
+_MAX_PRESSURE_RATIO = 10.0  # factor, up or down, from the last pressure to the pressure that limits friction
 _SLIDES_ON = 1 + 1e-9      # stored slip of sliding points, over g_s: they continue to slide in spite of round-off
 
 
@@ -134,7 +134,7 @@ class LaggedFriction(LaggedStick):
             depth = now
             if change.any():
                 depth = now + np.einsum("ni,ni->n", self.tool.distances(old.position).normal, change)
-            self._ahead = old, self.k * np.clip(depth, now / _MOST, _MOST * now)
+            self._ahead = old, self.k * np.clip(depth, now / _MAX_PRESSURE_RATIO, _MAX_PRESSURE_RATIO * now)
         return self._ahead[1]
 
     def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from ...tools.tool import RigidTool
 
 _BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
 
-_PULLS = 0.01
+_TENSILE_DISTANCE = 0.01
 """Distance outside the tool, over the distance from the sticking position, above which a point is in tension.
 
 A point that is sheared along a facet leaves the tool at the edges of the facet, without tension.
@@ -90,7 +90,7 @@ class LaggedStick(ContactLaw):
             Mask, shape (n,).
         """
         travel = np.linalg.norm(x - old.position, axis=1)
-        limit = np.maximum(_PULLS * travel, SMALL_GAP * self.theta)
+        limit = np.maximum(_TENSILE_DISTANCE * travel, SMALL_GAP * self.theta)
         return self.separates & self.in_contact(old) & (-self.distance(x) > limit)
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:

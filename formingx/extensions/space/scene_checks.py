@@ -13,7 +13,7 @@ from ...ranks import gathered
 from .sheet import Sheet
 from .solid_tool import Swept
 
-_LARGER = 9.0
+_EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
 
 The sheet may be a quarter of the whole.
@@ -149,7 +149,7 @@ def check_contact(scene: Any, contact: Any) -> None:
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in three dimensions contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
-    if tool.sized and np.isfinite(size) and not 1 / _LARGER < length / size < _LARGER:
+    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < length / size < _EXTENT_RATIO:
         raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
                          f" the same (mm, cm, inches)?")
     points = gathered(mesh.comm, mesh.domain.geometry.x)

@@ -19,8 +19,8 @@ from .bodies import merged
 from .lagged_friction import Distances, LaggedFriction
 from .lagged_stick import LaggedStick
 
-_ON_AXIS = 1e-9            # distance from the axis, over the size of a profile, that counts as 0
-_PER_CORNER = 24           # straight pieces of a rounded corner in `surface`
+_AXIS_TOLERANCE = 1e-9            # distance from the axis, over the size of a profile, that counts as 0
+_CORNER_PIECES = 24           # straight pieces of a rounded corner in `surface`
 
 
 class SolidTool:
@@ -148,7 +148,7 @@ class Swept(SolidTool):
         across = np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(x))])         # where the curve of `r` bends
         turn = found.normal[:, 0] * bend
         if self.kind == "revolved":                          # on the axis both curvatures are one
-            turn = np.where(r > _ON_AXIS * self._size, turn, found.curvature)
+            turn = np.where(r > _AXIS_TOLERANCE * self._size, turn, found.curvature)
         return Distances(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
@@ -222,7 +222,7 @@ class Swept(SolidTool):
 
     def _ring(self, r: float) -> np.ndarray:
         """Return points (x, y) of the curve that the profile point at coordinate r sweeps, shape (n, 2), length."""
-        turn = np.linspace(0, np.pi / 2, _PER_CORNER + 1)
+        turn = np.linspace(0, np.pi / 2, _CORNER_PIECES + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2
             line = np.column_stack([np.full(2, r), ends])

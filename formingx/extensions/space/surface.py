@@ -36,7 +36,7 @@ from ...forms.probes import Probe
 from ...physics.loads import Pressure
 from .pressure_on_tools import PressureOnTools
 
-_REGULAR = 1e-7
+_REGULARISING_STIFFNESS = 1e-7
 """Stiffness of the displacement gradient over the shear modulus."""
 
 
@@ -150,7 +150,7 @@ class Surface(Formulation):
     def _energy(self, of: Any) -> Any:
         left, F = self.scene.model.wrinkles, self.F
         grad = ufl.grad(self.u)
-        energy = self.constant(_REGULAR * self.stress) / 2 * ufl.inner(grad, grad)
+        energy = self.constant(_REGULARISING_STIFFNESS * self.stress) / 2 * ufl.inner(grad, grad)
         energy = self.weighted(self._scale * energy, list(self.thicknesses))
         for terms in self._terms.values():
             W = of(terms, F)

@@ -15,7 +15,7 @@ from ...results.extend import method_of
 from ...results.files.sheet import Sheet
 from ...results.path import Path
 
-_THROUGH = 4               # Gauss points of a layer
+_POINTS_PER_LAYER = 4               # Gauss points of a layer
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,7 +82,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
     profile = path.profile(state)
     (names, between), bottom, top = between_layers(scene.mesh, profile), profile.reference_bottom, profile.reference_top
     lines = np.array([bottom, *between, top])[:, 1::2]                       # keep off the corners of the rim
-    gauss, weights = np.polynomial.legendre.leggauss(_THROUGH)
+    gauss, weights = np.polynomial.legendre.leggauss(_POINTS_PER_LAYER)
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])
     for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):
         points = a[:, None] + (b - a)[:, None] * (1 + gauss)[:, None] / 2

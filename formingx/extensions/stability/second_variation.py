@@ -37,7 +37,7 @@ from ...forms.matrix import ExtendedMatrix
 from ...physics.kinematics import BLOCK
 from ...physics.supports import Constrained, Symmetry
 
-_FORCE_FREE = 1e-6
+_FREE_MOTION_FORCE = 1e-6
 """Force that a rigid motion causes, over the forces of its single unknowns, below which the motion is free."""
 
 
@@ -195,7 +195,7 @@ class SecondVariation:
         single = diagonal.norm()
         for vector in (x, y, diagonal):
             vector.destroy()
-        return bool(forces < _FORCE_FREE * single)
+        return bool(forces < _FREE_MOTION_FORCE * single)
 
     def _pin(self) -> None:
         """Constrain in `matrix` one unknown of each free rigid motion, the largest after those before are constrained.

@@ -30,7 +30,7 @@ _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
 The compliance is about a thousandth of the wall. On a rigid plate a contact line hops from point to point.
 """
 
-_STEP = 0.004
+_LARGEST_STEP = 0.004
 """Default of `StepControl.largest`: a crushed wall snaps through along short arcs."""
 
 
@@ -173,7 +173,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
                   contacts=[Contact(foot, floor, "none", **_FOOT)])
     modes, ended = wave_numbers(scene, modes), ""
     try:
-        path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_STEP))
+        path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_LARGEST_STEP))
     except ConvergenceError as error:
         if error.path is None or len(error.path.states) < 2:
             raise

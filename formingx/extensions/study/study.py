@@ -34,7 +34,7 @@ from . import effects, stored_runs
 from .task import Measure, StudyRun, Task, as_text, check_importable, finished, pool_of
 from .variables import design
 
-_AT_EDGE = 1e-3
+_EDGE_TOLERANCE = 1e-3
 """Distance from the ends of the range of a variable, over this range, within which the best value is at its edge."""
 
 
@@ -220,7 +220,7 @@ class Study(Sheet):
         for name in self.variables:
             values = [run.values[name] for run in self.runs]
             low, high, best = min(values), max(values), self.best.values[name]
-            margin = _AT_EDGE * (high - low)
+            margin = _EDGE_TOLERANCE * (high - low)
             if low < high and not low + margin < best < high - margin:
                 found.append(f"the best is at the edge of {name}, which was run from {low:g} to {high:g}: a better one"
                              f" may lie {'below' if best <= low + margin else 'above'}")

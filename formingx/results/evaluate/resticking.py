@@ -12,10 +12,10 @@ import numpy as np
 from ...findings import Finding
 from ...ranks import gathered
 
-_WALL = 3e-3
+_WALL_CHANGE = 3e-3
 """Relative change of the wall, due to the step lengths, above which there is a finding."""
 
-_LARGE = 0.1
+_LARGE_SHIFT = 0.1
 """Shift from which the finding estimates no error: the neighbouring points moved too, so the strain changed less."""
 
 
@@ -86,9 +86,9 @@ def findings(item: Resticking | None) -> list[Finding]:
     Args:
         item: result of `furthest`.
     """
-    if item is None or item.shift < _WALL:
+    if item is None or item.shift < _WALL_CHANGE:
         return []
-    depend = f"depend on the steps, by up to {100 * item.shift:.2g} %" if item.shift < _LARGE else (
+    depend = f"depend on the steps, by up to {100 * item.shift:.2g} %" if item.shift < _LARGE_SHIFT else (
         f"may depend on the steps (that point moved by {100 * item.shift:.2g} % of its tributary length)")
     count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"
     return [Finding("warning", item.tool, f"{count} to {item.tool!r} lifted off and stuck again elsewhere, most near"

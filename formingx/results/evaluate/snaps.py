@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import InputError
 from ...findings import Finding
 
-_WALL = 0.05
+_WALL_CHANGE = 0.05
 """Relative change of the wall in one jump above which later walls are uncertain."""
 
 
@@ -72,7 +72,7 @@ def findings(snap: Snap | None) -> list[Finding]:
     Args:
         snap: result of `largest`.
     """
-    if snap is None or snap.change < _WALL:
+    if snap is None or snap.change < _WALL_CHANGE:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
     return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall went"

@@ -17,7 +17,7 @@ from ...mesh.nodes import own_cells
 from ...physics.models import Membrane
 from ...ranks import gathered
 
-_COMPRESSED = 1e-3
+_MAX_COMPRESSION = 1e-3
 """Compressive resultant, over shear modulus times thickness, above which the state of a membrane is invalid."""
 
 
@@ -37,7 +37,7 @@ class Resultant(NamedTuple):
     @property
     def compressed(self) -> bool:
         """True if the resultant is compressive by more than 0.001 times shear modulus times thickness."""
-        return self.value < -_COMPRESSED
+        return self.value < -_MAX_COMPRESSION
 
 
 class Tension:

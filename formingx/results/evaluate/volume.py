@@ -12,10 +12,10 @@ from ...physics.supports import Clamped
 BOUND = 5e-3
 """Root mean square of J - 1 above which a report warns; a run warns above four times this value."""
 
-_NEAR = 2.0
+_CORNER_DISTANCE = 2.0
 """Distance from a clamped face, over the length of the face, within which its singular corners affect J."""
 
-_FURTHEST = 2.0
+_MAX_VOLUME_RATIO = 2.0
 """Largest J, and largest 1/J, at a point away from the quadrature points; beyond it a report warns."""
 
 
@@ -33,7 +33,8 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
     if far_error is not None and far_error <= 4 * BOUND:
         return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
                         f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * far_error:.2g} % from"
-                        f" {_NEAR:g} lengths of that face on. The corner is singular: take no stresses from there.")]
+                        f" {_CORNER_DISTANCE:g} lengths of that face on. The corner is singular: take no stresses from"
+                        " there.")]
     return [Finding("warning" if error > 4 * BOUND else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
                     f" {100 * error:.2g} % ({where}): use a finer mesh.")]
@@ -68,7 +69,7 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
     clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
     faces = [scene.mesh.nodes_of(name) for name in clamped]
     reach = max((float(np.hypot(*np.ptp(face, axis=0))) for face in faces), default=0.0)
-    return np.vstack([np.zeros((0, 2)), *faces]), _NEAR * reach
+    return np.vstack([np.zeros((0, 2)), *faces]), _CORNER_DISTANCE * reach
 
 
 def of_point(path: Any) -> list[Finding]:
@@ -81,7 +82,7 @@ def of_point(path: Any) -> list[Finding]:
     """
     furthest = path.problem.furthest_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
-    if 1 / _FURTHEST < J < _FURTHEST:
+    if 1 / _MAX_VOLUME_RATIO < J < _MAX_VOLUME_RATIO:
         return []
     faces, reach = _clamped(path)
     singular = len(faces) and np.hypot(*(faces - furthest.point).T).min() < reach

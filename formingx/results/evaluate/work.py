@@ -30,11 +30,11 @@ from .step_polynomials import GAUSS, Polynomial, integral, interpolate
 _LOSSES = "friction", "jumps", "bonds"
 _MATERIAL_LOSSES = "dissipated_energy", "damage_energy"
 _RAMP_EDGE = 0.06          # distance from the outer edge of the contact ramp, over its half width, that counts as 0
-_SMALL = 1e-5              # half the step of a central difference quotient in arc length
+_DIFFERENCE_STEP = 1e-5              # half the step of a central difference quotient in arc length
 _STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest strain energy of the run
 _RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry of the balance
-_HALVINGS = 6              # largest number of halvings of a step
-_SPLITS = 0.5, 0.35, 0.65  # positions in a step at which it is split
+_MAX_HALVINGS = 6              # largest number of halvings of a step
+_SPLIT_POSITIONS = 0.5, 0.35, 0.65  # positions in a step at which it is split
 
 
 class _Reaction(NamedTuple):
@@ -85,7 +85,7 @@ class EnergyBalance:
         return {name: np.array([row.get(name, 0.0) for row in rows]) for name in names}
 
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
-                times: int = _HALVINGS) -> dict[str, float]:
+                times: int = _MAX_HALVINGS) -> dict[str, float]:
         """Return the energies of a step, computed with further states between its ends.
 
         Args:
@@ -116,7 +116,7 @@ class EnergyBalance:
         if not h:
             return None
         line = [replace(s, direction=(b.x - a.x) / h, slope=(b.control - a.control) / h) for s in (a, b)]
-        for part, (start, end) in itertools.product(_SPLITS, [line] if self._flows(a, b) else [(a, b), line]):
+        for part, (start, end) in itertools.product(_SPLIT_POSITIONS, [line] if self._flows(a, b) else [(a, b), line]):
             with problem.state_context(a):
                 if self._flows(a, b):
                     problem.clock = a.time + part * (b.time - a.time)
@@ -213,7 +213,7 @@ class EnergyBalance:
         scale = forms.stress * forms.volume / forms.length
         with problem.state_context(state) as p:
             fields, n = p.x.array_r.copy(), p.n_owned
-            e, d = _SMALL, state.direction
+            e, d = _DIFFERENCE_STEP, state.direction
             forward, backward = (p.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
                              for sign in (1, -1))
             change = scale * (forward - backward)[:n] / (2 * e)

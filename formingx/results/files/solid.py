@@ -13,7 +13,7 @@ from ...units import LENGTHS, NONE, Units
 from ..evaluate.profile import fine
 from . import tabular
 
-_PARTS = 4  # number of straight pieces that replace the curved edge of an element
+_EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an element
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
@@ -30,7 +30,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         Points (x, y, z), shape (n, 3), length. For each triangle the rows of its corners in the points, shape (m, 3),
         counter-clockwise seen from outside.
     """
-    line = np.vstack([fine(profile.bottom, _PARTS), fine(profile.top, _PARTS)[::-1]])      # its edges are curved
+    line = np.vstack([fine(profile.bottom, _EDGE_PIECES), fine(profile.top, _EDGE_PIECES)[::-1]])  # edges are curved
     n = len(line)
     on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
     if axisymmetric:
@@ -67,7 +67,7 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
     """
     points, triangles = solid(profile, axisymmetric)
     n = len(profile.bottom)
-    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _PARTS), np.arange(n), profile.wall_ratio)
+    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _EDGE_PIECES), np.arange(n), profile.wall_ratio)
     ratio = np.concatenate([ratio, ratio[::-1]])
     return points, triangles, np.tile(ratio, len(points) // len(ratio))
 

@@ -11,13 +11,13 @@ from ...errors import non_negative, positive
 from ...findings import Finding, alarming
 from . import checkpoint_data
 
-_RECENT = 20
+_RECENT_STEPS = 20
 """Number of last steps from which the remaining time is estimated."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
 """Columns that show that the body moves."""
-_STILL = 1e-3
+_NEGLIGIBLE_CHANGE = 1e-3
 """Relative change of the columns `_MOVES` over the last steps below which the body counts as not moving."""
-_MET = 1e-9
+_TARGET_TOLERANCE = 1e-9
 """Relative distance from a target at which it counts as met."""
 
 
@@ -102,7 +102,7 @@ def of_folder(folder: Any) -> Status:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    n, states, age = checkpoint_data.latest(folder, _RECENT)
+    n, states, age = checkpoint_data.latest(folder, _RECENT_STEPS)
     last, ended = states[-1], checkpoint_data.ended(folder)
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
     stepping: dict[str, Any] = done[-1]["stepping"] if done else {}
@@ -117,8 +117,8 @@ def of_folder(folder: Any) -> Status:
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
-    remaining = 0.0 if abs(now - goal) <= _MET * abs(goal) else took * (1 - won) / won if nearer else None
-    moving = leader if leader and not np.isclose(*moved[leader], rtol=_STILL, atol=0.0) else None
+    remaining = 0.0 if abs(now - goal) <= _TARGET_TOLERANCE * abs(goal) else took * (1 - won) / won if nearer else None
+    moving = leader if leader and not np.isclose(*moved[leader], rtol=_NEGLIGIBLE_CHANGE, atol=0.0) else None
     return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], remaining,
                   counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 
