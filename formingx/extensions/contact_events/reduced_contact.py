@@ -17,13 +17,15 @@ with the normal n into the tool and its tangent t: the geometric stiffness of co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
+from ..._jit import address, address_of_integers
 from ...physics.contact_law import FAR, ContactStatus
+from .compiled_contact import compiled
 from .response import Response
 
 
@@ -47,6 +49,8 @@ class StatusSearch:
 
 
 _SEARCH = StatusSearch()
+_VALUES = np.array(astuple(_SEARCH), dtype=float)
+_ADDRESS = address(_VALUES)
 
 
 class ToolFrame(NamedTuple):
@@ -63,20 +67,6 @@ class ToolFrame(NamedTuple):
     tangent: np.ndarray
     curvature: np.ndarray
     beyond: np.ndarray
-
-
-class ReducedSystem(NamedTuple):
-    """Motion dx of m contact points as a linear function of their contact forces, free of contact stiffness.
-
-    Attributes:
-        free: dx without contact forces, shape (2 m,).
-        by: derivative of dx by forces of sign -1 (compliance), shape (2 m, 2 m).
-        turn: derivative by dx of contact forces that rotate with a curved tool, shape (m, 2, 2).
-    """
-
-    free: np.ndarray
-    by: np.ndarray
-    turn: np.ndarray
 
 
 class Points:
@@ -141,11 +131,6 @@ class Points:
         known = self.values_at([face.stiffness_in_tangent for face in self._faces], new)
         self._S = np.concatenate([self._S, known * touched])
         return True
-
-    @property
-    def _mu(self) -> np.ndarray:
-        """Coefficient of friction of each point, shape (m,), 0 for stick."""
-        return np.where(self.friction < np.inf, self.friction, 0.0)
 
     def values_at(self, values: Sequence[np.ndarray],
                   point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
@@ -256,15 +241,11 @@ class Points:
             New forces F, and the change of force outside the factorised tangent, dF - S dx, shape (m, 2) each. If no
             such forces exist, the second is NaN and F is `force`.
         """
-        N, mu = self.parts(force, near)[0], self._mu
-        slips = np.divide(self.elastic_slip, mu * N, out=np.zeros(len(N)), where=mu * N > 0)
-        try:
-            small = self._small(u + (self._C @ force.ravel()).reshape(u.shape), near,
-                                force * (status != ContactStatus.FREE)[:, None])
-            F, dx = self._solved(small, status, near, to, slips)
-        except np.linalg.LinAlgError:
-            return force, np.full(force.shape, np.nan)
-        return F, F - force - np.einsum("nij,nj->ni", self._S, dx)
+        F, outside = np.empty(force.shape), np.empty(force.shape)
+        good = compiled().forces_at_end(
+            *self._given(near), address(self.elastic_slip), address(near.beyond), address(u),
+            address_of_integers(status), address(force), address(to), _ADDRESS, address(F), address(outside))
+        return (F, outside) if good else (force, np.full(force.shape, np.nan))
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -282,68 +263,13 @@ class Points:
             Rates of the forces F, shape (m, 2); rates outside the factorised tangent, dF - S dx, shape (m, 2);
             statuses, shape (m,). None if no admissible statuses were found.
         """
-        (N, T), here = self.parts(force, near), status != ContactStatus.FREE
-        try:
-            small = self._small(u, near, force)
-        except np.linalg.LinAlgError:
-            return None
-        slack = here & (np.abs(N).max(initial=0.0) * _SEARCH.limit >= N) & ~self._pulls
-        for begin in (status, np.where(slack, ContactStatus.FREE, status)):
-            found = self._agreed(small, begin.copy(), near, N, T, here)
-            if found is not None:
-                F, dx, status = found
-                return F, F - np.einsum("nij,nj->ni", self._S, dx), status
-        return None
-
-    def _agreed(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame, N: np.ndarray,
-                T: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Search for contact statuses whose rates of force and motion satisfy Coulomb's law (active set).
-
-        Args:
-            small: condensed motion of the points.
-            status: first statuses, shape (m,), changed in place.
-            near: geometry of the tools.
-            N: normal forces, shape (m,).
-            T: tangential forces, shape (m,).
-            here: mask of the closed points, shape (m,).
-
-        Returns:
-            Rates of the forces and of the positions, shape (m, 2) each, and statuses; None if the search failed.
-        """
-        seen, mu = set(), self._mu
-        compliance = self._C.diagonal().reshape(len(N), -1).mean(1)
-        for k in range(_SEARCH.tries):
-            try:
-                F, dx = self._solved(small, status, near)
-            except np.linalg.LinAlgError:
-                return None
-            if not np.isfinite(F).all():
-                return None
-            (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
-            negligible = _SEARCH.limit * (np.abs(N).max() + _SEARCH.comparison_length * np.abs(dN).max())
-            other, miss = status.copy(), np.zeros(len(N))
-            slides = held & (status != ContactStatus.STICKS) & (mu > 0)
-            turns = slides & (status * along < -_SEARCH.none * np.abs(along).max())
-            other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
-            most = mu * ((1 - _SEARCH.limit) * N - negligible)
-            at_limit = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
-            sense = np.where(np.abs(T) > mu * negligible, np.sign(T), np.sign(dT))
-            over = sense * dT - mu * dN
-            slips = at_limit & (over > _SEARCH.none * np.abs(dT).max())
-            other[slips], miss[slips] = sense[slips], (over * compliance)[slips]
-            opens = held & ~self._pulls & (negligible >= N) & (dN < 0)
-            other[opens], miss[opens] = ContactStatus.FREE, -(dN * compliance)[opens]
-            closes = here & ~held & (into > 0)
-            sense = np.where(along[closes] < 0, ContactStatus.SLIDES_BACK, ContactStatus.SLIDES)
-            other[closes] = np.where(self.friction[closes] < np.inf, sense, ContactStatus.STICKS)
-            miss[closes] = into[closes]
-            changes = np.flatnonzero(other != status)
-            if not len(changes):
-                return F, dx, status
-            if k >= _SEARCH.all_at_once or status.tobytes() in seen:
-                changes = changes[[np.argmax(miss[changes])]]
-            seen.add(status.tobytes())
-            status[changes] = other[changes]
+        slack = (status != ContactStatus.FREE) & ~self._pulls
+        F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
+        slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit >= N
+        given = *self._given(near), address(u), address(force), address_of_integers(status), _ADDRESS
+        for found in (np.array(status, dtype=int), np.where(slack, ContactStatus.FREE, status).astype(int)):
+            if compiled().rates(*given, address_of_integers(found), address(F), address(outside)):
+                return F, outside, found
         return None
 
     def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
@@ -360,84 +286,14 @@ class Points:
             Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
             change.
         """
-        if not len(status):
-            return np.inf, status
-        (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
-        negligible = _SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
-        times, other = np.full(len(status), np.inf), status.copy()
-        opens = held & ~self._pulls & (dN < 0) & (negligible < N)
-        times[opens], other[opens] = -N[opens] / dN[opens], ContactStatus.FREE
-        k = np.flatnonzero(held & (status == ContactStatus.STICKS) & (self.friction < np.inf))
-        mu = self.friction[k]
-        for sense in (ContactStatus.SLIDES, ContactStatus.SLIDES_BACK):
-            margin, closing = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (closing > 0) & (margin > _SEARCH.limit * mu * np.abs(N[k]))
-            t = np.divide(margin, closing, out=np.full(len(k), np.inf), where=slips)
-            first = t < times[k]
-            times[k[first]], other[k[first]] = t[first], sense
-        first = int(np.argmin(times))
-        after = status.copy()
-        after[first] = other[first]
-        return float(times[first]), after
+        changed, after = np.zeros(2, dtype=int), np.array(status, dtype=int)
+        time = compiled().change(*self._given(near), address_of_integers(status), address(force), address(rate),
+                                 _ADDRESS, address_of_integers(changed))
+        if time < np.inf:
+            after[changed[0]] = changed[1]
+        return time, after
 
-    def _small(self, u: np.ndarray, near: ToolFrame, force: np.ndarray) -> ReducedSystem:
-        """Return the condensed motion of the points by u and by contact forces, with the contact stiffness S removed.
-
-        The stiffness of forces that rotate with a curved tool is included.
-
-        Args:
-            u: motion along the tangent of the path, shape (m, 2).
-            near: geometry of the tools.
-            force: present contact forces, shape (m, 2).
-        """
-        N, T = self.parts(force, near)
-        n, t = near.normal, near.tangent
-        turn = near.curvature[:, None, None] * ((N[:, None] * t - T[:, None] * n)[:, :, None] * t[:, None, :])
-        size, stiffness = len(self._C), self._S - turn
-        if not stiffness.any():
-            return ReducedSystem(u.ravel(), self._C, turn)
-        CK = np.einsum("xni,nij->xnj", self._C.reshape(size, *u.shape), stiffness).reshape(size, size)
-        found = np.linalg.solve(np.eye(size) - CK, np.column_stack([u.ravel(), self._C]))
-        return ReducedSystem(found[:, 0], found[:, 1:], turn)
-
-    def _solved(self, small: ReducedSystem, status: np.ndarray, near: ToolFrame,
-                to: np.ndarray | None = None, slips: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Solve the condensed equations for the contact forces at given statuses.
-
-        Args:
-            small: condensed motion of the points.
-            status: contact statuses, shape (m,).
-            near: geometry of the tools.
-            to: target motion of sticking points, shape (m, 2), length; None: solve for rates.
-            slips: compliance of elastic slip of the points, shape (m,), or None.
-
-        Returns:
-            Forces, or their rates without `to`, and motions of the points, shape (m, 2) each.
-        """
-        free, C, turn = small
-        held, m, c = status != ContactStatus.FREE, len(status), self._components
-        stuck = held & (status == ContactStatus.STICKS) & (self.friction > 0)
-        sticks, slides = np.flatnonzero(stuck), np.flatnonzero(held & ~stuck)
-        mu = self._mu
-        # one unknown force per direction: normal and tangent of sticking points, Coulomb's cone edge of sliding points
-        point = np.concatenate([sticks, sticks, slides])
-        into = np.concatenate([near.normal[sticks], near.tangent[sticks], near.normal[slides]])
-        along = (mu * status)[slides, None] * near.tangent[slides]
-        against = np.concatenate([into[:2 * len(sticks)], near.normal[slides] + along])
-        each, columns = np.arange(len(point))[:, None], c * point[:, None] + np.arange(c)
-        A, B = np.zeros((len(point), len(free))), np.zeros((len(free), len(point)))
-        A[each, columns], B[columns, each] = into, against
-        compliance, a = A @ C @ B, np.zeros(len(point))
-        largest = np.abs(compliance).max(1, initial=0.0)
-        most = largest.max(initial=0.0)
-        stiff = np.flatnonzero(largest < _SEARCH.none * most)
-        compliance[stiff, stiff] = most                          # no motion along a support or across the axis
-        if to is not None:
-            n = 2 * len(sticks)
-            a[:n], a[n:] = np.einsum("ni,ni->n", to[point[:n]], into[:n]), near.beyond[slides]
-        if slips is not None:
-            k = each[len(sticks):2 * len(sticks), 0]
-            compliance[k, k] += slips[sticks]
-        amounts = np.linalg.solve(compliance, A @ free - a)
-        dx = (free - C @ (B @ amounts)).reshape(m, c)
-        return (B @ amounts).reshape(m, c) + np.einsum("nij,nj->ni", turn, dx), dx
+    def _given(self, near: ToolFrame) -> tuple:
+        """Return the points as the first arguments of the functions in C."""
+        return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
+                address(near.normal), address(near.curvature))
