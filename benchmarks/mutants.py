@@ -152,8 +152,8 @@ MUTANTS = [Mutant(*row) for row in [
     ("extensions/heat/boundaries.py",
      "(kelvin[0] ** 4 - kelvin[1] ** 4)", "(kelvin[0] ** 4 - kelvin[1] ** 4) * 1.01", "details"),
     # answers
-    ("results/evaluate/work.py", "@ c.contact.way)\n                                 for c in tools)",
-     "@ np.sign(c.contact.way))\n                                 for c in tools)", "energy_balance"),
+    ("results/evaluate/work.py", "@ c.contact.travel_vector)\n                                 for c in tools)",
+     "@ np.sign(c.contact.travel_vector))\n                                 for c in tools)", "energy_balance"),
     ("results/evaluate/step_polynomials.py", "f.value(s) * y.slope(s)", "f.value(1) * y.slope(s)", "energy_balance"),
     ("results/evaluate/work.py", "+ _friction_of(c, b, problem)) / 2 * slid", "+ 0) / 2 * slid", "energy_balance"),
     ("results/evaluate/work.py", "temperature._replace(before=None)", "temperature", "energy_balance"),

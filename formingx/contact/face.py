@@ -70,7 +70,7 @@ class FaceContact:
         self.shift: np.ndarray | None = None
         self.law = self._law(1.0)
         self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
-        self._way = solid.length * contact.way
+        self._travel_vector = solid.length * contact.travel_vector
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
@@ -128,7 +128,7 @@ class FaceContact:
 
     def travelled(self, control: float) -> np.ndarray:
         """Return the displacement vector of the tool at a control, shape (components,), length."""
-        return (self._base + self._rate * control) * self._way
+        return (self._base + self._rate * control) * self._travel_vector
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
         """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
@@ -137,7 +137,7 @@ class FaceContact:
             dx: change of the locally owned unknowns.
             step: change of the control.
         """
-        return self._length * self.displacement(dx) - self._rate * step * self._way
+        return self._length * self.displacement(dx) - self._rate * step * self._travel_vector
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """Return the contact tractions at the points in a state; at the state last linearised, of the linearised law.
@@ -266,7 +266,7 @@ class FaceContact:
         """
         if self._rate:
             stiffness = self._stiffness(fields, control, ahead)
-            self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._way)))
+            self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._travel_vector)))
 
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
         """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""

@@ -90,7 +90,7 @@ class Tooling(NamedTuple):
         Returns:
             For each active tool the tool and its displacement (r, z), shape (2,), length.
         """
-        return [(contact.tool, travel * contact.way)
+        return [(contact.tool, travel * contact.travel_vector)
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
 

@@ -18,13 +18,13 @@ def resisting(contact: Any) -> np.ndarray:
     .. math:: -\frac{m}{|m|}
 
     Args:
-        contact: the `Contact`; m is its motion per unit of travel (`Contact.way`).
+        contact: the `Contact`; m is its motion per unit of travel (`Contact.travel_vector`).
 
     Returns:
         Unit vector against the travel, shape (components,); +Z for a fixed tool.
     """
     up = np.eye(contact.tool.components)[-1]
-    return up if contact.direction is None else -contact.way / np.linalg.norm(contact.way)
+    return up if contact.direction is None else -contact.travel_vector / np.linalg.norm(contact.travel_vector)
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
@@ -133,12 +133,12 @@ class _ToolForce(Bound):
 
     def __init__(self, problem: Any, contacts: list[Any]):
         forms = problem.forms
-        self._problem, self._contacts, self._way = problem, contacts, resisting(contacts[0].contact)
+        self._problem, self._contacts, self._direction = problem, contacts, resisting(contacts[0].contact)
         self._scale = self.size = forms.stress * forms.volume / forms.length
 
     def value(self, x, control):
         active = [c for c in self._contacts if c.present]
-        return float(sum(resultants.force(contact, x.array_r, control) @ self._way for contact in active))
+        return float(sum(resultants.force(contact, x.array_r, control) @ self._direction for contact in active))
 
     def equation(self, target):
         problem = self._problem
@@ -148,10 +148,10 @@ class _ToolForce(Bound):
             for contact in self._contacts:
                 by_control = np.zeros(problem.n_owned)
                 blocks = contact.stiffness(x.array_r, control)
-                way = np.tile(self._way, blocks.shape[1] // len(self._way))
-                np.add.at(values, contact.rule.dofs, np.einsum("i,nij->nj", way, blocks))
+                direction = np.tile(self._direction, blocks.shape[1] // len(self._direction))
+                np.add.at(values, contact.rule.dofs, np.einsum("i,nij->nj", direction, blocks))
                 contact.add_control_derivative(by_control, x.array_r, control)
-                slope += float(np.sum(by_control[contact.rule.dofs] @ self._way))
+                slope += float(np.sum(by_control[contact.rule.dofs] @ self._direction))
             problem.fill(gradient, values)
             return (self.value(x, control) - target) / self._scale, problem.comm.allreduce(slope)
         return c

@@ -159,8 +159,8 @@ class Contact(Part):
         return not self.friction_by_temperature and self.mu >= STICKS
 
     @property
-    def way(self) -> np.ndarray:
-        """Displacement vector of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
+    def travel_vector(self) -> np.ndarray:
+        """Displacement of the tool per unit of its travel, shape (components,), dimensionless; 0 if the tool is fixed."""
         return np.array(self.direction or (0.0,) * self.tool.components)
 
     @property

@@ -77,12 +77,12 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
         for j, b in present.items():
             if j <= i or j in scene.same_tool(i) or not np.isfinite(where[i] + where[j]):
                 continue
-            shift = where[i] * a.way - where[j] * b.way
+            shift = where[i] * a.travel_vector - where[j] * b.travel_vector
             for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
                 depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
-                    position = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.way)
+                    position = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.travel_vector)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
                     raise InputError(f"{caller}: tools overlap: {_with_travel(a, where[i])} and"
                                      f" {_with_travel(b, where[j])} reach {depth[worst]:.6g} into each other at"

@@ -74,7 +74,7 @@ def check_travel(scene: Any, contact: Contact, travel: float) -> None:
     Raises:
         InputError: all nodes of a constrained boundary would lie inside the tool.
     """
-    moves = contact.way
+    moves = contact.travel_vector
     for support in scene.supports:
         for constraint in scene.kinematics.in_axes(support, support.constraints()):
             if not isinstance(constraint, Constrained) or constraint.on is None or moves[constraint.component] == 0:

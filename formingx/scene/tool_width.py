@@ -70,7 +70,7 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     near = tool.nearest(ends.mean(1))
     way = -near.normal[np.argmax(near.distance)]
     if contact.direction:
-        way = contact.way / np.hypot(*contact.way)
+        way = contact.travel_vector / np.hypot(*contact.travel_vector)
     fractions = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
     points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1])

@@ -208,6 +208,6 @@ def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
             continue
         images = [[*scale, *shift] for scale, shift in record.planes.images(3, contact.tool.bounds)]
         tools.append({"name": name, "points": rounded(points.T), "triangles": triangles.T.tolist(), "images": images,
-                      "moves": contact.way.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
+                      "moves": contact.travel_vector.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
     return {"triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.deformed_points.T) for wall in walls],
             "fields": {name: [rounded(values) for values in each] for name, each in shown.items()}, "tools": tools}

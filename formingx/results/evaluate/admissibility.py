@@ -264,7 +264,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     share = images * energy / (state.measures.get("strain_energy") or np.inf)
     if share < 0.1 * _LIMITS.warning_error:
         return share
-    direction = contact.contact.way / np.hypot(*contact.contact.way)
+    direction = contact.contact.travel_vector / np.hypot(*contact.contact.travel_vector)
     h = _LIMITS.difference_step
     states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-h, 0.0, h)]
     backward, force, forward = (resultants.force(contact, *point) @ direction for point in states)
@@ -294,7 +294,7 @@ def _pulled(contact: Any, state: State) -> bool:
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
-    force = resultants.force(contact, state.x, state.control) @ law.way / np.hypot(*law.way)
+    force = resultants.force(contact, state.x, state.control) @ law.travel_vector / np.hypot(*law.travel_vector)
     return bool(force > _LIMITS.tensile_force * resultants.pressing(contact, state.x, state.control))
 
 

@@ -101,7 +101,7 @@ def filling(path: Any, contact: Any) -> Filling:
     gaps = np.full((len(path), len(corners)), np.nan)
     for n, state in enumerate(path.states):
         travel = tooling.travels(state.setting, state.control)[number] or 0.0
-        shift = travel * contact.contact.way
+        shift = travel * contact.contact.travel_vector
         with path.problem.state_context(state) as problem:
             line = fine(face.points + face.displacement(problem.x))
         gaps[n] = [distance_to_line(points + shift, line).max() for _, points in corners]

@@ -228,9 +228,9 @@ class EnergyBalance:
                 elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.same_tool(i)]
                     tools = [c for c in p.present if c.contact in together]
-                    force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.way)
+                    force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.travel_vector)
                                  for c in tools)
-                    slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.way)
+                    slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.travel_vector)
                                 for c in tools)
                 else:
                     force = -p.reaction(i, p.x, state.control)

@@ -122,7 +122,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
         line = contact.tool.surface()[0]
         shell = line + 0.02 * size * contact.tool.nearest(line).normal
         found.append({"name": name, "line": rounded(line.T), "shell": rounded(shell.T),
-                      "moves": contact.way.tolist(),
+                      "moves": contact.travel_vector.tolist(),
                       "travel": [None if t[k] is None else float(f"{t[k]:.7g}")
                                  for t in (record.travels[i] for i in frames)]})
     return found
