@@ -217,19 +217,19 @@ def test_a_jump_that_fails_leaves_what_is_remembered():
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
         [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
     with path.problem.state_context(path.last) as problem:
-        before = problem.memory
+        before = problem.history_variables
         with pytest.raises(snap_through.NoEquilibrium):
             snap_through.snap_through(path.record.curve, path.last, 0.01, False, snap_through.SnapThrough(), 1)
-        assert all(one is other for one, other in zip(problem.memory, before, strict=True))
+        assert all(one is other for one, other in zip(problem.history_variables, before, strict=True))
 
 
 def test_state_context_restores_history_variables():
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
         [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
-    problem, before = path.problem, path.problem.memory
+    problem, before = path.problem, path.problem.history_variables
     with problem.state_context(path.states[1]):
-        assert any(inside is not outside for inside, outside in zip(problem.memory, before, strict=True))
-    assert all(restored is held for restored, held in zip(problem.memory, before, strict=True))
+        assert any(inside is not outside for inside, outside in zip(problem.history_variables, before, strict=True))
+    assert all(restored is held for restored, held in zip(problem.history_variables, before, strict=True))
 
 
 def test_every_mutant_stands_in_its_file(monkeypatch):

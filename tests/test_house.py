@@ -160,8 +160,8 @@ def test_the_solver_sees_equations_alone():
 
 
 def test_protocols_say_what_they_take():
-    """No argument or result of an interface is just anything, but what a history remembers and matplotlib gives."""
-    memories = {"get", "put.memory", "save.memory", "load", "transfer", "transfer.memory", "transfer.source"}
+    """No argument or result of an interface is just anything, but the history variables and matplotlib's objects."""
+    histories = {"get", "put.variables", "save.variables", "load", "transfer", "transfer.variables", "transfer.source"}
     found = set()
     for file in (file for file in FILES if name_of(file) != "figures"):
         for kind in (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ClassDef)):
@@ -170,4 +170,4 @@ def test_protocols_say_what_they_take():
                     said = {f"{call.name}.{arg.arg}": arg.annotation for arg in call.args.args}
                     said[call.name] = call.returns
                     found |= {(kind.name, name) for name, note in said.items() if getattr(note, "id", "") == "Any"}
-    assert found <= {("History", name) for name in memories}
+    assert found <= {("History", name) for name in histories}

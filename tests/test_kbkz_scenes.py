@@ -302,4 +302,4 @@ def test_what_is_left_out_of_many_states_does_not_add_up():
                                  step=fx.StepControl(length=1 / 800, largest=1 / 800))
     sigma = path.stress().at_quadrature_points().cauchy[0]
     assert sigma[0, 0] - sigma[1, 1] == pytest.approx(5 * law.constant_rate("equibiaxial", 1.0, [5.0])[0], rel=5e-4)
-    assert len(path.last.memory[0].states) < len(path) / 3
+    assert len(path.last.history_variables[0].states) < len(path) / 3

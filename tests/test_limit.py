@@ -115,10 +115,10 @@ def test_what_materials_remember_is_computed_four_times_a_step(monkeypatch):
     assert len(path) > 8 and calls[0] <= 4 * (path.counts.steps + path.counts.failures) + 2
     before, last = path.states[-2:]
     with path.problem.state_context(last) as problem:
-        problem.memory = before.memory
+        problem.history_variables = before.history_variables
         problem.advance(last.x, last.control)
-        for name, values in problem.memory[0].values.items():
-            np.testing.assert_array_equal(values, last.memory[0].values[name])
+        for name, values in problem.history_variables[0].values.items():
+            np.testing.assert_array_equal(values, last.history_variables[0].values[name])
 
 
 def test_peers_measures_what_is_there(tmp_path):

@@ -283,7 +283,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
     whole, path = run(), run(remesh=remesh, checkpoint=tmp_path / "run")
     assert [s.stage for s in path.states if s.kind == "remesh"] == ["blow", "creep"]
     for state in (s for s in path.states if s.kind == "remesh" and type(material) is not fx.TransientNetwork):
-        kept = state.memory[-1]                              # of no change of volume, and so it stays
+        kept = state.history_variables[-1]                              # of no change of volume, and so it stays
         values = [past.C.T for past in kept.states] if hasattr(kept, "states") else kept.values.values()
         rr, zz, rz, hoop = np.concatenate([v.reshape(-1, 4) for v in values]).T
         assert (rr * zz - rz**2) * hoop == pytest.approx(np.ones(len(rr)), abs=1e-12)

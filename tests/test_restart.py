@@ -100,11 +100,11 @@ def test_goes_on_to_another_target_and_from_memory(whole, tmp_path):
 def test_a_state_is_stored_with_one_set_of_history_variables(whole):
     """Files hold the history variables after a state only: those before it are the ones of an earlier state."""
     folder, scene, path = whole["stick"]
-    before = path.states[-1].memory_before[0]
-    assert before.history.position.shape == path.states[-1].memory[0].history.position.shape
-    assert not any(state.memory_before for state in fx.load(folder, scene).states)
+    before = path.states[-1].history_variables_before[0]
+    assert before.history.position.shape == path.states[-1].history_variables[0].history.position.shape
+    assert not any(state.history_variables_before for state in fx.load(folder, scene).states)
     data = checkpoint_data.read_data(folder, len(path) - 1)
-    assert len(data["memory"]) == len(path.problem.histories) and "memory_before" not in data
+    assert len(data["memory"]) == len(path.problem.histories) and "history_variables_before" not in data
 
 
 def test_a_run_that_fails_leaves_its_states(tmp_path):
@@ -210,8 +210,8 @@ def test_what_is_many_numbers_is_no_text(whole):
     """Histories are saved as arrays: state.json does not grow with the mesh."""
     folder, _, path = whole["coulomb"]
     for k in range(len(path)):
-        memory = json.loads((folder / f"{k:04d}" / "state.json").read_text())["memory"]
-        assert len(json.dumps(memory)) < 600, memory
+        variables = json.loads((folder / f"{k:04d}" / "state.json").read_text())["memory"]
+        assert len(json.dumps(variables)) < 600, variables
 
 
 def test_a_digit_that_changed(copied):

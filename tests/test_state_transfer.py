@@ -72,8 +72,8 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
     for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
         with problem.state_context(path.last):
             transfer_histories(other.problem, other.last, problem, path.last.x, path.last.control)
-            found, = problem.memory
-        wanted, = path.last.memory
+            found, = problem.history_variables
+        wanted, = path.last.history_variables
         assert found.time == wanted.time
         for name, values in wanted.values.items():
             size = np.abs(values - np.mean(values, (0, 1))).max()
@@ -82,14 +82,14 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
 
 def test_temperatures_and_the_lines_of_tools():
     path, fine = press(pressed()), Problem(fx.Scene(**parts(pressed(), elements=(12, 2))))
-    memory = path.last.memory
-    T = memory[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
-    there = replace(path.last, memory=[*memory[:-1], T])
+    variables = path.last.history_variables
+    T = variables[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
+    there = replace(path.last, history_variables=[*variables[:-1], T])
     transfer_histories(path.problem, there, fine, np.zeros(fine.x.getLocalSize()), 0.0)
-    body, found = fine.histories[-1]._body, fine.memory[-1]
+    body, found = fine.histories[-1]._body, fine.history_variables[-1]
     assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
     assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
-    lines, kept = found.lines[0], memory[-1].lines[0]
+    lines, kept = found.lines[0], variables[-1].lines[0]
     over = 0.1 * np.ptp(kept)                               # fits go beyond a jump, where the touch ends, by a little
     assert kept.min() - over < lines.min() < lines.max() < kept.max() + over and len(lines) > len(kept)
     assert lines.max() == pytest.approx(kept.max(), rel=0.1)
@@ -109,9 +109,9 @@ def parts(scene, elements):
 @pytest.mark.parametrize("points", ["nodes", 3])
 def test_contact_comes_back_as_it_was(points):
     path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
-    here, kept = Problem(path.problem.scene), path.last.memory[0]
+    here, kept = Problem(path.problem.scene), path.last.history_variables[0]
     transfer_histories(path.problem, path.last, here, path.last.x, path.last.control)
-    found = here.memory[0]
+    found = here.history_variables[0]
     touched = kept.history.distance > -here.contacts[0].law.theta
     assert touched.sum() > 3 and np.abs(kept.history.slip).max() > 0
     assert found.history.position == pytest.approx(kept.history.position, rel=1e-9, abs=1e-12)

@@ -281,9 +281,10 @@ def test_internal_variables_follow_the_strain():
         problem.set_state(x, control)
         history.advance(x.array_r, control)
         q += (e - q) * step / (tau + step)
-        memory = history.get()
-        np.testing.assert_allclose(memory.values["q"], q, rtol=1e-12)
-        np.testing.assert_allclose(memory.values["C"].reshape(-1, 3, 3)[:, range(3), range(3)][0], [l**2, l**-4, l**2])
+        variables = history.get()
+        np.testing.assert_allclose(variables.values["q"], q, rtol=1e-12)
+        C = variables.values["C"].reshape(-1, 3, 3)
+        np.testing.assert_allclose(C[:, range(3), range(3)][0], [l**2, l**-4, l**2])
     stored = problem.assemble_scalar(forms.compile(forms.energy)) * forms.stress
     power = problem.assemble_scalar(forms.compile(forms.dissipation)) * forms.stress
     assert stored == pytest.approx(2 * e + (e - q) ** 2, rel=1e-6)
@@ -297,16 +298,16 @@ def test_a_memory_is_kept():
     rest = history.get()
     problem.set_state(x, 0.3)
     history.advance(x.array_r, 0.3)
-    memory, force = history.get(), residual(problem, 0.5)(x)
-    plain, content = pack(history.save(memory))
+    variables, force = history.get(), residual(problem, 0.5)(x)
+    plain, content = pack(history.save(variables))
     data = unpack(json.loads(json.dumps(plain)), content)
     history.start()
     assert history.get().time == 0 and np.array_equal(history.get().values["C"], rest.values["C"])
     assert np.abs(residual(problem, 0.5)(x) - force).max() > 1e-6 * np.abs(force).max()
     history.put(history.load(data))
-    assert np.array_equal(residual(problem, 0.5)(x), force) and history.get().time == memory.time
+    assert np.array_equal(residual(problem, 0.5)(x), force) and history.get().time == variables.time
     with pytest.raises(ValueError, match="read-only"):
-        memory.values["q"][0] = 1
+        variables.values["q"][0] = 1
     for broken in (data | {"cells": data["cells"][:-1]}, data | {"values": {"q": data["values"]["q"]}}, {}):
         with pytest.raises(fx.InputError, match="another mesh"):
             history.load(broken)
@@ -325,8 +326,8 @@ for model in (fx.MixedPressure(), fx.Membrane()):
     problem.fill(x, forms.w.x.array[:forms.space.dofmap.index_map.size_local])
     problem.set_state(x, 0.3)
     history.advance(x.array_r, 0.3)
-    memory = history.get()
-    saved = history.save(memory)
+    variables = history.get()
+    saved = history.save(variables)
     history.start()
     history.put(history.load(saved))
     energy = problem.assemble_scalar(forms.compile(forms.potential))

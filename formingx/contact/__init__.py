@@ -1,1 +1,1 @@
-"""Contact of one face with a tool: where it acts, its equations and memory, its increments, how steps bring it on."""
+"""Contact of a face with a rigid tool: contact points, tractions, history variables and limits of the step length."""

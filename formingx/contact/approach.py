@@ -261,17 +261,17 @@ class Approach:
             True if the pressure was replaced. False if both agree to `StepLimits.difference_at_target` in the
             area-weighted 1-norm, or no pressure is lagged.
         """
-        face, law, memory = self.face, self.face.law, self.face.get()
-        if memory is None or not face.contact.lagged or face.contact.sticks:
+        face, law, variables = self.face, self.face.law, self.face.get()
+        if variables is None or not face.contact.lagged or face.contact.sticks:
             return False
-        old, depth = memory.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
+        old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
         history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), arrival=old.position)
         now = law.pressure(history)
         sums = np.array([face.rule.area @ np.abs(now - law.pressure_ahead(old)), face.rule.area @ now])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
         if change <= LIMITS.difference_at_target * (pressure + LIMITS.least_force * face.force_scale):
             return False
-        face.put(memory._replace(history=history))
+        face.put(variables._replace(history=history))
         return True
 
     def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:

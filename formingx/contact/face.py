@@ -19,7 +19,7 @@ _SAME_STIFFNESS = 1e-3
 """Relative difference of the stiffness of a point below which the stored tangent serves for the next step."""
 
 
-class Memory(NamedTuple):
+class FaceHistory(NamedTuple):
     """History variables of the points of a face at the last accepted state.
 
     Attributes:
@@ -74,7 +74,7 @@ class FaceContact:
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
-        self._memory: Memory | None = None
+        self._stored: FaceHistory | None = None
         self.start()
 
     def enter(self, base: float, rate: float, present: bool) -> None:
@@ -161,9 +161,9 @@ class FaceContact:
 
         For tools in three dimensions it is 0 for points whose gap closed in the last step.
         """
-        if self._memory is None or not self.contact.lagged:
+        if self._stored is None or not self.contact.lagged:
             return self.rule.area
-        return np.where(self._memory.arrived, 0.0, self.rule.area)
+        return np.where(self._stored.arrived, 0.0, self.rule.area)
 
     # equations
 
@@ -271,7 +271,7 @@ class FaceContact:
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
         """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""
         if ahead:
-            arrived = self._memory.arrived if self._memory else np.zeros(len(self.points), dtype=bool)
+            arrived = self._stored.arrived if self._stored else np.zeros(len(self.points), dtype=bool)
             return self.law.stiffness_ahead(self.positions(fields, control), self.history, arrived)
         return self.tractions(fields, control).stiffness
 
@@ -307,7 +307,7 @@ class FaceContact:
     @property
     def history(self) -> ContactHistory | None:
         """History variables of the contact law; None if it has none, as without friction."""
-        return self._memory and self._memory.history
+        return self._stored and self._stored.history
 
     def start(self) -> None:
         """Set the history variables of the reference configuration, in which the points have not been in contact."""
@@ -320,7 +320,7 @@ class FaceContact:
     def _start_at(self, x: np.ndarray) -> None:
         """Set the history variables of points that begin at positions x relative to the tool, shape (n, c), length."""
         n = len(x)
-        self._take(Memory(self.law.start(x), np.zeros(n, dtype=bool), np.ones(n)) if self.has_history else None)
+        self._take(FaceHistory(self.law.start(x), np.zeros(n, dtype=bool), np.ones(n)) if self.has_history else None)
 
     def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
         """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.arrival`).
@@ -330,8 +330,8 @@ class FaceContact:
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
         """
         self._guessed = guessed
-        if self._memory is not None:
-            self._take(self._memory._replace(history=self._memory.history._replace(arrival=arrival)))
+        if self._stored is not None:
+            self._take(self._stored._replace(history=self._stored.history._replace(arrival=arrival)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Update the history variables to an accepted state; they do not change while the tool is inactive.
@@ -341,26 +341,26 @@ class FaceContact:
             control: load parameter (control) of the state, dimensionless.
             start: not used.
         """
-        if self._memory is None or not self.present:
+        if self._stored is None or not self.present:
             return
-        old, theta = self._memory.history, self.law.theta
+        old, theta = self._stored.history, self.law.theta
         history = self.law.tractions(self.positions(x, control), old).history
-        penalty = self._penalty if self.contact.present_area else self._memory.penalty
+        penalty = self._penalty if self.contact.present_area else self._stored.penalty
         arrived = (old.distance <= -theta) & (history.distance > -theta)
         if self.contact.lagged:                             # no point has moved since a stage began here
             moved = np.abs(history.arrival - old.arrival).max(1, initial=0.0)
-            arrived |= self._memory.arrived & (moved < 1e-12 * self._length)
-        self._take(Memory(history, arrived, penalty))
+            arrived |= self._stored.arrived & (moved < 1e-12 * self._length)
+        self._take(FaceHistory(history, arrived, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
         """Open the points under tension at a tool in three dimensions; return True if there were any. Collective."""
-        if self._memory is None or not (self.contact.lagged and self.contact.separates):
+        if self._stored is None or not (self.contact.lagged and self.contact.separates):
             return False
-        history, x = self._memory.history, self.positions(fields, control)
-        free = self.law.pulling(x, history) & ~self._memory.arrived
+        history, x = self._stored.history, self.positions(fields, control)
+        free = self.law.pulling(x, history) & ~self._stored.arrived
         found = bool(self.comm.allreduce(int(free.sum())))
         if found:
-            self._take(self._memory._replace(history=history._replace(
+            self._take(self._stored._replace(history=history._replace(
                 position=np.where(free[:, None], x, history.position),
                 distance=np.where(free, -2 * self.law.theta, history.distance))))
         return found
@@ -371,14 +371,14 @@ class FaceContact:
         Each point sticks or slides from the position where its path in the step met the tool. Points that are deeper
         than `most` (length) count. Return True if there are such points.
         """
-        if self._memory is None or not self.contact.lagged:
+        if self._stored is None or not self.contact.lagged:
             return False
-        old, x, theta = self._memory.history, self.positions(fields, control), self.law.theta
+        old, x, theta = self._stored.history, self.positions(fields, control), self.law.theta
         late = (old.distance <= -theta) & (self.law.distance(x) > most)
         found = bool(self.comm.allreduce(int(late.sum())))
         if found:
             new = self.law.tractions(x, old).history
-            self._take(self._memory._replace(history=ContactHistory(*(
+            self._take(self._stored._replace(history=ContactHistory(*(
                 np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
         return found
 
@@ -387,29 +387,29 @@ class FaceContact:
         """Magnitude of the forces in the body: shear modulus times thickness times largest extent of the body."""
         return float(self._solid.stress * self.thickness * self._length)
 
-    def get(self) -> Memory | None:
+    def get(self) -> FaceHistory | None:
         """Return the present history variables; None without history variables."""
-        return self._memory
+        return self._stored
 
-    def put(self, memory: Memory | None) -> None:
+    def put(self, variables: FaceHistory | None) -> None:
         """Restore history variables that `get` returned."""
-        if memory is not self._memory:
-            self._take(memory)
+        if variables is not self._stored:
+            self._take(variables)
 
-    def _take(self, memory: Memory | None) -> None:
+    def _take(self, variables: FaceHistory | None) -> None:
         """Set the history variables, and begin an increment that evaluates states."""
-        self._memory = memory
-        if self.contact.present_area and memory is not None:
-            self._harden(memory.penalty)
+        self._stored = variables
+        if self.contact.present_area and variables is not None:
+            self._harden(variables.penalty)
         self.increment = Increment(self.law, self.history)
 
-    def save(self, memory: Memory) -> dict[str, np.ndarray]:
+    def save(self, variables: FaceHistory) -> dict[str, np.ndarray]:
         """Return the history variables of all ranks as arrays, with the reference position of each point."""
-        parts = self.comm.allgather((self.points, *memory.history, memory.arrived, memory.penalty))
-        names = ("points", *memory.history._fields, "arrived", "penalty")
+        parts = self.comm.allgather((self.points, *variables.history, variables.arrived, variables.penalty))
+        names = ("points", *variables.history._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
-    def load(self, data: dict[str, Any]) -> Memory:
+    def load(self, data: dict[str, Any]) -> FaceHistory:
         """Return the history variables of the locally owned points from the arrays of `save`.
 
         Raises:
@@ -422,28 +422,28 @@ class FaceContact:
         like = self.law.start(self.points)
         history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in ContactHistory._fields))
-        return Memory(history, np.array(data["arrived"], dtype=bool)[rows], np.array(data["penalty"])[rows])
+        return FaceHistory(history, np.array(data["arrived"], dtype=bool)[rows], np.array(data["penalty"])[rows])
 
-    def transfer(self, source: FaceContact, memory: Memory | None, x: np.ndarray, control: float,
-                 mapping: Callable[[np.ndarray], np.ndarray]) -> Memory | None:
+    def transfer(self, source: FaceContact, variables: FaceHistory | None, x: np.ndarray, control: float,
+                 mapping: Callable[[np.ndarray], np.ndarray]) -> FaceHistory | None:
         """Return the history variables of a face of another mesh, transferred to this face.
 
         A point is in contact if the nearest point of the source is; elastic slips are fitted to slips of the source.
 
         Args:
             source: the same contact on the other mesh.
-            memory: its history variables, or None.
+            variables: its history variables, or None.
             x: locally owned unknowns of the state on this mesh.
             control: load parameter (control) of the state, dimensionless.
             mapping: function that maps points of the other mesh to this mesh.
         """
-        if memory is None:
+        if variables is None:
             return None
-        interpolation, history = MovingLeastSquares(self.comm, mapping(source.points), self.points), memory.history
+        interpolation, history = MovingLeastSquares(self.comm, mapping(source.points), self.points), variables.history
         distance, arrived, penalty = (interpolation.all(values)[interpolation.nearest] for values in
-                                      (history.distance, memory.arrived, memory.penalty))
+                                      (history.distance, variables.arrived, variables.penalty))
         touched, position, theta = distance > -source.law.theta, self.positions(x, control), self.law.theta
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
         slip = np.where(touched, interpolation.fitted(history.slip), 0.0)
         distance = np.where(touched, distance * theta / source.law.theta, free)
-        return Memory(ContactHistory(position, distance, slip, position), arrived, penalty)
+        return FaceHistory(ContactHistory(position, distance, slip, position), arrived, penalty)

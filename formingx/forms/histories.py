@@ -80,15 +80,15 @@ class Histories:
         return self.forms.time_at(control)
 
     @property
-    def memory(self) -> list[Any]:
+    def history_variables(self) -> list[Any]:
         """History variables of the last accepted state: the result of `History.get` for each of `histories`."""
         return [history.get() for history in self.histories]
 
-    @memory.setter
-    def memory(self, memory: list[Any]) -> None:
+    @history_variables.setter
+    def history_variables(self, variables: list[Any]) -> None:
         self._predicted = None, []
-        for history, remembered in zip(self.histories, memory, strict=True):
-            history.put(remembered)
+        for history, stored in zip(self.histories, variables, strict=True):
+            history.put(stored)
 
     def advance(self, x: np.ndarray, control: float) -> None:
         if self.forms.histories:
@@ -96,8 +96,8 @@ class Histories:
         known = self._predicted[1] if self._predicted[0] is x else []
         for history in self.histories[: len(self.histories) - len(known)]:
             history.advance(x[: self.n_owned], control)
-        for history, memory in zip(self.forms.histories, known):
-            history.put(memory)
+        for history, variables in zip(self.forms.histories, known):
+            history.put(variables)
         self._predicted = None, []
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:

@@ -56,18 +56,18 @@ class History(Protocol):
             Values that `put` accepts.
         """
 
-    def put(self, memory: Any) -> None:
+    def put(self, variables: Any) -> None:
         """Set the history variables.
 
         Args:
-            memory: values from `get`.
+            variables: values from `get`.
         """
 
-    def save(self, memory: Any) -> dict[str, Any]:
+    def save(self, variables: Any) -> dict[str, Any]:
         """Return history variables as plain data and arrays, the same on all ranks; collective.
 
         Args:
-            memory: values from `get`.
+            variables: values from `get`.
 
         Returns:
             Data that do not depend on the number of ranks.
@@ -86,14 +86,14 @@ class History(Protocol):
             InputError: the data belong to another mesh, material or boundary.
         """
 
-    def transfer(self, source: Any, memory: Any, x: np.ndarray, control: float,
+    def transfer(self, source: Any, variables: Any, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
         """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
 
         Args:
             source: history of the same material, contact or temperature in the other problem. That problem must be set
                 to the state to transfer.
-            memory: history variables of `source` in this state.
+            variables: history variables of `source` in this state.
             x: unknowns of the state in this problem, to which its forms are set, locally owned entries, shape (n,).
             control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.

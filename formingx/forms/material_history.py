@@ -90,25 +90,25 @@ class MaterialHistory:
             self._now = _unchangeable(InternalVariables(float(self._terms.start.value), values))
         return self._now
 
-    def put(self, memory: InternalVariables) -> None:
+    def put(self, variables: InternalVariables) -> None:
         """Set the internal variables and the process time.
 
         Args:
-            memory: values from `get`.
+            variables: values from `get`.
         """
-        if memory is self._now:
+        if variables is self._now:
             return
-        for name, values in memory.values.items():
+        for name, values in variables.values.items():
             self._set(name, self._own, values)
             self._terms.internal[name].x.scatter_forward()
-        self._terms.start.value = memory.time
-        self._now = memory
+        self._terms.start.value = variables.time
+        self._now = variables
 
-    def save(self, memory: InternalVariables) -> dict[str, Any]:
+    def save(self, variables: InternalVariables) -> dict[str, Any]:
         """Return internal variables as arrays, the same on all ranks; collective.
 
         Args:
-            memory: values from `get`.
+            variables: values from `get`.
 
         Returns:
             {"time": process time, "cells": cell numbers of the script's mesh, "values": {name: values in these cells}}.
@@ -116,8 +116,8 @@ class MaterialHistory:
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
         order = np.argsort(numbers)
-        return {"time": memory.time, "cells": numbers[order],
-                "values": {name: gathered(comm, v)[order] for name, v in memory.values.items()}}
+        return {"time": variables.time, "cells": numbers[order],
+                "values": {name: gathered(comm, v)[order] for name, v in variables.values.items()}}
 
     def load(self, data: dict[str, Any]) -> InternalVariables:
         """Return the internal variables of this rank from stored data of all ranks.
@@ -140,13 +140,13 @@ class MaterialHistory:
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
         return InternalVariables(float(data["time"]), {name: found[name][rows] for name in self._sizes})
 
-    def transfer(self, source: MaterialHistory, memory: InternalVariables, x: np.ndarray, control: float,
+    def transfer(self, source: MaterialHistory, variables: InternalVariables, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables of the same material on another mesh; collective.
 
         Args:
             source: history of the material on the other mesh.
-            memory: its history variables.
+            variables: its history variables.
             x: unknowns of this problem, locally owned entries.
             control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
@@ -164,9 +164,9 @@ class MaterialHistory:
                 return interpolation.fitted(values)
             return fitted_tensors(interpolation, values, *(F if shapes[name] > 0 else [
                 np.linalg.inv(f).swapaxes(1, 2) for f in F]))
-        return _unchangeable(InternalVariables(memory.time, {
+        return _unchangeable(InternalVariables(variables.time, {
             name: transferred(name, v.reshape(-1, v.shape[-1])).reshape(len(self._own), -1, v.shape[-1])
-            for name, v in memory.values.items()}))
+            for name, v in variables.values.items()}))
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -191,8 +191,8 @@ class MaterialHistory:
         self._array(name)[self._points(name, cells)] = values
 
 
-def _unchangeable(memory: InternalVariables) -> InternalVariables:
+def _unchangeable(variables: InternalVariables) -> InternalVariables:
     """Make the arrays of internal variables read-only, and return these variables."""
-    for array in memory.values.values():
+    for array in variables.values.values():
         array.setflags(write=False)
-    return memory
+    return variables

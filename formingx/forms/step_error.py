@@ -68,9 +68,9 @@ class StepError:
         first, found = (self._at(old.x, old.time), self._at(x, end)) if step > 0 else ([], [])
         forms.clock = clock
         after = self._problem.predict(old, x, control)
-        for history, memory in zip(forms.histories, start):
+        for history, variables in zip(forms.histories, start):
             if history in self._materials or not step > 0:
-                history.put(memory)
+                history.put(variables)
         if not step > 0:
             return 0.0, 0.0
         errors = []
@@ -80,11 +80,11 @@ class StepError:
         if self._materials:
             self._advance(x, control, end)
             better = self._relaxing(x, end + step)
-            for history, memory in zip(forms.histories, after):
-                history.put(memory)
+            for history, variables in zip(forms.histories, after):
+                history.put(variables)
             errors.append((better, self._relaxing(x, end + step)))
-        for history, memory in zip(forms.histories, start):
-            history.put(memory)
+        for history, variables in zip(forms.histories, start):
+            history.put(variables)
         self._at_time(end)
         forms.clock = clock
         relaxed = [stress.values() for stress in self._relaxed]     # branches may turn the sum through 0

@@ -166,7 +166,7 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
             return points + Probe(source, points).displacement_in(state) if moved else points
         same = len(problem.histories) == len(source.histories) and not moved
         n = len(problem.histories) if same else len(problem.forms.histories)
-        for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.memory[-n:],
+        for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.history_variables[-n:],
                                      strict=True) if n else ():
             mine.put(mine.transfer(other, kept, x[: problem.n_owned], control, on_this_mesh))
 

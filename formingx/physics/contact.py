@@ -160,7 +160,7 @@ class Contact(Part):
 
     @property
     def travel_vector(self) -> np.ndarray:
-        """Displacement of the tool per unit of its travel, shape (components,), dimensionless; 0 if the tool is fixed."""
+        """Displacement of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
         return np.array(self.direction or (0.0,) * self.tool.components)
 
     @property

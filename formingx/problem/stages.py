@@ -98,20 +98,20 @@ class Stages(Vectors):
 
         Args:
             state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
-                and memory.
+                and history_variables.
 
         Yields:
             The problem.
         """
         fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
-        stage, memory, x, predicted = self._stage, self.memory, self.x.array_r.copy(), self._predicted
+        stage, variables, x, predicted = self._stage, self.history_variables, self.x.array_r.copy(), self._predicted
         try:
             self.restore(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
         finally:
-            self.memory, self._predicted = memory, predicted
+            self.history_variables, self._predicted = variables, predicted
             self._take(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
@@ -125,7 +125,7 @@ class Stages(Vectors):
             state: the state, see `state_context`.
         """
         if self.has_history:
-            self.memory = state.memory
+            self.history_variables = state.history_variables
         if state.setting:
             self.enter(StepData(**state.setting), state.x, state.control)
         if not self.setting.rate[-1]:

@@ -296,7 +296,7 @@ class Curve(StateSolver):
             return states
         equation = fixed(new.control) if bound is None or new.met is None else bound.equation(new.met.value)
         for sweep in range(self.sweeps):
-            late, memory = limit.close_penetrated(new, bound is not None, sweep), self.problem.memory
+            late, variables = limit.close_penetrated(new, bound is not None, sweep), self.problem.history_variables
             if not late and (bound is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
                 return [new, *rest]
             try:
@@ -305,7 +305,7 @@ class Curve(StateSolver):
                 if late:
                     raise
                 log.info("the contact pressure at %s stays that of the last solution: %s", new.met, failure.reason)
-                self.problem.memory = memory
+                self.problem.history_variables = variables
                 return [new, *rest]
         raise Failure("points that come into contact late bring others into their tool again and again", [])
 

@@ -63,14 +63,14 @@ class Standing(Protocol):
         x: the unknowns, locally owned entries, shape (n,), dimensionless.
         control: load parameter (control), dimensionless.
         time: process time.
-        memory: history variables of the problem after this state.
+        history_variables: history variables of the problem after this state.
         setting: step data as plain data (`StepData`), or empty.
     """
 
     x: Array
     control: float
     time: float
-    memory: list[Any]
+    history_variables: list[Any]
     setting: dict[str, Any]
 
 
@@ -321,11 +321,11 @@ class Histories(Protocol):
     """History variables and process time, on which F may depend besides x and the control.
 
     Attributes:
-        memory: history variables after the last accepted state.
+        history_variables: history variables after the last accepted state.
         clock: process time at control 0.
     """
 
-    memory: list[Any]
+    history_variables: list[Any]
     clock: float
 
     @property

@@ -290,12 +290,12 @@ class Run:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _OtherState("the iteration fell back to a part of the path that was passed already", [])
-        error, memory = self._error_in_time(new), self.problem.memory
+        error, variables = self._error_in_time(new), self.problem.history_variables
         try:
             new = separated(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
             states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
         except Failure:
-            self.problem.memory = memory
+            self.problem.history_variables = variables
             raise
         if target is None and length == self.step.length:   # not a step that contact has shortened
             self.step.accepted(tangents(new.history) - (limit.settling if limit else 0), error)

@@ -165,10 +165,10 @@ class Record:
         Raises:
             InadmissibleState: no body can have this state. The record is then unchanged.
         """
-        problem, memory = self.equations, self.equations.memory
+        problem, variables = self.equations, self.equations.history_variables
         problem.advance(state.x, state.control)
-        state.memory, state.stage, state.setting = problem.memory, self.stage, asdict(problem.setting)
-        state.memory_before = memory
+        state.history_variables, state.history_variables_before = problem.history_variables, variables
+        state.stage, state.setting = self.stage, asdict(problem.setting)
         state.time = problem.time_at(state.control)
         self.segments[-1].states.append(state)
         try:
@@ -179,7 +179,7 @@ class Record:
                 raise InadmissibleState(state.verdict)
         except BaseException:
             self.segments[-1].states.pop()
-            problem.memory = memory
+            problem.history_variables = variables
             raise
         if state.verdict and not any(s.verdict for s in self.states[-2:-1]):
             log.warning("beyond %s: %s", self.describe(state), state.verdict)

@@ -319,7 +319,7 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
         Failure: no state was found; `NoEquilibrium` if the body moved but reached no equilibrium. The problem then has
             the history variables of `old` again.
     """
-    problem, kept = curve.problem, curve.problem.memory
+    problem, kept = curve.problem, curve.problem.history_variables
     motion = _Motion(curve, old, old.control + change, settings, onward, passed)
     origin = old.x + change / old.slope * old.direction if ahead else old.x
     eta, solutions = settings.eta, solutions or settings.solutions
@@ -339,7 +339,7 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
             Failure, "even the largest artificial viscosity finds no next state")
         raise kind(f"no equilibrium is found that the body could snap to: {where}", [])
     except Failure:
-        problem.memory = kept
+        problem.history_variables = kept
         raise
     finally:
         motion.destroy()

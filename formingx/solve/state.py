@@ -24,8 +24,8 @@ class State:
         jump: of a "jump": {"dissipated": energy lost in the snap-through (stress length^3), "moved": displacement from
             the state before, mean over the volume of the body (length)}.
         met: the target that the state meets exactly, or None.
-        memory: history variables of the problem after this state (`Problem.histories`).
-        memory_before: history variables with which the state was solved for; empty in a loaded path.
+        history_variables: history variables of the problem after this state (`Problem.histories`).
+        history_variables_before: history variables with which the state was solved for; empty in a loaded path.
         stage: name of the stage of a process.
         setting: step data of the stage, as plain data (`StepData`).
         stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
@@ -48,8 +48,8 @@ class State:
     history: list[Any] = field(default_factory=list)
     kind: str = "step"
     met: Target | None = None
-    memory: list[Any] = field(default_factory=list)
-    memory_before: list[Any] = field(default_factory=list)
+    history_variables: list[Any] = field(default_factory=list)
+    history_variables_before: list[Any] = field(default_factory=list)
     stage: str = ""
     setting: dict[str, Any] = field(default_factory=dict)
     stepping: dict[str, Any] = field(default_factory=dict)

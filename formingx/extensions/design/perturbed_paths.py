@@ -117,7 +117,7 @@ class _PerturbedPaths:
         self._closing: list[np.ndarray] = []
         self._solved = state
         if np.any(state.x):
-            with self.problem.state_context(replace(state, memory=state.memory_before)):
+            with self.problem.state_context(replace(state, history_variables=state.history_variables_before)):
                 constraint = fixed(state.control)
                 solve_perturbed(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
 
@@ -157,7 +157,7 @@ class _PerturbedPaths:
             before: the state of the base run before it.
             last: True if a stage or a piece of a stage ends at the state.
         """
-        with self.problem.state_context(replace(state, memory=state.memory_before)):
+        with self.problem.state_context(replace(state, history_variables=state.history_variables_before)):
             self._closing = []
             for number, face in enumerate(self.problem.contacts):
                 self._closing.append(self._close_gaps(number, face, state, before))
@@ -226,24 +226,24 @@ class _PerturbedPaths:
         for number, face in enumerate(self.problem.contacts):
             if not face.law.has_history or not face.present:
                 continue
-            base = state.memory[self.problem.histories.index(face)]
+            base = state.history_variables[self.problem.histories.index(face)]
             free = base.history.distance <= -face.law.theta
             closing = np.flatnonzero(self._closing[number] if self._closing else 0 * free)
             free[closing] = True
             for run in self.runs:
                 perturbed = run.problem.contacts[number]
-                memory = perturbed.get()
-                assert memory is not None
-                history = memory.history._replace(distance=base.history.distance,
-                                              slip=np.where(free, base.history.slip, memory.history.slip))
+                variables = perturbed.get()
+                assert variables is not None
+                history = variables.history._replace(distance=base.history.distance,
+                                              slip=np.where(free, base.history.slip, variables.history.slip))
                 if len(closing):
                     history = history._replace(position=history.position.copy())
                     history.position[closing] = _projected(
                         perturbed.law.part(closing), perturbed.positions(run.x[:n], run.control)[closing],
                         self._velocity[number][closing], base.history.distance[closing])
-                perturbed.put(memory._replace(history=history, arrived=base.arrived))
+                perturbed.put(variables._replace(history=history, arrived=base.arrived))
         for run in self.runs:
-            run.memory = run.problem.memory
+            run.history_variables = run.problem.history_variables
         self._closing = []
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:

@@ -73,7 +73,7 @@ class PerturbedRun:
         gradient: gradient of a constraint, a PETSc vector for temporary results.
         x: locally owned unknowns of the state, shape (n,).
         control: load parameter (control) of the state, dimensionless.
-        memory: history variables of the state.
+        history_variables: history variables of the state.
         plans: plans of the stages, see `formingx.solve.stage.plan`.
         piece_end: time at which the present piece of a stage ends.
 
@@ -93,7 +93,7 @@ class PerturbedRun:
             raise InputError(f"Design: {name} changes the number of unknowns: there is no derivative by that")
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
         self.x: Any = None                                   # locally owned entries, shape (n,)
-        self.control, self.memory = 0.0, self.problem.memory
+        self.control, self.history_variables = 0.0, self.problem.history_variables
         self.plans: list[Any] = []
         self.piece_end = 0.0
 
@@ -106,8 +106,8 @@ class PerturbedRun:
         Returns:
             The state.
         """
-        return State(self.x, self.control, base.direction, base.slope, memory=self.memory, stage=base.stage,
-                     kind=base.kind, time=self.problem.time_at(self.control))
+        return State(self.x, self.control, base.direction, base.slope, history_variables=self.history_variables,
+                     stage=base.stage, kind=base.kind, time=self.problem.time_at(self.control))
 
     def residual(self, base_residual: np.ndarray) -> np.ndarray:
         """Return the residual of the perturbed run at its state minus the residual of the base run at the base state.

@@ -169,8 +169,8 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
     states = path.segments[-1].states
     for k, history in enumerate(path.problem.histories):
         if isinstance(history, CoolingHistory):
-            local = [f(state.memory[k].temperature) for state in states if len(state.memory[k].temperature)
-                    for f in (np.min, np.max)]
+            temperatures = [state.history_variables[k].temperature for state in states]
+            local = [f(T) for T in temperatures if len(T) for f in (np.min, np.max)]
             ends = [value for part in path.problem.comm.allgather(local) for value in part]
             found = _outside_known_range(path.problem.scene, min(ends), max(ends), "the run brought it")
             yield from (finding for finding in found if finding.about not in reported)

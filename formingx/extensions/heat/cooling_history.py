@@ -140,7 +140,7 @@ class CoolingHistory:
                          *(k - 1 for k in begun)})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
         errors = self.errors_in_space([states[k] for k in looked])
-        temperatures = [states[k].memory[-1].temperature for k in looked]          # the memory of heat is the last one
+        temperatures = [states[k].history_variables[-1].temperature for k in looked]      # the temperature is last
         scene, comm = self._problem.scene, self._problem.comm
         ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
         worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
@@ -222,32 +222,33 @@ class CoolingHistory:
         return HeatState(self._time, self._state[0].copy(), [lines.copy() for lines in self._state[1:]], self._dt,
                       self._power, self._before)
 
-    def put(self, memory: HeatState) -> None:
+    def put(self, variables: HeatState) -> None:
         """Set the present state of the heat equation.
 
         Args:
-            memory: result of `get`.
+            variables: result of `get`.
         """
-        self._time, self._dt, self._power, self._before = memory.time, memory.step, memory.power, memory.before
-        self._state = [memory.temperature.copy(), *(lines.copy() for lines in memory.lines)]
+        self._time, self._dt = variables.time, variables.step
+        self._power, self._before = variables.power, variables.before
+        self._state = [variables.temperature.copy(), *(lines.copy() for lines in variables.lines)]
         self._update_problem()
 
-    def save(self, memory: HeatState) -> dict[str, Any]:
+    def save(self, variables: HeatState) -> dict[str, Any]:
         """Return a state of the heat equation as plain data, the same on all ranks; collective.
 
         Args:
-            memory: result of `get`.
+            variables: result of `get`.
 
         Returns:
             Data for `load`.
         """
         plain = partial(gathered, self._problem.comm)
-        return {"time": memory.time, "step": memory.step, "points": plain(self._body.points),
-                "temperature": plain(memory.temperature),
-                **({} if memory.before is None else {"before": [memory.before[0], plain(memory.before[1])]}),
-                **({} if memory.power is None else {"power": plain(memory.power)}),
+        return {"time": variables.time, "step": variables.step, "points": plain(self._body.points),
+                "temperature": plain(variables.temperature),
+                **({} if variables.before is None else {"before": [variables.before[0], plain(variables.before[1])]}),
+                **({} if variables.power is None else {"power": plain(variables.power)}),
                 "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
-                          for touch, lines in zip(self._body.tool_contacts, memory.lines, strict=True)]}
+                          for touch, lines in zip(self._body.tool_contacts, variables.lines, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
         """Return the state of the heat equation of this rank from stored data.
@@ -270,7 +271,7 @@ class CoolingHistory:
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
 
-    def transfer(self, source: CoolingHistory, memory: HeatState, x: np.ndarray, control: float,
+    def transfer(self, source: CoolingHistory, variables: HeatState, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
         """Interpolate a state of the heat equation from another mesh to this one.
 
@@ -278,7 +279,7 @@ class CoolingHistory:
 
         Args:
             source: history of the temperature on the other mesh.
-            memory: state of `source`, from `get`.
+            variables: state of `source`, from `get`.
             x: not used.
             control: not used.
             mapping: function from reference points of the other mesh, shape (n, 2), to reference points of this mesh.
@@ -286,14 +287,14 @@ class CoolingHistory:
         Returns:
             A state for `put`.
         """
-        comm, before = self._problem.comm, memory.before
+        comm, before = self._problem.comm, variables.before
         to_body = MovingLeastSquares(comm, mapping(source._body.points), self._body.points).fitted
-        touched = (zip(source._body.tool_contacts, memory.lines, strict=True)
+        touched = (zip(source._body.tool_contacts, variables.lines, strict=True)
                    if self._body.tool_contacts else ())     # a released body has no tools
         lines = [MovingLeastSquares(comm, mapping(other.points), touch.points).fitted(kept)
                  for touch, (other, kept) in zip(self._body.tool_contacts, touched, strict=True)]
-        power = None if memory.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
-        return HeatState(memory.time, to_body(memory.temperature), lines, memory.step, power,
+        power = None if variables.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
+        return HeatState(variables.time, to_body(variables.temperature), lines, variables.step, power,
                       before and (before[0], to_body(before[1])))
 
     def _update_problem(self) -> None:

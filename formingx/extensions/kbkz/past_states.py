@@ -96,17 +96,17 @@ class PastStates:
         Returns:
             The history variables.
         """
-        return self._memory
+        return self._stored
 
-    def put(self, memory: StoredStates) -> None:
+    def put(self, variables: StoredStates) -> None:
         """Set the past states.
 
         Args:
-            memory: result of `get`.
+            variables: result of `get`.
         """
-        self._memory, self._terms.start.value = memory, memory.time
-        times = np.array([state.reduced_time for state in memory.states])
-        self._past = np.array([state.C for state in memory.states])
+        self._stored, self._terms.start.value = variables, variables.time
+        times = np.array([state.reduced_time for state in variables.states])
+        self._past = np.array([state.C for state in variables.states])
         self._weights = self._law.weights(times[-1] - times)
         self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # with C, how the body moves
         self._close = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
@@ -119,10 +119,10 @@ class PastStates:
         if self._refreshed and np.array_equal(self._refreshed[0], C) and np.array_equal(self._refreshed[1], step):
             return
         W, slope = self._law.after(self._weights, step, self._before, self._close)
-        S, D, T = self._law.stress(C, self._past, W, slope, self._memory.smallest_h)
+        S, D, T = self._law.stress(C, self._past, W, slope, self._stored.smallest_h)
         count = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
         T = T * rate
-        S = count * (S - T * (self._forms.time_now - self._memory.time))
+        S = count * (S - T * (self._forms.time_now - self._stored.time))
         for (array, rows), values in zip(self._coefficients, (S, C, (count[:, None] * D).reshape(16, -1), count * T),
                                          strict=True):
             array[rows] = values.T
@@ -136,14 +136,14 @@ class PastStates:
             control: load parameter (control) of the state, dimensionless.
             start: state at the start of the step, or None.
         """
-        (C, step, _), memory = self._now(), self._memory
-        states = [*memory.states, Past(memory.states[-1].reduced_time + step, C)]
-        smallest_h = memory.smallest_h
+        (C, step, _), variables = self._now(), self._stored
+        states = [*variables.states, Past(variables.states[-1].reduced_time + step, C)]
+        smallest_h = variables.smallest_h
         if smallest_h is not None:
             h = self._law.damped(C, self._past, smallest_h)[1]
             smallest_h = np.concatenate([h, np.ones((1, self._n))])
         time = self._forms.time_at(control)
-        if time == memory.time and len(states) > 2 and np.array_equal(states[-2].reduced_time,
+        if time == variables.time and len(states) > 2 and np.array_equal(states[-2].reduced_time,
                                                                       states[-3].reduced_time):
             chosen = [*range(len(states) - 2), len(states) - 1]             # between two jumps at one instant
         else:
@@ -151,13 +151,13 @@ class PastStates:
         self.put(StoredStates(time, tuple(states[k] for k in chosen),
                               None if smallest_h is None else smallest_h[chosen]))
 
-    def transfer(self, source: PastStates, memory: StoredStates, x: np.ndarray, control: float,
+    def transfer(self, source: PastStates, variables: StoredStates, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Interpolate the past states of a run on another mesh to this mesh; collective.
 
         Args:
             source: past states on the other mesh.
-            memory: history variables there.
+            variables: history variables there.
             x: unknowns of this problem, locally owned entries.
             control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to reference points of
@@ -172,8 +172,9 @@ class PastStates:
         def fitted(values: np.ndarray) -> np.ndarray:
             return interpolation.fitted(values.T).T
         states = tuple(Past(fitted(s.reduced_time) if self._aT else s.reduced_time,
-                            fitted_tensors(interpolation, s.C.T, *F).T) for s in memory.states)
-        return StoredStates(memory.time, states, None if memory.smallest_h is None else fitted(memory.smallest_h))
+                            fitted_tensors(interpolation, s.C.T, *F).T) for s in variables.states)
+        smallest_h = None if variables.smallest_h is None else fitted(variables.smallest_h)
+        return StoredStates(variables.time, states, smallest_h)
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -217,7 +218,7 @@ class PastStates:
 
     def _now(self) -> tuple[np.ndarray, Any, Any]:
         """Return Cbar = J^(-2/3) C, shape (4, n), and the reduced time since the last state and per process time."""
-        step: Any = self._forms.time_now - self._memory.time
+        step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
         if not len(self._own):
             return np.zeros((4, 0)), step, rate
@@ -245,11 +246,11 @@ class PastStates:
         square, point = min(self._forms.comm.allgather(local))
         return float(np.sqrt(square)), np.array(point)
 
-    def save(self, memory: StoredStates) -> dict[str, Any]:
+    def save(self, variables: StoredStates) -> dict[str, Any]:
         """Return the past states as plain data, the same on all ranks; collective.
 
         Args:
-            memory: past states with their times, as `get` returns them.
+            variables: past states with their times, as `get` returns them.
 
         Returns:
             Dictionary of numbers and arrays that `load` accepts.
@@ -263,9 +264,9 @@ class PastStates:
             each = values.reshape(-1, len(self._own), len(self._terms.places)).transpose(1, 0, 2)
             return gathered(self._forms.comm, each)[order]
         states = [{"felt": of_all(s.reduced_time) if self._aT else s.reduced_time, "C": of_all(s.C)}
-                  for s in memory.states]
-        return {"time": memory.time, "cells": numbers[order], "states": states,
-                **({} if memory.smallest_h is None else {"least": of_all(memory.smallest_h)})}
+                  for s in variables.states]
+        return {"time": variables.time, "cells": numbers[order], "states": states,
+                **({} if variables.smallest_h is None else {"least": of_all(variables.smallest_h)})}
 
     def load(self, data: dict[str, Any]) -> StoredStates:
         """Return the past states of this rank from stored data.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.face import FaceContact, Memory
+from ...contact.face import FaceContact, FaceHistory
 from ...contact.rule import Lobatto
 from ...physics.contact_law import ContactHistory
 
@@ -131,7 +131,7 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
         bound = 2 * old.slip * face.thickness               # under a small pressure the slip would be unbounded
         slip = np.clip(slip, -bound, bound)
     distance = np.where(touches, depth, np.minimum(d - law.shift, -(1 + 1e-9) * theta))
-    face.put(Memory(ContactHistory(x, distance, slip, x), newly_closed, np.ones(len(x))))
+    face.put(FaceHistory(ContactHistory(x, distance, slip, x), newly_closed, np.ones(len(x))))
 
 
 def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -97,7 +97,8 @@ class CriticalPoint:
         segment = self.path.segment(self.left)
         curve, problem = segment.curve, segment.problem
         start = State(self.state.x.copy(), self.state.control, self.found.x, 0.0, kind="branch point",
-                      memory=self.left.memory, stage=self.left.stage, setting=self.left.setting, time=self.state.time)
+                      history_variables=self.left.history_variables, stage=self.left.stage,
+                      setting=self.left.setting, time=self.state.time)
         zero = State(0 * start.x, 0.0, 0 * start.x, 0.0)
         start.direction = sense * self.found.x / curve.moved(zero, State(self.found.x, 0.0, zero.x, 0.0))
         record = Record(problem, curve)

@@ -203,8 +203,8 @@ class Modes:
             fraction = nearest.fraction
         else:
             x, control = self.curve.interpolate(a, b, fraction)
-            state = State(x, control, a.direction, a.slope, memory=a.memory, stage=a.stage, setting=a.setting,
-                          time=self.problem.time_at(control))
+            state = State(x, control, a.direction, a.slope, history_variables=a.history_variables, stage=a.stage,
+                          setting=a.setting, time=self.problem.time_at(control))
         with self.problem.state_context(nearest.state):
             self.variation.fill(*kind)
             x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._mode_of_index(nearest, index)
@@ -259,7 +259,7 @@ class Modes:
         with self.problem.state_context(a):
             state = self.curve.inside(a, b, fraction)
         self.curve.spent()
-        state.stage, state.setting, state.memory = a.stage, a.setting, a.memory
+        state.stage, state.setting, state.history_variables = a.stage, a.setting, a.history_variables
         x, control = self.curve.interpolate(a, b, fraction)
         guess = State(x, control, a.direction, a.slope)
         if self.curve.distance(guess, state) > self._locating.max_deviation * self.curve.distance(a, b):

@@ -48,13 +48,13 @@ def furthest(path: Any) -> Resticking | None:
         The point, or None if no point stuck again.
     """
     found = []
-    for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # they come first in memory
+    for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # contacts come first
         definition = contact.contact
         if definition.lagged or not (definition.sticks and definition.separates):
             continue
-        touches = [state.memory[number].history for state in path.segments[-1].states
+        touches = [state.history_variables[number].history for state in path.segments[-1].states
                    if state.kind != "start"                 # points that touch there do not stick: they carry no force
-                   and len(state.memory) > number and state.memory[number] is not None]
+                   and len(state.history_variables) > number and state.history_variables[number] is not None]
         rows = gathered(contact.comm, np.column_stack([contact.points, _shifts(contact, touches)]))
         again = rows[rows[:, 2] > 0]
         if len(again):

@@ -128,7 +128,7 @@ class EnergyBalance:
                 finally:
                     curve.spent()
                 problem.advance(found.x, found.control)
-                found.memory, found.setting = problem.memory, b.setting
+                found.history_variables, found.setting = problem.history_variables, b.setting
                 return found
         return None
 
@@ -287,11 +287,11 @@ class EnergyBalance:
 
         The displacements are constant: those of a and those of b, with equal weights (trapezoidal rule).
         """
-        cold, warm = a.memory[-1], b.memory[-1]        # the temperature is last
+        cold, warm = a.history_variables[-1], b.history_variables[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
             still = temperature._replace(before=None)                         # no previous temperature
-            return self._energy_at(replace(state, memory=[*state.memory[:-1], still]))
+            return self._energy_at(replace(state, history_variables=[*state.history_variables[:-1], still]))
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:

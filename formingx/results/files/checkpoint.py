@@ -152,9 +152,10 @@ class Checkpoint:
         problem = segment.problem
         final = self.folder / state_name(number)
         part = final.with_name(final.name + ".part")
-        memory = [history.save(values) for history, values in zip(problem.histories, state.memory, strict=True)]
+        variables = [history.save(values)
+                     for history, values in zip(problem.histories, state.history_variables, strict=True)]
         space = problem.forms.space
-        data = _plain_state(state) | {"number": number, "memory": memory, "profile": _profile(self._path, state)}
+        data = _plain_state(state) | {"number": number, "memory": variables, "profile": _profile(self._path, state)}
         if state is segment.states[0] and segment is not self._path.segments[0]:
             data["mesh"] = problem.scene.preformed.save(problem)
         for name in FIELDS:
@@ -275,7 +276,7 @@ def _read_state(data: dict, problem: Any) -> State:
     met, stored = data.pop("met"), (f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES))
     return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
                  history=[Iteration(*row) for row in data.pop("history")],
-                 memory=_read_memory(problem, data.pop("memory")),
+                 history_variables=_read_history_variables(problem, data.pop("memory")),
                  **{name: data[name] for name in stored if name in data})
 
 
@@ -329,20 +330,20 @@ def _plain_state(state: State) -> dict[str, Any]:
                    "history": [list(i) for i in state.history]}
 
 
-def _read_memory(problem: Any, memory: list[dict[str, Any]]) -> list[Any]:
+def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> list[Any]:
     """Return the history variables of a state from its data in a checkpoint.
 
     Args:
         problem: the `Problem` on the mesh of the state.
-        memory: data of each set of history variables.
+        variables: data of each set of history variables.
 
     Raises:
         InputError: their number differs from the scene.
     """
-    if len(memory) != len(problem.histories):
+    if len(variables) != len(problem.histories):
         raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"
                          " belongs to another scene")
-    return [history.load(data) for history, data in zip(problem.histories, memory, strict=True)]
+    return [history.load(data) for history, data in zip(problem.histories, variables, strict=True)]
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:

@@ -19,7 +19,7 @@ from .progress import progress
 
 FORMAT = 8  # number of the format of the files, in scene.json
 FIELDS = ("x", "direction")
-HISTORIES = ("memory", "memory_before")
+HISTORIES = ("history_variables", "history_variables_before")
 ARRAYS = "arrays.bin"
 END = "end.json"
 
