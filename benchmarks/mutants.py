@@ -145,7 +145,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("extensions/heat/cooling_history.py", "self._body.power, self._power = (self._power + power) / 2, power",
      "self._body.power, self._power = power, power", "cooling"),
     ("extensions/heat/contact.py",
-     "self.conductance / (1 + self.conductance * column[0])", "self.conductance + 0 * column[0]",
+     "self.conductance / (1 + self.conductance * compliance[0])", "self.conductance + 0 * compliance[0]",
      "heat"),
     ("extensions/heat/stepping.py",
      "_D, _W = 1 - np.sqrt(0.5), np.sqrt(0.125)", "_D, _W = 1 - np.sqrt(0.5), 0.36", "heat"),
