@@ -332,7 +332,7 @@ def test_crossing_edges_are_found(grid):
         n = int(random.integers(3, 13))
         corners = random.integers(0, grid, (n, 2))
         edges = [(i, (i + 1) % n) for i in range(n) if np.any(corners[i] != corners[(i + 1) % n])]
-        found = check.crossings(0.1 * corners, np.array(edges)) if edges else ()
+        found = check.crossing_edges(0.1 * corners, np.array(edges)) if edges else ()
         pairs = sorted((min(pair), max(pair)) for rows in found for pair in rows.tolist())
         assert pairs == [(i, j) for i in range(len(edges)) for j in range(i + 1, len(edges))
                          if meet(edges[i], edges[j])]

@@ -11,7 +11,7 @@ import numpy as np
 from dolfinx import fem
 
 from ..errors import InputError
-from ..mesh.check import crossing, crossings
+from ..mesh.check import crossing_edges, crossing_point
 from ..ranks import gathered
 
 FINE_PIECES = 16
@@ -124,10 +124,10 @@ class Outline:
         Returns:
             A point where edges cross, shape (2,), length; None if there is none.
         """
-        if crossing(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
+        if crossing_point(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
         points, pieces = self.pieces(edges, _SEARCH_PIECES)
-        for i, j in itertools.chain.from_iterable(crossings(points, pieces)):
+        for i, j in itertools.chain.from_iterable(crossing_edges(points, pieces)):
             if not self._near(i // _SEARCH_PIECES, j // _SEARCH_PIECES):
                 return points[pieces[i]].mean(0)
         return None

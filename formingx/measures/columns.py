@@ -7,8 +7,8 @@ from ..contact import resultants
 from ..contact.tooling import Tooling
 from ..errors import InputError
 from ..physics.loads import Gravity
-from .forces import resisting, support_factor, tool_factor
-from .quantities import Bound, OfWholePart, Sag
+from .forces import positive_direction, support_factor, tool_factor
+from .quantities import Quantity, Sag, WholePartQuantity
 from .relaxed import PoleStressRatio
 from .targets import Amplitude, Target, bind_pole_height, bind_pole_stretch, bind_volume, swept_volume
 
@@ -16,7 +16,7 @@ Measure = Target | Callable[[Any], float]
 """Quantity of a user-defined column, see `formingx.trace`."""
 
 
-class _Recorded(Bound):
+class _Recorded(Quantity):
     """Base class of quantities that depend on more than the displacements; they cannot be interpolated between states.
     """
 
@@ -67,7 +67,7 @@ class _Ratio(_Recorded):
 
     def value(self, x, control):
         self._problem.set_state(x, control)
-        return self._ratio.now()
+        return self._ratio.evaluate()
 
 
 class _UserDefined(_Recorded):
@@ -85,7 +85,7 @@ class _UserDefined(_Recorded):
             raise InputError(f"record: {self._name!r} gave {found!r}: must be a number") from None
 
 
-def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Bound]) -> dict[str, Bound]:
+def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """Return the output quantities that a user adds to the columns of a run.
 
     Args:
@@ -101,7 +101,7 @@ def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[st
     """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")
-    found: dict[str, Bound] = {}
+    found: dict[str, Quantity] = {}
     for name, measure in columns.items():
         if not isinstance(name, str) or not name or name in taken:
             raise InputError(f"record: name = {name!r}: must be a word that is no column yet; columns are"
@@ -115,7 +115,7 @@ def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[st
     return found
 
 
-def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
+def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
     r"""Return the output quantities that every run records.
 
     Energies, volumes, areas and forces belong to the whole part, tool and support, also where a half or a quarter is
@@ -157,13 +157,13 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     energy = scene.symmetry_factor * forms.stress * volume
-    found: dict[str, Bound] = {"process_time": Amplitude(problem, -1)} if timed else {}
+    found: dict[str, Quantity] = {"process_time": Amplitude(problem, -1)} if timed else {}
     for i, item in enumerate(scene.items):
         if any(item is t for t in scene.drivable):
             found[column := scene.column(item)] = Amplitude(problem, i)
             if item in scene.supports:
                 found["support_force" if column == item.quantity else f"{item.name}_force"] = (
-                    OfWholePart(_Reaction(problem, i), support_factor(scene, item)))
+                    WholePartQuantity(_Reaction(problem, i), support_factor(scene, item)))
     if "axis" in scene.mesh.boundaries:
         found["pole_height"] = bind_pole_height(problem)
         found["pole_stretch"] = bind_pole_stretch(problem)
@@ -198,8 +198,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Bound]:
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
         for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # moving tools come first
-            force = _Nodal(problem, lambda c, *state: factors[c] * (resultants.force(c, *state) @ resisting(c.contact)),
-                           sum, tools[name])
+            force = _Nodal(problem, lambda c, *state: factors[c] * (resultants.force(c, *state)
+                                                                    @ positive_direction(c.contact)), sum, tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:
                 found[f"{name}_force"] = force

@@ -8,11 +8,11 @@ from dolfinx import fem
 
 from ..contact import resultants
 from ..errors import InputError, finite, known
-from .quantities import Bound, OfWholePart
+from .quantities import Quantity, WholePartQuantity
 from .targets import Target
 
 
-def resisting(contact: Any) -> np.ndarray:
+def positive_direction(contact: Any) -> np.ndarray:
     r"""Return the direction in which the force of the body on a tool counts as positive.
 
     .. math:: -\frac{m}{|m|}
@@ -37,7 +37,7 @@ def tool_factor(scene: Any, contact: Any) -> int:
     Returns:
         The ratio, a power of 2.
     """
-    return int(scene.symmetry.factor_of(contact.tool.bounds, resisting(contact)))
+    return int(scene.symmetry.factor_of(contact.tool.bounds, positive_direction(contact)))
 
 
 def support_factor(scene: Any, support: Any) -> int:
@@ -89,13 +89,13 @@ def force(value: float, *, of: str | None = None) -> Target:
         number, item = next(iter(moving.items()))
         if item in scene.contacts:
             tools = [scene.items[i] for i in scene.same_tool(number)]
-            return OfWholePart(_ToolForce(problem, [c for c in problem.contacts if c.contact in tools]),
+            return WholePartQuantity(_ToolForce(problem, [c for c in problem.contacts if c.contact in tools]),
                                tool_factor(scene, item))
-        return OfWholePart(_SupportForce(problem, number), support_factor(scene, item))
+        return WholePartQuantity(_SupportForce(problem, number), support_factor(scene, item))
     return Target("force" if of is None else f"{of}_force", finite("force", value), bind)
 
 
-class _SupportForce(Bound):
+class _SupportForce(Quantity):
     """Force of the body on a driven support along its component; `number` is the number of the support in the scene."""
 
     smooth = False
@@ -126,14 +126,14 @@ class _SupportForce(Bound):
         return c
 
 
-class _ToolForce(Bound):
+class _ToolForce(Quantity):
     """Force of the body on a tool, positive against its travel; `contacts` are the contact faces of the tool."""
 
     smooth = False
 
     def __init__(self, problem: Any, contacts: list[Any]):
         forms = problem.forms
-        self._problem, self._contacts, self._direction = problem, contacts, resisting(contacts[0].contact)
+        self._problem, self._contacts, self._direction = problem, contacts, positive_direction(contacts[0].contact)
         self._scale = self.size = forms.stress * forms.volume / forms.length
 
     def value(self, x, control):

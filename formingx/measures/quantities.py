@@ -9,7 +9,7 @@ import ufl
 from ..mesh.nodes import of_space
 
 
-class Bound:
+class Quantity:
     """Base class of output quantities of one problem, such as the height of its pole.
 
     A quantity has a value in a state, and an equation that fixes this value at the target of a run.
@@ -49,7 +49,7 @@ class Bound:
         raise NotImplementedError
 
 
-class OfWholePart(Bound):
+class WholePartQuantity(Quantity):
     """Output quantity of the whole part, where a half, a quarter or an eighth is modelled (`Scene.symmetry`).
 
     Args:
@@ -57,7 +57,7 @@ class OfWholePart(Bound):
         factor: number of images of the modelled body that count; the quantity is multiplied by it.
     """
 
-    def __init__(self, modelled: Bound, factor: int):
+    def __init__(self, modelled: Quantity, factor: int):
         self._modelled, self._factor = modelled, factor
         self.size, self.smooth = factor * modelled.size, modelled.smooth
 
@@ -68,7 +68,7 @@ class OfWholePart(Bound):
         return self._modelled.equation(target / self._factor)
 
 
-class Linear(Bound):
+class Linear(Quantity):
     r"""Output quantity that is a function of a linear form of the unknowns x.
 
     .. math:: f(y_0 + a \cdot x)
@@ -97,7 +97,7 @@ class Linear(Bound):
         return c
 
 
-class Form(Bound):
+class Form(Quantity):
     r"""Output quantity that is an integral over the body or its boundary.
 
     .. math:: q_0 + s \, I(x)
@@ -131,7 +131,7 @@ class Form(Bound):
         return c
 
 
-class Sag(Bound):
+class Sag(Quantity):
     r"""Largest downward displacement of a node; the displacement counts from the first mesh of a run.
 
     .. math:: \max(0, \max_i(-u_{z,i}))
@@ -148,28 +148,28 @@ class Sag(Bound):
         dofs = np.unique(forms.space.sub(0).sub(forms.scene.kinematics.components - 1).dofmap.list[:, nodes])
         self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
         self.size = self._scale = forms.length
-        self._so_far: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
+        self._earlier: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
         if (preformed := forms.scene.preformed) is not None:
             space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
             order = np.argsort(numbers)
             nodes_at = of_space(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
-            self._so_far = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
+            self._earlier = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
 
-    def _deepest(self, x: Any) -> tuple[float, int]:
+    def _largest_sag(self, x: Any) -> tuple[float, int]:
         """Return the sag over the length of the body, and the rank that owns the lowest node; `x`: unknowns."""
-        sag = -(x.array_r[self._dofs] + self._so_far).min(initial=0.0)
+        sag = -(x.array_r[self._dofs] + self._earlier).min(initial=0.0)
         found = self._problem.comm.allgather(float(sag))
         return max(found), int(np.argmax(found))
 
     def value(self, x, control):
-        return self._scale * self._deepest(x)[0]
+        return self._scale * self._largest_sag(x)[0]
 
     def equation(self, target):
         def c(x, control, gradient):
-            depth, rank = self._deepest(x)
+            depth, rank = self._largest_sag(x)
             row = np.zeros(self._problem.n_owned)
             if self._problem.comm.rank == rank and len(self._dofs):
-                row[self._dofs[np.argmin(x.array_r[self._dofs] + self._so_far)]] = -1.0
+                row[self._dofs[np.argmin(x.array_r[self._dofs] + self._earlier)]] = -1.0
             self._problem.fill(gradient, row)
             return depth - target / self._scale, 0.0
         return c

@@ -60,7 +60,7 @@ class PoleStressRatio:
         return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
                                                        for t in forms.terms)
 
-    def now(self) -> float:
+    def evaluate(self) -> float:
         """Return the ratio of stresses for the current fields of the forms of the problem; collective.
 
         Returns:
@@ -129,7 +129,7 @@ class ElasticStretches:
             basis, at_places = (np.column_stack([np.ones(len(x)), x]) for x in (points, places))
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
-    def now(self, cells: int) -> np.ndarray:
+    def evaluate(self, cells: int) -> np.ndarray:
         """Return the elastic stretches for the current fields of the forms of the problem.
 
         Args:

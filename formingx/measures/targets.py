@@ -7,13 +7,13 @@ import ufl
 
 from ..errors import InputError, finite, known, pair, positive
 from ..forms.probes import probe
-from .quantities import Bound, Form, Linear, OfWholePart, Sag
+from .quantities import Form, Linear, Quantity, Sag, WholePartQuantity
 
 _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 """Points of the two-point Gauss rule on [0, 1], each of weight 1/2."""
 
 
-class Amplitude(Bound):
+class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
 
     For a load that a stage deactivates or activates, it is the part of the load that acts on the body.
@@ -31,12 +31,12 @@ class Amplitude(Bound):
         self.size = 0.0 if number == -1 else self._scale    # a process may be short in any unit of time
 
     @property
-    def of_load(self) -> bool:
+    def is_load(self) -> bool:
         """True if the item is a load, such as a pressure."""
         return self._acts
 
     @property
-    def moves(self) -> bool:
+    def is_controlled(self) -> bool:
         """True if the amplitude changes with the control in the present stage."""
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
@@ -68,7 +68,7 @@ class Amplitude(Bound):
             target: the target value, in the user's units.
 
         Returns:
-            Function as in `Bound.equation`.
+            Function as in `Quantity.equation`.
         """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
@@ -88,7 +88,7 @@ class Target(NamedTuple):
     Attributes:
         name: name of the output quantity.
         value: its target value, in the user's units.
-        bind: function that takes a `Problem` and returns the output quantity of this problem (`Bound`).
+        bind: function that takes a `Problem` and returns the output quantity of this problem (`Quantity`).
         signed: True if the quantity changes sign with the control; False for a stretch, which may grow in both
             directions of the control.
     """
@@ -148,7 +148,7 @@ def process_time(value: float) -> Target:
     return Target("process_time", finite("process_time", value), lambda problem: Amplitude(problem, -1))
 
 
-def changed() -> Target:
+def change_completed() -> Target:
     """Return the target that a change of the active loads, supports and tools between two stages is complete.
 
     The change leaves forces out of balance. They decrease to 0 while the control goes from 0 to its target 1
@@ -293,7 +293,7 @@ def sag(value: float) -> Target:
     return Target("sag", positive("sag", value), Sag)
 
 
-def bind_pole_height(problem: Any) -> Bound:
+def bind_pole_height(problem: Any) -> Quantity:
     """Return the axial displacement u_z of the pole of a problem as an output quantity.
 
     The pole is the material point on the axis at mid-thickness in the reference configuration.
@@ -308,7 +308,7 @@ def bind_pole_height(problem: Any) -> Bound:
     return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
 
 
-def bind_pole_stretch(problem: Any) -> Bound:
+def bind_pole_stretch(problem: Any) -> Quantity:
     r"""Return the in-plane stretch of the sheet at the pole, on the axis, as an output quantity.
 
     .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
@@ -325,11 +325,11 @@ def bind_pole_stretch(problem: Any) -> Bound:
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
     row, power = pole.stretch_row()
-    so_far = 1 + float(pole.earlier_displacement[1, -1] - pole.earlier_displacement[0, -1]) / (high - low)
-    return Linear(problem, row, so_far, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
+    earlier = 1 + float(pole.earlier_displacement[1, -1] - pole.earlier_displacement[0, -1]) / (high - low)
+    return Linear(problem, row, earlier, lambda t: max(t, 1e-300) ** power, lambda s: s ** (1 / power))
 
 
-def bind_volume(problem: Any, form: Any = None) -> Bound:
+def bind_volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the face under the controlled pressure as an output quantity.
 
     `enclosed_volume` defines the volume. It belongs to the whole part, also where a half or a quarter is modelled.
@@ -341,21 +341,21 @@ def bind_volume(problem: Any, form: Any = None) -> Bound:
     Returns:
         The quantity, length^3; in plane strain per unit depth, length^2.
     """
-    return OfWholePart(_volume(problem, form), problem.scene.symmetry_factor)
+    return WholePartQuantity(_volume(problem, form), problem.scene.symmetry_factor)
 
 
-def _volume(problem: Any, form: Any = None) -> Bound:
+def _volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
 
     On a remeshed body it includes the volume that the face swept on earlier meshes. form: as in `bind_volume`.
     """
-    so_far = 0.0
+    earlier = 0.0
     if problem.scene.preformed is not None:
         old, state = problem.scene.preformed.before
         with old.state_context(state):
-            so_far = _volume(old).value(old.x, state.control)
+            earlier = _volume(old).value(old.x, state.control)
     form = swept_volume(problem) if form is None else form
-    return Form(problem, form, _unit_of_volume(problem.forms), so_far)
+    return Form(problem, form, _unit_of_volume(problem.forms), earlier)
 
 
 def _unit_of_volume(forms: Any) -> float:
@@ -428,7 +428,7 @@ def is_met(target: Target, size: float, value: float) -> bool:
 
     Args:
         target: the target.
-        size: scale of the quantity, in the user's units (`Bound.size`).
+        size: scale of the quantity, in the user's units (`Quantity.size`).
         value: value of the quantity, in the user's units.
 
     Returns:

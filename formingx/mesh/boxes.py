@@ -29,7 +29,7 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
         if len(low) > 1:
             yield pairs[:count, 0], pairs[:count, 1]
         return
-    order = np.argsort(_along_a_curve((low + high) / 2), kind="stable")
+    order = np.argsort(_morton_codes((low + high) / 2), kind="stable")
     depth = int(np.ceil(np.log2(len(low))))
     ends = np.full((2, 2**depth, 2), [[[np.inf]], [[-np.inf]]])             # empty boxes overlap nothing
     ends[0, :len(low)], ends[1, :len(low)] = low[order], high[order]
@@ -50,7 +50,7 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
         waiting += [(level - 1, a[k:k + _CHUNK], b[k:k + _CHUNK]) for k in range(0, len(a), _CHUNK)]
 
 
-def _along_a_curve(points: np.ndarray) -> np.ndarray:
+def _morton_codes(points: np.ndarray) -> np.ndarray:
     """Return the positions of points, shape (n, 2), on Morton's space-filling curve, integers, shape (n,).
 
     Points that follow each other on the curve are mostly close together in the plane.

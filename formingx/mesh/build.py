@@ -12,8 +12,8 @@ from .divisions import (
     Thickness,
     checked_grading,
     divisions,
-    graded,
-    is_row,
+    graded_ends,
+    is_sequence,
     layer_thicknesses,
     levels,
     with_middles,
@@ -85,11 +85,11 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     if elements is None:
         elements = _preset(accuracy, inner_radius, radius, layers)
     along, through = divisions("disc", "radius", elements, len(layers))
-    sizes = None if concentrate is None else _sizes(concentrate, inner_radius, radius)
+    sizes = None if concentrate is None else _checked_sizes(concentrate, inner_radius, radius)
     if sizes and grading != 1:
         raise InputError(f"disc: grading = {grading!r} and concentrate = {concentrate!r}: give one of them")
     joints = (_concentrated(inner_radius, radius, along, sizes) if sizes
-              else inner_radius + (radius - inner_radius) * graded(along, grading))
+              else inner_radius + (radius - inner_radius) * graded_ends(along, grading))
 
     def body(ends: np.ndarray, through: list[np.ndarray]) -> Mesh:
         def points(R: np.ndarray) -> np.ndarray:
@@ -137,7 +137,7 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
                                        body(ends, [np.linspace(0.0, 1.0, m + 1) for m in n])))
 
 
-def _sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
+def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
     """Return the argument `concentrate` of a disc, sorted by radius.
 
     Args:
@@ -220,7 +220,7 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     def points(angle: np.ndarray) -> np.ndarray:
         radius = inner_radius + levels(layers, through, angle)
         return np.stack([radius * np.sin(angle), radius * np.sin(np.pi / 2 - angle)], axis=-1)
-    ends = np.pi / 2 * graded(along, checked_grading("sphere", grading))
+    ends = np.pi / 2 * graded_ends(along, checked_grading("sphere", grading))
     return _mesh("sphere", points, ends, [], list(layers), through, ("axis", "equator", "inner", "outer"), comm)
 
 
@@ -263,26 +263,26 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
         raise InputError(f"parison: elements along the meridian = {along}: must be at least 2, one in the bottom and"
                          f" one in the tube")
     # elements lie along [0, 1] from the neck; the joint of tube and bottom is a node
-    joints = graded(along, 1 / grading)
+    joints = graded_ends(along, 1 / grading)
     wall = float(sum(thickness_at(np.zeros(1))[0] for thickness_at in layers.values()))
     joint = length / (length + np.pi / 2 * (inner_radius + wall / 2))
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
 
-    def inner(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def height_and_angle(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the height above the half sphere, length, and the angle in it, radians, shape (n,) each."""
         return (length * np.maximum(1 - from_neck / node, 0.0),
                 np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0))
 
     def body(ends: np.ndarray, through: list[np.ndarray]) -> Mesh:
         def points(from_neck: np.ndarray) -> np.ndarray:
-            z, angle = inner(from_neck)
+            z, angle = height_and_angle(from_neck)
             radius = inner_radius + levels(layers, through, z - inner_radius * np.sin(angle))
             return np.stack([radius * np.sin(np.pi / 2 - angle), z - radius * np.sin(angle)], axis=-1)
         return _mesh("parison", points, ends, [node], list(layers), through, ("neck", "axis", "inner", "outer"), comm)
     made = body(joints, through)
     if accuracy is None or not chosen:
         return made
-    z, angle = inner(joints)
+    z, angle = height_and_angle(joints)
     return _with_preset(made, accuracy, layers, z - inner_radius * np.sin(angle), through, body)
 
 
@@ -312,15 +312,15 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     layers: wall
     boundaries: end (2 edges), axis (2 edges), inner (24 edges), outer (24 edges)
     """
-    lines = [_points(f"from_lines: {name}", points) for name, points in (("inner", inner), ("outer", outer))]
+    lines = [_checked_points(f"from_lines: {name}", points) for name, points in (("inner", inner), ("outer", outer))]
     if len(lines[0]) != len(lines[1]):
         raise InputError(f"from_lines: inner has {len(lines[0])} points, outer {len(lines[1])}: they must be as many")
     parts = layer_thicknesses("from_lines", {"wall": 1.0} if layers is None else layers, "wall", "")
-    if not is_row(elements) or len(elements) != 2:
+    if not is_sequence(elements) or len(elements) != 2:
         raise InputError(f"from_lines: elements = {elements!r}: must be (between two points, through each layer)")
     pieces, given = len(lines[0]) - 1, elements[0]
     along = [count("from_lines: elements between two points", n)
-             for n in (given if is_row(given) else [given] * pieces)]
+             for n in (given if is_sequence(given) else [given] * pieces)]
     if len(along) != pieces:
         raise InputError(f"from_lines: elements between points = {given!r}: {pieces} pieces need as many counts")
     _, through = divisions("from_lines", "lines", (sum(along), elements[1]), len(parts))
@@ -342,7 +342,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
                  comm)
 
 
-def _points(name: str, points: Any) -> np.ndarray:
+def _checked_points(name: str, points: Any) -> np.ndarray:
     """Return points (R, Z) as an array, shape (n, 2), length.
 
     Args:

@@ -39,14 +39,14 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     flat = np.abs(area) <= _MIN_AREA * longest
     if flat.any():
         raise InputError(f"{what}: {flat.sum()} elements are flat, one at {_show(corners[flat][0].mean(0))}")
-    inside_out = turned_inside_out(points[triangles])
+    inside_out = inverted(points[triangles])
     if inside_out.any():
         raise InputError(f"{what}: {inside_out.sum()} elements are turned inside out, one at"
                          f" {_show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
                          f" much for them: use smaller elements there")
     _check_middles(points, triangles, what)
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
-    place = crossing(points, outline)
+    place = crossing_point(points, outline)
     if place is not None:
         raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
                          f" their nodes, and none may lie over another")
@@ -99,7 +99,7 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
                          f" another one too or a corner")
 
 
-def turned_inside_out(nodes: np.ndarray) -> np.ndarray:
+def inverted(nodes: np.ndarray) -> np.ndarray:
     """Return True for triangles whose Jacobian determinant changes its sign between nodes.
 
     Args:
@@ -144,7 +144,7 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
     return edges[times == 1]
 
 
-def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
+def crossing_point(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
     """Return the middle of an edge that crosses another, or touches it anywhere but in a common node, or None.
 
     The middle has the shape (2,), length.
@@ -153,11 +153,11 @@ def crossing(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
         points: ends of the edges, shape (n, 2), length.
         edges: numbers of the ends of each edge, shape (k, 2).
     """
-    pairs = next(crossings(points, edges), None)
+    pairs = next(crossing_edges(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
 
 
-def crossings(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
+def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
     """Yield the pairs of edges that cross, or touch anywhere but in a common node.
 
     Args:

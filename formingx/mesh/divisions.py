@@ -112,10 +112,10 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
     Raises:
         InputError: `elements` has another form, or there are too many elements.
     """
-    if not is_row(elements) or len(elements) != 2:
+    if not is_sequence(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
-    through = list(elements[1]) if is_row(elements[1]) else [elements[1]] * layers
+    through = list(elements[1]) if is_sequence(elements[1]) else [elements[1]] * layers
     if layers == 1 and len(through) > 1:
         through = [through]
     if len(through) != layers:
@@ -137,7 +137,7 @@ def _layer_ends(kind: str, given: Any) -> np.ndarray:
     Raises:
         InputError: a size is not positive.
     """
-    if not is_row(given):
+    if not is_sequence(given):
         n = count(f"{kind}: elements through a layer", given)
         if n > MAX_RECTANGLES:
             raise InputError(f"{kind}: elements through a layer = {given!r}: must be at most {MAX_RECTANGLES}")
@@ -150,12 +150,12 @@ def _layer_ends(kind: str, given: Any) -> np.ndarray:
     return ends / ends[-1]
 
 
-def is_row(values: Any) -> bool:
+def is_sequence(values: Any) -> bool:
     """Return True for a list, a tuple or a one-dimensional array."""
     return isinstance(values, tuple | list) or isinstance(values, np.ndarray) and values.ndim == 1
 
 
-def graded(along: int, grading: float) -> np.ndarray:
+def graded_ends(along: int, grading: float) -> np.ndarray:
     """Return the ends of elements on [0, 1] whose sizes form a geometric progression, shape (along + 1,).
 
     Args:

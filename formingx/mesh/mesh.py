@@ -168,9 +168,9 @@ class Mesh:
             preset = preset._replace(make=lambda ends, through: made(ends, through).with_part(*part))
         return replace(self, facets=meshtags(domain, 1, self.facets.indices, values),
                        boundaries=boundaries | {name: tuple(new.values())}, preset=preset,
-                       columns=self._columns_with((low, high), axis, tolerance, part))
+                       columns=self._columns_with_part((low, high), axis, tolerance, part))
 
-    def _columns_with(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
+    def _columns_with_part(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
         """Return the `Columns` of the mesh with fixed ends at the limits of a new part, or None without columns.
 
     Args:

@@ -329,11 +329,11 @@ def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
         numbers.append(section.sizes(n))
         width = 3 + (checked_dimension(dim, section) if parametric else 0)
         points.append(section.reals(width * n).reshape(n, width)[:, :3])
-    _total(section, "nodes", total, numbers)
+    _check_total(section, "nodes", total, numbers)
     return np.concatenate(numbers), np.concatenate(points)
 
 
-def _total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
+def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
     """Check that a section ends, and holds the number of nodes or elements that its first line states.
 
     Args:
@@ -370,5 +370,5 @@ def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]
         width = 1 + _KINDS[kind][1]
         rows = section.sizes(n * width).reshape(n, width)[:, 1:]
         blocks.append(Block(dim, entity, kind, groups.get((dim, entity), ()), rows))
-    _total(section, "elements", total, [block.nodes for block in blocks])
+    _check_total(section, "elements", total, [block.nodes for block in blocks])
     return blocks

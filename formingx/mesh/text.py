@@ -52,7 +52,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     >>> sorted(fx.mesh.read("plate.msh").boundaries)
     ['axis', 'bottom', 'rim', 'top']
     """
-    order = np.argsort(_NUMBERINGS[_known(numbering)])
+    order = np.argsort(_NUMBERINGS[_checked_numbering(numbering)])
     if any(t.shape[1] != 6 for t in grid.layers.values()):
         raise InputError("mesh.write: the text format holds six-node triangles; this mesh has three-node ones")
     lines = [f"{_FORMAT} 2", f"numbering {numbering}", f"nodes {len(grid.points)}"]
@@ -87,7 +87,7 @@ def read(file: str | os.PathLike) -> Grid:
     ended = version == "1"
     for words in lines:
         if words[0] == "numbering" and len(words) == 2 and order is None:
-            order = _NUMBERINGS[_known(words[1], lines)]
+            order = _NUMBERINGS[_checked_numbering(words[1], lines)]
         elif words[0] == "nodes" and len(words) == 2 and not index:
             rows = lines.block(words[1], (whole, number, number), "number R Z")
             points, numbers = np.array([row[1:] for row in rows]), np.array([row[0] for row in rows])
@@ -104,10 +104,10 @@ def read(file: str | os.PathLike) -> Grid:
                 raise lines.error("an element number stands twice")
             elements |= {row[0] for row in rows}
             triangles = np.array([row[1:] for row in rows])[:, order]
-            layers[_new(lines, words, layers)] = counter_clockwise(points, triangles)
+            layers[_new_name(lines, words, layers)] = counter_clockwise(points, triangles)
         elif words[0] == "boundary" and len(words) > 2:
             rows = lines.block(words[1], (whole,) * 3, "first, middle and last node", index, all_nodes=True)
-            boundaries[_new(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
+            boundaries[_new_name(lines, words, boundaries)] = np.array(rows)[:, [0, 2, 1]]
         elif words == ["end"] and not ended:
             ended = True
             if next(lines, None):
@@ -144,7 +144,7 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
                                  f" is not an edge of an element (first, middle and last node)")
 
 
-def _known(numbering: str, lines: _Lines | None = None) -> str:
+def _checked_numbering(numbering: str, lines: _Lines | None = None) -> str:
     """Return `numbering`, which must be "corners" or "around".
 
     lines: lines of the file that is read, for messages; None when a file is written.
@@ -158,7 +158,7 @@ def _known(numbering: str, lines: _Lines | None = None) -> str:
     return numbering
 
 
-def _new(lines: _Lines, words: Sequence[str], taken: Any) -> str:
+def _new_name(lines: _Lines, words: Sequence[str], taken: Any) -> str:
     """Return the name of a new layer or boundary from the first line of its block.
 
     Args:

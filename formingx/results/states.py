@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import ConvergenceError, InputError, finite, known
 from ..measures import columns as standard_columns
-from ..measures.quantities import Bound
+from ..measures.quantities import Quantity
 from ..measures.targets import Target, is_met, process_time
 from ..solve.branches import branch_points
 from ..solve.newton import Failure
@@ -155,7 +155,7 @@ class States:
         """
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
-    def value(self, measure: str | Bound, state: State) -> float:
+    def value(self, measure: str | Quantity, state: State) -> float:
         """Return an output quantity in a state, in the units of the script.
 
         Args:
@@ -219,7 +219,7 @@ class States:
             raise InputError("Path.state_at: after: must be a state of this path")
         values: list[float] = []
         refused: list[InputError] = []
-        piece: tuple[Segment, State, State, Bound] | None = None
+        piece: tuple[Segment, State, State, Quantity] | None = None
         started = after is None
         for segment in self.segments:
             for left, right in zip(segment.states, segment.states[1:]):
@@ -253,7 +253,7 @@ class States:
         raise InputError(f"the path does not pass {target.name.replace('_', ' ')} = {target.value:.9g}: " + (
             f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
-    def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
+    def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
         """Return the state that meets a target between two successive states.
 
         Args:
@@ -276,7 +276,7 @@ class States:
         segment.curve.spent()
         return found
 
-    def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Bound) -> State:
+    def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
         """Return the state that a run from the first state reaches at the target, with its history variables.
 
         The arguments are those of `_between`.

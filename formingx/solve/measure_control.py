@@ -53,7 +53,7 @@ class Flow(Run):
 
     Args:
         record: record of the states.
-        measure: the prescribed output quantity (`Bound`).
+        measure: the prescribed output quantity (`Quantity`).
         course: function of time that gives its prescribed value, in the user's units.
         times: times that are met exactly: the start, the corners and the end of the amplitude.
         targets: pairs (target, output quantity) to meet in between.

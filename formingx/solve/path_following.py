@@ -180,7 +180,7 @@ class Run:
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
         targets, bound = self.targets, self.targets.measure
-        pressure = isinstance(bound, Amplitude) and bound.of_load
+        pressure = isinstance(bound, Amplitude) and bound.is_load
         if may_turn and last.stepping.get("until") != [*targets.until[:2]] and not pressure:
             with self.problem.state_context(last):
                 facing = targets.facing(replace(last))

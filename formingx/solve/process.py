@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import ConvergenceError, InputError
 from ..forms.schedule import StepData
-from ..measures.targets import Amplitude, Target, changed, process_time
+from ..measures.targets import Amplitude, Target, change_completed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose
 from .equations import Array, Measure
@@ -117,7 +117,7 @@ class Execution:
                 bound = target.bind(self.problem)
             except InputError as error:
                 raise InputError(f"{stage.label}: {error}") from None
-            if isinstance(bound, Amplitude) and not bound.moves:
+            if isinstance(bound, Amplitude) and not bound.is_controlled:
                 raise InputError(f"{stage.label}: target {target}: this stage does not drive that")
             found.append((target, bound))
         return found
@@ -167,7 +167,7 @@ class Execution:
     def _accept_known(self, state: State) -> None:
         """Accept a state that needs no iteration, and complete its step in the record."""
         self.record.accept(state)
-        self.record.complete_step(StepControl(), changed())
+        self.record.complete_step(StepControl(), change_completed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
         """Follow the path until the last target is met, and return the targets that are still open.
@@ -201,7 +201,7 @@ class Execution:
             start = 0.0 if fading else control
             self._enter(self._amplitudes(), still, 0, start, fading)
         if self.problem.setting.fading and (begun or self._out_of_balance(x)):
-            target = changed()
+            target = change_completed()
             self._trace([(target, target.bind(self.problem))], start)
 
     def _out_of_balance(self, x: Array) -> bool:
@@ -399,7 +399,7 @@ def begin(curve: Curve) -> State:
         if not problem.fixed_loads:
             raise _no_start(curve, failure) from None
         record = Record(problem, curve)
-        target = changed()
+        target = change_completed()
         try:
             problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
             run = Run(record, [(target, target.bind(problem))])

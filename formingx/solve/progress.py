@@ -135,7 +135,7 @@ class RunTargets:
             change: change of the control, dimensionless.
         """
         for target, bound in self.open:
-            if isinstance(bound, Amplitude) and bound.moves:
+            if isinstance(bound, Amplitude) and bound.is_controlled:
                 then, now = (self._curve.value(bound, old.x, c) - target.value
                              for c in (old.control + change, old.control))
                 change *= now / (now - then) if now * then < 0 else 1.0

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from ...errors import InputError, instance, known, non_negative, pair, positive, several
 from ...mesh import with_gmsh
-from ...mesh.check import crossing
+from ...mesh.check import crossing_point
 from ...mesh.grid import Grid, counter_clockwise, to_mesh
 from ...mesh.mesh import Mesh
 
@@ -224,7 +224,7 @@ def _chords(edges: list[Edge]) -> np.ndarray:
             line = edge.centre + away * (math.dist(a, edge.centre) / np.linalg.norm(away, axis=1))[:, None]
         points.append(line)
     x = np.concatenate(points)
-    if (place := crossing(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
+    if (place := crossing_point(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
         raise InputError(f"sheet: outline: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
     return x
 

@@ -1,12 +1,12 @@
 """Energy that materials dissipate in a step."""
 
-from ...measures.quantities import Bound
+from ...measures.quantities import Quantity
 from ...solve import predictor
 from ...solve.record import Segment
 from ...solve.state import State
 
 
-def dissipated_energy(segment: Segment, states: list[State], power: Bound) -> float:
+def dissipated_energy(segment: Segment, states: list[State], power: Quantity) -> float:
     """Return the energy that materials dissipate between the last two of given states, by Simpson's rule; collective.
 
     In the middle of the step the body lies on the predicted curve, and its history variables are advanced to that time.

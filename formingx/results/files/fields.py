@@ -89,7 +89,7 @@ class Fields:
                       "cauchy_hoop": sigma[:, 2, 2], "hydrostatic_pressure": stress.hydrostatic_pressure,
                       "stress_error": np.repeat(field.error_in_cells(), len(_NODES[2]))}
             with problem.state_context(state):
-                elastic = self._elastic.now(len(self._cells))
+                elastic = self._elastic.evaluate(len(self._cells))
             found |= {f"elastic_stretch_{k + 1}": elastic[..., k] for k in range(self._elastic.count)}
             if problem.contacts:
                 found["contact_pressure"] = self._contact_pressure(state)
