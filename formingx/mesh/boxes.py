@@ -12,14 +12,14 @@ _MAX_DIRECT = 1024  # largest number of boxes whose pairs are compared without a
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the pairs of boxes that overlap or touch.
+    """Yield the pairs of boxes that overlap or touch, in one or more arrays.
 
     Args:
         low: lower corners of the boxes, shape (n, 2), finite.
         high: upper corners of the boxes, shape (n, 2), finite.
 
     Yields:
-        Numbers i and j of overlapping boxes, shape (k,) each; every pair occurs once.
+        Indices i and j of overlapping boxes, shape (k,) each. Every pair occurs once, in either order.
     """
     if len(low) <= _MAX_DIRECT:
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)

@@ -50,8 +50,8 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             a function of R, or a table {R: thickness}, interpolated linearly. All nodes lie on this shape, mid-edge
             nodes too.
         accuracy: "draft", "standard" or "fine", for the number of elements. Sheets that bend near the rim get more
-            elements through the thickness. Thick layers get more, too, so that no element is 1.5 times taller than
-            wide. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
+            elements through the thickness. Thick layers get more, too, so that no element is taller than 1.5 times its
+            width. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
             sheet, the `Scene` chooses other elements: short ones where the sheet reaches a fillet of the tool,
             and fewer through the thickness (docs/accuracy.md). A given `grading` or `concentrate` is kept.
         elements: (number along the radius, division of the layers), in place of `accuracy`. The division is a number of
@@ -60,8 +60,11 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             4]). Each rectangle is divided into two triangles.
         grading: size of the element at the rim over the element at the axis, 1e-6 to 1e6.
         concentrate: in place of `grading`, {reference radius: element size there over the largest}, for example around
-            the edge of a plug. Sizes grow linearly with the distance from these radii, where nodes are placed.
+            the edge of a plug. A node is placed at each of these radii. Sizes grow linearly with the distance from it.
         comm: MPI communicator.
+
+    Returns:
+        The mesh, of quadratic triangles.
 
     Raises:
         InputError: a size is not positive, or a count is not a positive integer. A radius in `concentrate` is not on
@@ -101,13 +104,13 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
-    """Return the number of elements along the radius of a disc, and the numbers through its layers.
+    """Return the number of elements along the radius of a disc for an accuracy, and the numbers through its layers.
 
     Args:
         accuracy: "draft", "standard" or "fine".
         low: inner radius, length.
         high: outer radius, length.
-        layers: {name: thickness as a function of radii}.
+        layers: {name: function of radii, shape (n,), that returns the thickness of the layer, shape (n,), length}.
     """
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
@@ -138,7 +141,7 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
 
 
 def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
-    """Return the argument `concentrate` of a disc, sorted by radius.
+    """Return the argument `concentrate` of `disc`, checked and sorted by radius.
 
     Args:
         concentrate: {reference radius: element size there over the largest}.
@@ -146,7 +149,7 @@ def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) 
         high: outer radius, length.
 
     Raises:
-        InputError: a radius is not on the disc, or a size is not between 0 and 1.
+        InputError: a radius is not on the disc, or a relative size is not between 1e-6 and 1.
     """
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
@@ -162,13 +165,18 @@ def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) 
 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
-    """Return the ends of `along` elements from radius `low` to radius `high`, shape (along + 1,), length.
+    r"""Return the radii at the ends of elements that are small near given radii, shape (along + 1,), length.
+
+    With relative sizes s_i at radii R_i, and D the largest distance of a radius from the nearest R_i, the relative size
+    is
+
+    .. math:: s(R) = \min_i \left[s_i + (1 - s_i) \frac{|R - R_i|}{D}\right]
 
     Args:
         low: smallest radius, length.
         high: largest radius, length.
         along: number of elements.
-        sizes: {radius: element size there over the largest}; each of these radii is an end.
+        sizes: {R_i: s_i}; each R_i is the end of an element.
 
     Raises:
         InputError: there are fewer elements than intervals between these radii.
@@ -204,7 +212,7 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
         inner_radius: inner radius, length.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
         elements: (number from the axis to the equator, division of the layers as in `disc`).
-        grading: size of the element at the equator over the element at the axis.
+        grading: size of the element at the equator over the size of the element at the axis, along the meridian.
         comm: MPI communicator.
 
     Raises:
@@ -269,7 +277,10 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
 
     def height_and_angle(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the height above the half sphere, length, and the angle in it, radians, shape (n,) each."""
+        """Return the height above the half sphere, length, and the angle below the equator, radians, shape (n,) each.
+
+        from_neck: coordinates along the wall, 0 at the neck, 1 on the axis, shape (n,).
+        """
         return (length * np.maximum(1 - from_neck / node, 0.0),
                 np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0))
 
@@ -298,8 +309,8 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
         outer: corners (R, Z) of the outer face, shape (n, 2), length.
         elements: (number between successive corners, division of the layers as in `disc`). The first entry may be a
             list of n - 1 numbers, one for each interval.
-        layers: {layer name: its fraction of the distance from `inner` to `outer`, in any unit}; default one layer,
-            `wall`.
+        layers: {layer name: thickness of the layer relative to the other layers} from `inner` to `outer`; default one
+            layer, `wall`.
         comm: MPI communicator.
 
     Raises:
@@ -343,10 +354,10 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
 
 def _checked_points(name: str, points: Any) -> np.ndarray:
-    """Return points (R, Z) as an array, shape (n, 2), length.
+    """Return an argument with points (R, Z) as an array, shape (n, 2), length.
 
     Args:
-        name: name of the argument, for messages.
+        name: name of the argument, for error messages.
         points: the points, a sequence of pairs.
 
     Raises:
@@ -360,19 +371,19 @@ def _checked_points(name: str, points: Any) -> np.ndarray:
 
 def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
-    """Return the mesh of triangles on rows and columns of nodes.
+    """Return the mesh of quadratic triangles on rows and columns of nodes.
 
-    The diagonals alternate in each layer as on a chessboard.
+    Each rectangle of a column is divided into two triangles. The diagonals alternate in each layer as on a chessboard.
 
     Args:
         kind: name of the body, for messages.
         place: function of coordinates along the body, shape (k,), that returns the nodes of all rows, shape
             (rows, k, 2), length.
-        ends: ends of the columns of elements in this coordinate, shape (n + 1,).
-        fixed: ends that other divisions of the body keep, shape (m,).
+        ends: coordinates of the ends of the columns of elements, shape (n + 1,).
+        fixed: coordinates at which columns must also end if the body is divided anew, shape (m,).
         layers: names of the layers.
         through: ends of the elements through each layer on [0, 1].
-        sides: names of the boundaries left, right, bottom and top.
+        sides: names of the boundaries at the first and the last column, and at the first and the last row.
         comm: MPI communicator.
     """
     points = place(with_middles(ends))

@@ -24,7 +24,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
         what: name of the mesh, with which the message begins.
 
     Raises:
-        InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet without
+        InputError: a coordinate is not finite. An element is flat or inverted. Two elements overlap, or meet without
             sharing their nodes. The body is in pieces. The message gives the position.
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
@@ -58,9 +58,9 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def _pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return the number of the connected piece of the body that contains each triangle, shape (m,).
+    """Return a number for each triangle that is equal within a connected piece of the body, shape (m,).
 
-    triangles: node numbers of the corners, shape (m, 3). Piece 0 contains the lowest node number.
+    triangles: node numbers of the corners, shape (m, 3). The number is 0 for the piece with the lowest node number.
     """
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
@@ -100,7 +100,7 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def inverted(nodes: np.ndarray) -> np.ndarray:
-    """Return True for triangles whose Jacobian determinant changes its sign between nodes.
+    """Return True for triangles whose Jacobian determinant vanishes at a node, or changes sign between nodes.
 
     Args:
         nodes: nodes (R, Z) of each triangle, corners first, shape (m, 3 or 6, 2), length.
@@ -122,7 +122,7 @@ def inverted(nodes: np.ndarray) -> np.ndarray:
 
 
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
-    """Return the edges that belong to one element only, as node numbers, shape (k, 2).
+    """Return the edges of the outline, which belong to one element only, as node numbers, shape (k, 2).
 
     Args:
         points: nodes (R, Z), shape (n, 2), length.
@@ -145,13 +145,14 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing_point(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """Return the middle of an edge that crosses another, or touches it anywhere but in a common node, or None.
-
-    The middle has the shape (2,), length.
+    """Find an edge that crosses another edge, or touches it anywhere but in a common node.
 
     Args:
         points: ends of the edges, shape (n, 2), length.
-        edges: numbers of the ends of each edge, shape (k, 2).
+        edges: for each edge the rows of its two ends in `points`, shape (k, 2).
+
+    Returns:
+        Middle of such an edge, shape (2,), length; None if no edges cross.
     """
     pairs = next(crossing_edges(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
@@ -162,10 +163,10 @@ def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray
 
     Args:
         points: ends of the edges, shape (n, 2), length.
-        edges: numbers of the ends of each edge, shape (k, 2).
+        edges: for each edge the rows of its two ends in `points`, shape (k, 2).
 
     Yields:
-        Numbers of the two edges of each pair, shape (m, 2), m > 0.
+        Indices of the two edges of each pair, shape (m, 2), m > 0.
     """
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = 1e-9 * float((high - low).max())

@@ -68,5 +68,5 @@ void cross(long pairs, const long *first, const long *second, const double *poin
 
 
 def compiled() -> Any:
-    """Return the functions `overlaps` and `cross` in C."""
+    """Return an object with the functions `overlaps` (boxes) and `cross` (edges) in C, compiled at the first call."""
     return functions("mesh", _HEADER, _SOURCE)

@@ -17,13 +17,13 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
     """Return the thickness of each layer as a function of coordinates.
 
     Args:
-        kind: name of the calling function, for messages.
-        thickness: its argument of this name.
+        kind: name of the calling function, for error messages.
+        thickness: argument of that function: a thickness, see `Thickness`, or {layer name: thickness}.
         alone: name of the layer if `thickness` names none.
-        coordinate: coordinate along which the thickness may vary; "" if it may not.
+        coordinate: coordinate along which the thickness may vary, "R" or "Z"; "" if it must be constant.
 
     Returns:
-        {name of a layer: function of coordinates, shape (n,), that returns its thickness, shape (n,)}.
+        {name of a layer: function of coordinates, shape (n,), that returns its thickness, shape (n,), length}.
 
     Raises:
         InputError: there is no layer, or a name or a thickness is not allowed.
@@ -41,10 +41,11 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
     Args:
         caller: name of the thickness, for messages.
         given: a length, a function of a coordinate, or a table {coordinate: length}.
-        coordinate: name of the coordinate along which the thickness may vary; "" if it may not.
+        coordinate: name of the coordinate along which the thickness may vary; "" if it must be constant.
 
     Raises:
-        InputError: the thickness is not positive or not given at all coordinates, or varies although it may not.
+        InputError: the thickness is not positive. It varies although it must be constant. The returned function also
+            raises it: at a coordinate without a value.
     """
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
         value = positive(caller, given)
@@ -88,8 +89,8 @@ def checked_grading(kind: str, grading: Any) -> float:
     """Return the argument `grading` as a float.
 
     Args:
-        kind: name of the calling function, for messages.
-        grading: size of the last element over the first.
+        kind: name of the calling function, for error messages.
+        grading: size of the last element over the size of the first.
 
     Raises:
         InputError: `grading` is not between 1e-6 and 1e6.
@@ -104,9 +105,9 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
     """Return the number of elements along the sheet, and the ends of elements through each layer on [0, 1].
 
     Args:
-        kind: name of the calling function, for messages.
-        along_what: direction along the sheet, for messages.
-        elements: its argument of this name: (number along the sheet, division of the layers).
+        kind: name of the calling function, for error messages.
+        along_what: direction along the sheet, such as "radius", for error messages.
+        elements: argument of that function: (number along the sheet, division of the layers), see `disc`.
         layers: number of layers.
 
     Raises:
@@ -156,11 +157,13 @@ def is_sequence(values: Any) -> bool:
 
 
 def graded_ends(along: int, grading: float) -> np.ndarray:
-    """Return the ends of elements on [0, 1] whose sizes form a geometric progression, shape (along + 1,).
+    r"""Return the ends of elements on [0, 1] whose sizes form a geometric progression, shape (along + 1,).
+
+    .. math:: h_i \propto g^{i/(n - 1)}, \qquad i = 0, \dots, n - 1
 
     Args:
-        along: number of elements.
-        grading: size of the last element over the first.
+        along: number n of elements.
+        grading: size g of the last element over the size of the first.
     """
     sizes = grading ** (np.arange(along) / max(along - 1, 1))
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
@@ -168,7 +171,7 @@ def graded_ends(along: int, grading: float) -> np.ndarray:
 
 
 def with_middles(joints: np.ndarray) -> np.ndarray:
-    """Return the ends of n elements, shape (n + 1,), and their middles in order, shape (2 n + 1,)."""
+    """Return n + 1 ends of elements, the array `joints`, and the n middles between them in order, shape (2 n + 1,)."""
     points = np.empty(2 * len(joints) - 1)
     points[::2], points[1::2] = joints, (joints[1:] + joints[:-1]) / 2
     return points
@@ -177,8 +180,10 @@ def with_middles(joints: np.ndarray) -> np.ndarray:
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
     """Return the distances of all rows of nodes from the first face of a sheet, shape (rows, n), length.
 
+    Rows lie at the ends and in the middles of the elements.
+
     Args:
-        layers: {name: thickness as a function of coordinates}.
+        layers: {name: function of coordinates, shape (n,), that returns the thickness of the layer, shape (n,)}.
         through: ends of the elements through each layer on [0, 1].
         coordinates: coordinates along the sheet, shape (n,).
     """

@@ -21,11 +21,11 @@ class FilletInSheet(NamedTuple):
     """A fillet of a tool, and the part of the undeformed sheet that is estimated to lie on it.
 
     Attributes:
-        first, last: ends of this part, measured along the sheet from its start, length.
+        first, last: distances of the ends of this part from the start of the sheet, along the sheet, length.
         radius: radius of the fillet, length.
         turn: 1 - cos of the angle of the arc, at most 1.
         stretch: reference over deformed length of the sheet on the fillet, along the section.
-        area_ratio: reference over deformed area there: the wall over the thickness in the reference configuration.
+        area_ratio: reference over deformed area there, which equals deformed over reference thickness.
         concave: True if the sheet bridges the fillet before it touches it.
     """
 
@@ -53,10 +53,10 @@ is 1.)"""
 
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
-    """Yield the fillets of a tool that a sheet may reach.
+    """Yield the fillets of a tool that a sheet may reach, with the part of the sheet on each.
 
     Args:
-        tool: a tool of a section.
+        tool: a tool in the plane of the section (`formingx.tools.tool`).
         face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
         axisymmetric: True for bodies of revolution, False in plane strain.
         moving: True if the tool moves, by an unknown amount.
@@ -113,7 +113,7 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
 
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:
-    """Return the numbers of the points of each arc of a tool: consecutive points of equal curvature above 0.
+    """Return the indices of the points on each arc of a tool: consecutive points of equal curvature above 0.
 
     curvature: absolute curvature at each point of the tool, shape (m,), 1/length.
     """

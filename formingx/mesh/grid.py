@@ -40,7 +40,7 @@ class Grid(NamedTuple):
 
 
 def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return triangles with their nodes counter-clockwise, shape (m, 3 or 6).
+    """Return triangles with their nodes in counter-clockwise order, shape (m, 3 or 6).
 
     Args:
         points: nodes (R, Z), shape (n, 2), length.
@@ -126,18 +126,19 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 def _tagged(grid: Grid, what: str) -> tuple:
     """Return the arrays of a grid with its names as tags, in the order of nodes of DOLFINx.
 
-    An edge of several boundaries gets a tag of its own, which belongs to all of them.
+    An edge of several boundaries has a tag of its own, which belongs to all of these boundaries.
 
     Args:
         grid: the grid.
         what: name of the mesh, for messages.
 
     Returns:
-        Cells, shape (m, 3 or 6); points; tags of the cells, shape (m,); boundary edges, shape (k, 2 or 3); tags of the
-        edges, shape (k,); {layer: tag}; {boundary: tags}.
+        Cells, shape (m, 3 or 6); points, shape (n, 2 or 3), length; tags of the cells, shape (m,); boundary edges,
+        shape (k, 2 or 3); tags of the edges, shape (k,); {layer: tag}; {boundary: tags}.
 
     Raises:
-        InputError: the elements are invalid, or a boundary edge is not an edge of an element.
+        InputError: the elements are invalid, an element belongs to two layers, or a boundary edge is not an edge of an
+            element.
     """
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
@@ -173,7 +174,10 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    """Return {(lower end, higher end): [middle]}, node numbers of all edges; [] for triangles of three nodes."""
+    """Return {(lower, higher node number of the ends): [node number of the middle]} of all edges of triangles.
+
+    The list is empty for triangles of three nodes.
+    """
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()

@@ -15,10 +15,10 @@ OUTSIDE = 1e-3
 
 
 class LocatedPoints(NamedTuple):
-    """Sought points that lie in cells of this rank, and their cells.
+    """Given points that lie in cells of this rank, and their cells.
 
     Attributes:
-        numbers: numbers of these points among the sought ones, shape (m,).
+        numbers: indices of these m points among all given points, shape (m,).
         cells: local number of the cell that contains each point, shape (m,).
         reference: position of each point in the reference cell, shape (m, dimension).
     """
@@ -30,14 +30,19 @@ class LocatedPoints(NamedTuple):
 
 def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh"
            ) -> LocatedPoints:
-    """Return the cells that contain points; collective.
+    """Find the cell that contains each of the given points; collective.
+
+    A point counts as inside up to 0.001 cell sizes from a cell. A point on several cells or ranks is found once.
 
     Args:
         mesh: the `dolfinx.mesh.Mesh`.
         points: reference positions (R, Z), shape (n, 2), length, equal on all ranks.
         size: extent of the mesh, length.
-        cells: local numbers of cells to be searched; default all.
-        within: name of these cells in the message.
+        cells: local numbers of the cells to be searched; None: all.
+        within: name of these cells in the error message.
+
+    Returns:
+        The points that lie in cells of this rank.
 
     Raises:
         InputError: a point lies in none of the cells.

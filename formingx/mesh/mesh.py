@@ -35,7 +35,7 @@ class Columns(NamedTuple):
 
 
 class Preset(NamedTuple):
-    """Accuracy that a script asks of a sheet, and the function that divides the sheet into other elements.
+    """Accuracy that a script requests for a sheet, and the function that divides the sheet into other elements.
 
     Attributes:
         accuracy: "draft", "standard" or "fine".
@@ -94,7 +94,7 @@ class Mesh:
         """Check the elements of this mesh, after a script moved its nodes; collective.
 
         Raises:
-            InputError: a coordinate is not finite. An element is flat or inside out. Two elements overlap, or meet
+            InputError: a coordinate is not finite. An element is flat or inverted. Two elements overlap, or meet
                 without sharing their nodes. The message gives the position.
         """
         geometry, nodes = self.domain.geometry, np.asarray(_compat.cell_nodes(self.domain))[own_cells(self.domain)]
@@ -123,7 +123,7 @@ class Mesh:
         Args:
             name: new name of the part.
             of: name of the boundary that contains the part.
-            within: (lowest, highest) reference coordinate of the part, length. Nodes must lie at both (see
+            within: (lowest, highest) reference coordinate of the part, length. There must be nodes at both values (see
                 `concentrate` of `disc`), unless the boundary ends before.
             along: coordinate that `within` limits, "r" or "z".
 
@@ -171,14 +171,17 @@ class Mesh:
                        columns=self._columns_with_part((low, high), axis, tolerance, part))
 
     def _columns_with_part(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
-        """Return the `Columns` of the mesh with fixed ends at the limits of a new part, or None without columns.
+        """Return the `Columns` of the mesh, in which columns must end at the limits of a new part of a boundary.
 
-    Args:
-        limits: lowest and highest coordinate of the part, length.
-        axis: 0 for R, 1 for Z.
-        tolerance: largest distance of an end from a limit, length.
-        part: arguments of `with_part`.
-    """
+        Args:
+            limits: lowest and highest coordinate of the part, length.
+            axis: 0 for R, 1 for Z.
+            tolerance: largest distance of an end from a limit, length.
+            part: arguments of `with_part`.
+
+        Returns:
+            The columns; None if the mesh has none.
+        """
         if self.columns is None:
             return None
         columns, make = self.columns, self.columns.make

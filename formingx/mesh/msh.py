@@ -26,13 +26,13 @@ _LINES, _TRIANGLES = {1: 2, 8: 3}, {2: 3, 9: 6}
 
 
 class Block(NamedTuple):
-    """Elements of one type on one entity.
+    """Elements of one type on one geometric entity of a gmsh file.
 
     Attributes:
         dim: dimension of the entity.
         entity: number of the entity.
-        kind: gmsh's element type.
-        groups: numbers of the physical groups.
+        kind: element type, a number of gmsh.
+        groups: numbers of the physical groups that contain the entity.
         nodes: node numbers, shape (n, nodes per element).
     """
 
@@ -48,9 +48,9 @@ class Content(NamedTuple):
 
     Attributes:
         numbers: node numbers, shape (n,).
-        points: nodes, shape (n, 3).
-        blocks: the elements.
-        names: {(dimension, group): name}.
+        points: coordinates (x, y, z) of the nodes, shape (n, 3), length.
+        blocks: elements, by type and entity.
+        names: {(dimension, number of a physical group): name}.
     """
 
     numbers: np.ndarray
@@ -60,7 +60,7 @@ class Content(NamedTuple):
 
 
 def content(file: str | os.PathLike) -> Content:
-    """Return nodes, elements and names of a mesh file.
+    """Return nodes, elements and names of a gmsh file (MSH 2.2 or 4.1, text or binary).
 
     Raises:
         InputError: the file cannot be read, or is in none of the formats; the message names the section.
@@ -102,7 +102,7 @@ def content(file: str | os.PathLike) -> Content:
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a mesh file; physical groups name the layers (2-D) and the boundaries (1-D).
+    """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
 
     Raises:
         InputError: as in `content`. There is no physical group of dimension 2, an element is not a triangle, or the
@@ -138,7 +138,7 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def write(grid: Grid, file: str | os.PathLike) -> None:
-    """Write a grid as MSH 2.2, text, with groups numbered in order, layers first."""
+    """Write a grid as a gmsh file (MSH 2.2, text). Layers, then boundaries are physical groups 1, 2, and so on."""
     parts = [(2, name, rows) for name, rows in grid.layers.items()]
     parts += [(1, name, rows) for name, rows in grid.boundaries.items()]
     named = [f'{dim} {tag} "{name}"' for tag, (dim, name, _) in enumerate(parts, 1)]
@@ -213,7 +213,9 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
-    """Return version, True if binary, byte order and bytes of a size from the section $MeshFormat.
+    """Return the format of a file from its section $MeshFormat.
+
+    The result is (version, True if binary, byte order "<" or ">", number of bytes of a size).
 
     Raises:
         InputError: the version is not supported.
@@ -334,13 +336,13 @@ def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
-    """Check that a section ends, and holds the number of nodes or elements that its first line states.
+    """Check that a section ends, and contains as many nodes or elements as its first line states.
 
     Args:
         section: the section.
         what: "nodes" or "elements", for messages.
         total: number from the first line.
-        parts: nodes or elements of each block.
+        parts: nodes or elements of each block, arrays of any length.
 
     Raises:
         InputError: the numbers differ.

@@ -9,14 +9,14 @@ from ..errors import InputError
 
 
 class Section:
-    """Reader of the numbers of a section.
+    """Reader of the numbers in a section of a gmsh file.
 
     Args:
         body: content of the section.
         binary: True in a binary file.
         order: byte order, "<" or ">".
-        width: bytes of a size.
-        where: name of the section, for messages.
+        width: number of bytes of a size, 4 or 8.
+        where: name of the section, for error messages.
     """
 
     def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
@@ -36,7 +36,7 @@ class Section:
         return self._binary
 
     def line(self) -> int:
-        """Return the count on the next line of text; sections of binary MSH 2.2 files begin with one.
+        """Return the count on the next line of text, with which a section of a binary MSH 2.2 file begins.
 
         Raises:
             InputError: there is no such line.
@@ -49,7 +49,7 @@ class Section:
         return int(word)
 
     def reals(self, n: int) -> np.ndarray:
-        """Return the next n numbers of the section as floats, shape (n,)."""
+        """Return the next n numbers of the section as floats, shape (n,), eight bytes each in a binary file."""
         return self._take(n, "f8")
 
     def ints(self, n: int) -> np.ndarray:
@@ -57,11 +57,11 @@ class Section:
         return self.whole(self._take(n, "i4"))
 
     def int_list(self, n: int) -> list[int]:
-        """Return the next n numbers of the section, as in `ints`, as a list."""
+        """Return the next n numbers of the section as a list; in a binary file they are integers of four bytes."""
         return [int(value) for value in self.ints(n)]
 
     def sizes(self, n: int) -> np.ndarray:
-        """Return the next n counts, node or element numbers, integers of `width` bytes in a binary file, shape (n,)."""
+        """Return the next n counts or numbers of nodes or elements, shape (n,); `width` bytes each in a binary file."""
         return self.whole(self._take(n, f"u{self._width}"))
 
     def end(self) -> None:
@@ -108,7 +108,7 @@ class Section:
         return found
 
     def whole(self, values: np.ndarray) -> np.ndarray:
-        """Return floats as integers, of the shape of `values`.
+        """Return floats with integral values as integers, of the shape of `values`.
 
         Raises:
             InputError: a number is not an integer.
@@ -122,7 +122,7 @@ class Section:
 
 
 def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
-    """Return the first of the numbers `found` as a count.
+    """Return the first of the numbers `found` as a count of items in the section.
 
     Raises:
         InputError: the count is negative or too large.

@@ -29,14 +29,14 @@ def of_mesh(domain: Any) -> np.ndarray:
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
-    """Return the lowest and highest coordinates of all nodes of a DOLFINx mesh; collective.
+    """Return the lowest and highest reference coordinates of all nodes of a DOLFINx mesh; collective.
 
     Args:
         domain: the mesh.
         comm: MPI communicator.
 
     Returns:
-        Coordinates, shape (2, 2), length: lowest first.
+        Lowest, then highest coordinates, shape (2, 2), length, equal on all ranks.
     """
     X = of_mesh(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
@@ -49,14 +49,14 @@ def of_space(space: Any) -> np.ndarray:
 
 
 def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance from each place to the nearest point, and the number of this point.
+    """Return the distance from each place to the nearest point, and the index of this point.
 
     Args:
-        points: shape (n, d), length.
-        places: shape (..., d), length.
+        points: coordinates of n points in d dimensions, shape (n, d), length.
+        places: coordinates of the places, shape (..., d), length.
 
     Returns:
-        Distances, shape (...,), length, and point numbers, shape (...,).
+        Distances, shape (...,), length, and row indices of `points`, shape (...,).
     """
     if len(points) * places.size > MAX_COMPARED:
         from scipy.spatial import cKDTree
@@ -67,7 +67,7 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def of_cells(domain: Any, cells: Any) -> np.ndarray:
-    """Return the positions of the nodes of cells, corners first, shape (cells, nodes, coordinates), length.
+    """Return the positions of the nodes of some cells, corners first, shape (cells, nodes, coordinates), length.
 
     Args:
         domain: the DOLFINx mesh.
@@ -78,7 +78,7 @@ def of_cells(domain: Any, cells: Any) -> np.ndarray:
 
 
 def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the positions of the nodes of facets, ends first, shape (facets, 2 or 3, coordinates), length.
+    """Return the positions of the nodes of some facets, ends first, shape (facets, 2 or 3, coordinates), length.
 
     Args:
         domain: the DOLFINx mesh.
@@ -88,7 +88,7 @@ def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
 
 
 def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the nodes of facets, ends first, as rows of `domain.geometry.x`, shape (facets, 2 or 3).
+    """Return the nodes of some facets, ends first, as row indices of `domain.geometry.x`, shape (facets, 2 or 3).
 
     Args:
         domain: the DOLFINx mesh.

@@ -9,7 +9,7 @@ GROWTH = 0.25
 
 
 def length_along(line: np.ndarray) -> np.ndarray:
-    """Return the length along a polyline from its first point to each point, shape (n,).
+    """Return the length along a polyline from its first point to each of its n points, shape (n,), length.
 
     line: points of the polyline, shape (n, 2), length.
     """
@@ -17,23 +17,28 @@ def length_along(line: np.ndarray) -> np.ndarray:
 
 
 def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return the number of columns from the first point of a sheet to each point, not rounded, shape (n,).
+    r"""Return the number of columns of elements from the first point of a sheet to each point, a real number.
+
+    .. math:: n(s) = \int_0^s \frac{ds'}{h(s')}
 
     Args:
-        s: length along the sheet to each point, shape (n,).
-        size: length of a column at each point, shape (n,), length.
+        s: length along the sheet to each point, shape (n,), length.
+        size: length h of a column at each point, shape (n,), length.
+
+    Returns:
+        Numbers of columns, shape (n,), by the trapezoidal rule.
     """
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 
 def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return the ends of columns with given lengths, as coordinates along the sheet, shape (columns + 1,).
+    """Return the ends of columns of elements with given lengths, as coordinates along the sheet, shape (columns + 1,).
 
     Args:
-        coordinates: coordinates of points along the sheet, shape (n,).
-        s: length along the sheet to each point, shape (n,).
+        coordinates: coordinates of n points along the sheet, shape (n,).
+        s: length along the sheet to each point, shape (n,), length.
         size: largest length of a column at each point, shape (n,), length.
-        pieces: coordinates at which columns must end, with the first and the last, shape (m,).
+        pieces: ascending coordinates at which columns must end, with the first and the last, shape (m,).
     """
     number = number_of_columns(s, size)
     marks = np.interp(pieces, coordinates, number)

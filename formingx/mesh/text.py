@@ -70,7 +70,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a text file (format of `formingx.mesh.text`); clockwise elements become counter-clockwise.
+    """Return the grid in a text file; clockwise elements become counter-clockwise.
 
     Raises:
         InputError: the file is missing or not in this format; the message names the line.

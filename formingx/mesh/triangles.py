@@ -35,14 +35,12 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Return the place of a point: its coordinates, its layer, and the nearest boundary with its distance.
-
-    Collective.
+    """Return the place of a point with the nearest boundary, for error messages; collective.
 
     Args:
         mesh: the mesh.
         point: reference coordinates, shape (2,), length, equal on all ranks; in three dimensions (x, y).
-        layer: name of the layer, if known.
+        layer: name of the layer that contains the point, "" if unknown.
     """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
@@ -55,9 +53,11 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
 
 
 def shape_quality(corners: np.ndarray) -> np.ndarray:
-    """Return 4 sqrt(3) area / (sum of squared edges) of triangles.
+    r"""Return the shape quality q of triangles with the area A and the edges l_1, l_2, l_3.
 
-    It is 1 for an equilateral triangle, 0 for a flat one, and negative for an inverted one.
+    .. math:: q = \frac{4 \sqrt{3} \, A}{l_1^2 + l_2^2 + l_3^2}
+
+    It is 1 for an equilateral triangle, 0 for a flat one, and negative for a clockwise one.
 
     Args:
         corners: corners of the triangles, shape (n, 3, 2), length.
@@ -78,13 +78,13 @@ class Triangles:
         mesh: the mesh.
 
     Attributes:
-        corners: corners, shape (m, 3, 2), length.
+        corners: corners (R, Z), shape (m, 3, 2), length.
         layer: names of their layers, shape (m,).
         edge: longest edges, shape (m,), length.
         area: areas, shape (m,), length^2.
-        slenderness: longest edge over the height on it, shape (m,).
+        slenderness: longest edge over the height on this edge, shape (m,).
         length: longer side of the bounding box of the body, length.
-        thickness: area of the body over its length, length.
+        thickness: area of the section of the body over `length`, length.
     """
 
     def __init__(self, mesh: Mesh):
