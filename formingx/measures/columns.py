@@ -17,14 +17,13 @@ Measure = Target | Callable[[Any], float]
 
 
 class _Recorded(Quantity):
-    """Base class of quantities that depend on more than the displacements; they cannot be interpolated between states.
-    """
+    """Base class of quantities that depend on more than displacements and control, such as on history variables."""
 
     smooth = False
 
 
 class _Scalar(_Recorded):
-    """Quantity f(value of a scalar form): `form` is UFL of rank 0, `function` is f."""
+    r"""Quantity :math:`f(I)` of an integral I: `form` is the UFL form of I, of rank 0, and `function` is f."""
 
     def __init__(self, problem, form, function):
         self._problem, self._form, self._function = problem, problem.forms.compile(form), function
@@ -35,9 +34,10 @@ class _Scalar(_Recorded):
 
 
 class _Nodal(_Recorded):
-    """Sum or maximum (`reduce`) of 0 and a quantity of each active contact.
+    """Sum or maximum over the active contacts of a quantity of each contact; 0 if no contact is active.
 
-    `quantity` takes a contact, the owned unknowns and the control; `contacts` are all contacts of the problem if None.
+    `quantity` is a function of a contact, the locally owned unknowns and the control. `reduce` is `sum` or `max`.
+    `contacts` None means all contacts of the problem.
     """
 
     def __init__(self, problem, quantity, reduce, contacts=None):
@@ -50,7 +50,7 @@ class _Nodal(_Recorded):
 
 
 class _Reaction(_Recorded):
-    """Force of the body on a driven support along its component; `number` is the number of the support in the scene."""
+    """Force of the body on a driven support along its component; `number` is its index in `Scene.items`."""
 
     def __init__(self, problem, number):
         self._problem, self._number = problem, number
@@ -90,7 +90,8 @@ def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[st
 
     Args:
         problem: the `Problem`.
-        columns: {name of a column: a target, or a function that takes the problem and returns a number}.
+        columns: {name of a column: a target, of which the quantity is recorded, or a function of the `Problem` that
+            returns a number}.
         taken: {name of an existing column: its quantity}.
 
     Returns:

@@ -28,7 +28,9 @@ def positive_direction(contact: Any) -> np.ndarray:
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
-    """Return the ratio of the force on a whole tool to the force on its part in the model.
+    """Return the ratio of the force on a whole tool to the force on the part of the tool in the model.
+
+    It is 1 if no mirror plane cuts the tool (`MirrorPlanes.factor_of`).
 
     Args:
         scene: the `Scene`.
@@ -41,7 +43,9 @@ def tool_factor(scene: Any, contact: Any) -> int:
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the ratio of the force on a whole driven support to the force on its part in the model.
+    """Return the ratio of the force on a whole driven support to the force on the part of the support in the model.
+
+    It is 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`).
 
     Args:
         scene: the `Scene`.
@@ -96,7 +100,7 @@ def force(value: float, *, of: str | None = None) -> Target:
 
 
 class _SupportForce(Quantity):
-    """Force of the body on a driven support along its component; `number` is the number of the support in the scene."""
+    """Force of the body on a driven support along its component; `number` is its index in `Scene.items`."""
 
     smooth = False
 
@@ -127,7 +131,7 @@ class _SupportForce(Quantity):
 
 
 class _ToolForce(Quantity):
-    """Force of the body on a tool, positive against its travel; `contacts` are the contact faces of the tool."""
+    """Force of the body on a tool, positive against its travel; `contacts` are all contact faces of the tool."""
 
     smooth = False
 

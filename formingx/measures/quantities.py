@@ -12,7 +12,7 @@ from ..mesh.nodes import of_space
 class Quantity:
     """Base class of output quantities of one problem, such as the height of its pole.
 
-    A quantity has a value in a state, and an equation that fixes this value at the target of a run.
+    A quantity has a value in a state. Its equation replaces the arc-length constraint in the step to a target.
 
     Attributes:
         size: scale of the quantity, in the user's units; differences below 1e-12 times `size` are round-off.
@@ -43,14 +43,14 @@ class Quantity:
             target: the target value, in the user's units.
 
         Returns:
-            Function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, and sets the
-            vector to dc/dx.
+            Function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, both
+            dimensionless, and sets the vector to dc/dx.
         """
         raise NotImplementedError
 
 
 class WholePartQuantity(Quantity):
-    """Output quantity of the whole part, where a half, a quarter or an eighth is modelled (`Scene.symmetry`).
+    """Output quantity of the whole part, if only a half, a quarter or an eighth of it is modelled (`Scene.symmetry`).
 
     Args:
         modelled: quantity of the modelled body.
@@ -69,15 +69,17 @@ class WholePartQuantity(Quantity):
 
 
 class Linear(Quantity):
-    r"""Output quantity that is a function of a linear form of the unknowns x.
+    r"""Output quantity q that is a function of a linear form of the unknowns x.
 
-    .. math:: f(y_0 + a \cdot x)
+    .. math:: q = f(y_0 + a \cdot x), \qquad c(x) = y_0 + a \cdot x - f^{-1}(q^*)
+
+    Here c is the residual of its equation for the target value q*.
 
     Args:
         problem: the `Problem`.
         row: coefficients a of the linear form, locally owned entries, shape (n,).
         offset: value y_0 of the form for x = 0.
-        function: function f; the default is the identity.
+        function: function f, whose values are in the user's units; the default is the identity.
         inverse: inverse function of f.
     """
 
@@ -98,9 +100,11 @@ class Linear(Quantity):
 
 
 class Form(Quantity):
-    r"""Output quantity that is an integral over the body or its boundary.
+    r"""Output quantity q that is an integral over the body or its boundary.
 
-    .. math:: q_0 + s \, I(x)
+    .. math:: q = q_0 + s \, I(x), \qquad c(x) = \frac{q - q^*}{s}
+
+    Here c is the residual of its equation for the target value q*.
 
     Args:
         problem: the `Problem`.
@@ -115,7 +119,7 @@ class Form(Quantity):
 
     @cached_property
     def _derivative(self):
-        """Compiled derivative of the integral by the unknowns."""
+        """Compiled derivative dI/dx of the integral by the unknowns, a linear form."""
         forms = self._problem.forms
         return forms.compile(ufl.derivative(self._form, forms.w, forms.test_function()))
 
@@ -132,7 +136,7 @@ class Form(Quantity):
 
 
 class Sag(Quantity):
-    r"""Largest downward displacement of a node; the displacement counts from the first mesh of a run.
+    r"""Largest downward displacement of a node, from the reference configuration of the first mesh of a run, length.
 
     .. math:: \max(0, \max_i(-u_{z,i}))
 
@@ -156,7 +160,7 @@ class Sag(Quantity):
             self._earlier = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:
-        """Return the sag over the length of the body, and the rank that owns the lowest node; `x`: unknowns."""
+        """Return the sag over the length scale, and the rank that owns the lowest node; `x`: unknowns. Collective."""
         sag = -(x.array_r[self._dofs] + self._earlier).min(initial=0.0)
         found = self._problem.comm.allgather(float(sag))
         return max(found), int(np.argmax(found))

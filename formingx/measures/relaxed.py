@@ -61,10 +61,10 @@ class PoleStressRatio:
                                                        for t in forms.terms)
 
     def evaluate(self) -> float:
-        """Return the ratio of stresses for the current fields of the forms of the problem; collective.
+        """Return the ratio of stresses for the present fields of the problem; collective.
 
         Returns:
-            The ratio.
+            The ratio; if both stresses are zero, the ratio of the moduli.
         """
         stored, relaxed, modulus = self._integrals()
         if relaxed < _ZERO_STRESS * modulus:
@@ -76,7 +76,7 @@ class PoleStressRatio:
     def _integrals(self) -> np.ndarray:
         """Return the integrals of present stress, relaxed stress and largest modulus over the elements at the pole.
 
-        Shape (3,), equal on all ranks; collective.
+        The result has the shape (3,) and is equal on all ranks; collective.
         """
         totals = np.zeros(3)
         for expression, cells in self._parts:
@@ -86,7 +86,7 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """Return the integrands of `_integrals` times the reference volume, for the `MaterialTerms` of a material."""
+        """Return the integrands of `_integrals` for a material (`MaterialTerms`), per unit of the reference cell."""
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -130,13 +130,13 @@ class ElasticStretches:
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def evaluate(self, cells: int) -> np.ndarray:
-        """Return the elastic stretches for the current fields of the forms of the problem.
+        """Return the elastic stretches for the present fields of the problem.
 
         Args:
             cells: number of locally owned cells.
 
         Returns:
-            Stretches, shape (cells, n, count); nan for branches that a material does not have.
+            Stretches, shape (cells, n, count); nan in cells of materials with fewer branches.
         """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:

@@ -16,7 +16,7 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
 
-    For a load that a stage deactivates or activates, it is the part of the load that acts on the body.
+    While a load is activated or deactivated, it is the part of the load that acts on the body.
 
     Args:
         problem: the `Problem`.
@@ -32,7 +32,7 @@ class Amplitude(Quantity):
 
     @property
     def is_load(self) -> bool:
-        """True if the item is a load, such as a pressure."""
+        """True if the quantity belongs to a load, such as a pressure, and not to a support or a tool."""
         return self._acts
 
     @property
@@ -41,7 +41,7 @@ class Amplitude(Quantity):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return the quantity at a value of the control, dimensionless; the process time in the user's unit of time."""
+        """Return the quantity over its scale at a value of the control; the process time in the user's unit of time."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -88,8 +88,8 @@ class Target(NamedTuple):
     Attributes:
         name: name of the output quantity.
         value: its target value, in the user's units.
-        bind: function that takes a `Problem` and returns the output quantity of this problem (`Quantity`).
-        signed: True if the quantity changes sign with the control; False for a stretch, which may grow in both
+        bind: function of a `Problem` that returns the output quantity of this problem (`Quantity`).
+        signed: True if the quantity changes sign with the control; False for a stretch, which may increase in both
             directions of the control.
     """
 
@@ -149,7 +149,7 @@ def process_time(value: float) -> Target:
 
 
 def change_completed() -> Target:
-    """Return the target that a change of the active loads, supports and tools between two stages is complete.
+    """Return the target of the transition between two stages with other active loads, supports or tools.
 
     The change leaves forces out of balance. They decrease to 0 while the control goes from 0 to its target 1
     (`StepData.fading`).
@@ -336,7 +336,7 @@ def bind_volume(problem: Any, form: Any = None) -> Quantity:
 
     Args:
         problem: the `Problem`.
-        form: form of this volume (`swept_volume`), if it is at hand.
+        form: the result of `swept_volume`, if the caller has it; None to build it.
 
     Returns:
         The quantity, length^3; in plane strain per unit depth, length^2.
@@ -359,8 +359,7 @@ def _volume(problem: Any, form: Any = None) -> Quantity:
 
 
 def _unit_of_volume(forms: Any) -> float:
-    """Return the cube of the length scale of the forms; in plane strain, where volumes are per unit depth, its square.
-    """
+    """Return the cube of the length scale of the forms; in plane strain its square, for a volume per unit depth."""
     return forms.length**forms.scene.kinematics.dimension_of_volume
 
 
