@@ -29,7 +29,7 @@ _compiled: dict[str, Any] = {}
 
 def compile_form(form: Any) -> Any:
     """Return a UFL form compiled by `_jit`, a form of DOLFINx that can be assembled."""
-    return _compiled_here(lambda: fem.form(form, jit_options=JIT_OPTIONS))
+    return _compiled_by_jit(lambda: fem.form(form, jit_options=JIT_OPTIONS))
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
@@ -39,7 +39,7 @@ def compile_expression(expression: Any, points: Any) -> Any:
     other, and these numbers are part of the signature, so that each problem would compile its own expression.
     """
     numbered = map_expr_dag(_Numbered(), expression)
-    return _compiled_here(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
+    return _compiled_by_jit(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
 
 
 class _Numbered(MultiFunction):
@@ -69,7 +69,7 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
         _compiled.update(_jit.compile_together(comm, items, options, form_options))
 
 
-def _compiled_here(compiled: Any) -> Any:
+def _compiled_by_jit(compiled: Any) -> Any:
     """Return the result of `compiled()`, a call of DOLFINx in which `_jit` compiles the form or expression.
 
     Each form is compiled once in a process.

@@ -14,7 +14,7 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
         _usual(kind, error, trace)
 
 
-def imported() -> None:
+def restore_excepthook() -> None:
     """Restore `sys.excepthook` when the import of the package is complete."""
     if sys.excepthook is _one_line:
         sys.excepthook = _usual

@@ -56,7 +56,7 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
         jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
         form_options: options of FFCx (`ffcx.get_options`).
     """
-    tag = f"{sorted(form_options.items())}{_command(jit_options)}{_program()}" if supported(jit_options) else ""
+    tag = f"{sorted(form_options.items())}{_command(jit_options)}{_compiler_id()}" if supported(jit_options) else ""
     return "form_" + naming.compute_signature([item], tag)
 
 
@@ -80,7 +80,7 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
     folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
         try:
-            found = _opened(items, folder, form_options, jit_options)
+            found = _open_libraries(items, folder, form_options, jit_options)
         except BaseException as error:
             comm.bcast(str(error))
             raise
@@ -88,10 +88,11 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
         return found
     if (failure := comm.bcast(None)) is not None:
         raise RuntimeError(failure)
-    return _opened(items, folder, form_options, jit_options)       # another machine may not see the folder of rank 0
+    # another machine may not see the folder of rank 0
+    return _open_libraries(items, folder, form_options, jit_options)
 
 
-def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
+def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
     """Return the compiled objects by their keys, after building those without a library in the cache `folder`.
 
@@ -99,22 +100,22 @@ def _opened(items: dict[str, Any], folder: Path, form_options: dict[str, Any], j
         RuntimeError: the compiler failed, or a new library cannot be loaded.
     """
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
-    found = {name: _loaded(ffi, name, item, folder) for name, item in items.items()}
+    found = {name: _load(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
         folder = _writable(folder)
         with _locked(folder, next(name for name, compiled in found.items() if not compiled)):
-            found = {name: compiled or _loaded(ffi, name, items[name], folder) for name, compiled in found.items()}
+            found = {name: compiled or _load(ffi, name, items[name], folder) for name, compiled in found.items()}
             missing = {name: items[name] for name, compiled in found.items() if not compiled}
             if missing:
                 _build(missing, folder, jit_options, form_options)
-        found |= {name: _loaded(ffi, name, item, folder) for name, item in missing.items()}
+        found |= {name: _load(ffi, name, item, folder) for name, item in missing.items()}
         if not all(found.values()):
             raise RuntimeError(f"the compiled forms in {folder} cannot be loaded: if its file system forbids programs"
                                " (noexec), set XDG_CACHE_HOME to another folder")
     return found
 
 
-def _loaded(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
+def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
     """Return (object of FFCx, namespace, (None, None)) from the library of a form, or None if it cannot be loaded.
 
     Args:
@@ -178,7 +179,7 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
         RuntimeError: there is no compiler, or it failed.
     """
     command = [*(_compiler() or ("cc",)), *flags, "-shared", "-fPIC", "-x", "c", "-", "-lm"]
-    digest = hashlib.sha1(f"{code}{command}{_program() if _compiler() else ''}".encode()).hexdigest()
+    digest = hashlib.sha1(f"{code}{command}{_compiler_id() if _compiler() else ''}".encode()).hexdigest()
     file = Path(jit.get_options()["cache_dir"]) / "formingx" / f"{name}_{digest}.so"
     if not file.exists():
         file = _writable(file.parent) / file.name
@@ -257,7 +258,7 @@ def _compiler() -> tuple[str, ...] | None:
 
 
 @functools.cache
-def _program() -> str:
+def _compiler_id() -> str:
     """Return path, size and date of the C compiler as text; they change with its version."""
     program = Path(shutil.which((_compiler() or ("cc",))[0]) or "").resolve()
     status = program.stat()
@@ -268,11 +269,11 @@ def _writable(folder: Path) -> Path:
     """Return the folder in which libraries are built: the cache `folder`, or a temporary one if it is read-only."""
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-    return folder if os.access(folder, os.W_OK) else Path(_own_folder().name)
+    return folder if os.access(folder, os.W_OK) else Path(_temporary_folder().name)
 
 
 @functools.cache
-def _own_folder() -> tempfile.TemporaryDirectory:
+def _temporary_folder() -> tempfile.TemporaryDirectory:
     """Return the temporary folder of this process, which is deleted at its end."""
     return tempfile.TemporaryDirectory(prefix="formingx_")
 

@@ -330,7 +330,7 @@ def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> n
     return found
 
 
-def place(name: str, value: Any) -> Path:
+def file_path(name: str, value: Any) -> Path:
     """Return the name of a file or a folder as a path.
 
     Args:

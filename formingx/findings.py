@@ -74,7 +74,7 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
     return add
 
 
-def found_at(moment: Moment, subject: Any) -> list[Finding]:
+def findings_at(moment: Moment, subject: Any) -> list[Finding]:
     """Return the findings of all checks that are registered for a moment, the worst first; collective.
 
     Args:
@@ -89,17 +89,17 @@ def worst_first(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity))
 
 
-def alarming(findings: Iterable[Finding]) -> list[Finding]:
+def without_notes(findings: Iterable[Finding]) -> list[Finding]:
     """Return those findings that are more severe than notes, in the given order."""
     return [finding for finding in findings if finding.severity != "note"]
 
 
-def tell(findings: Sequence[Finding], rank: int) -> None:
+def log_findings(findings: Sequence[Finding], rank: int) -> None:
     """Log each warning and each serious finding once, as a warning of the logger "formingx".
 
     Args:
         findings: the findings; notes are left out.
         rank: rank of the calling process; only rank 0 logs.
     """
-    for finding in dict.fromkeys(alarming(findings)) if rank == 0 else ():
+    for finding in dict.fromkeys(without_notes(findings)) if rank == 0 else ():
         log.warning("%s: %s", finding.about, finding.text)

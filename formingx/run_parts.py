@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from .errors import ConvergenceError, InputError, Interrupted, instance, known
-from .findings import Finding, tell
+from .findings import Finding, log_findings
 from .measures.columns import Measure
 from .problem.problem import Problem
 from .results.files.checkpoint import Checkpoint, holds_states, read
@@ -103,7 +103,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     """
     record = Record(curve.problem, curve)
     record.findings = found
-    tell(found, curve.problem.comm.rank)
+    log_findings(found, curve.problem.comm.rank)
     record.allow_inadmissible = instance("allow_inadmissible", allow_inadmissible, bool, "True or False")
     if isinstance(start, Path):
         record.continue_from(start.record)
@@ -169,14 +169,14 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         paths.append(path)
         return path
 
-    def so_far() -> Path | None:
+    def first_with_states() -> Path | None:
         """Return the first registered path that has a state, or None."""
         return next((path for path in paths if path.states), None)
 
     try:
         yield register
     except (ConvergenceError, InputError) as error:
-        error.path = path = so_far()
+        error.path = path = first_with_states()
         if path is not None and isinstance(error, ConvergenceError):       # on all ranks
             _call_listeners(path, str(error), path.findings() if path.record.hooks.on_end else [])
         if isinstance(error, ConvergenceError) and error.diagnosis is not None:
@@ -184,7 +184,7 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
             raise without_traceback from None
         raise
     except KeyboardInterrupt:
-        path = so_far()
+        path = first_with_states()
         if path is None:
             raise Interrupted("interrupted before its first state") from None
         position = f"at {path.describe(path.last)}, after {len(path)} states"
@@ -194,7 +194,7 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         raise Interrupted(f"interrupted {position}; {advice}", path) from None
     path = paths[0]
     found = path.findings()
-    tell([finding for finding in found if finding not in path.record.findings], path.problem.comm.rank)
+    log_findings([finding for finding in found if finding not in path.record.findings], path.problem.comm.rank)
     _call_listeners(path, "", found)
 
 

@@ -113,7 +113,7 @@ class Units:
             raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_MAX_DENSITY:g}")
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
-    def of(self, column: str) -> str:
+    def unit_of(self, column: str) -> str:
         """Return the unit of a column of results; "" for dimensionless columns, or if a unit is not given.
 
         Args:
@@ -133,7 +133,7 @@ class Units:
             column: name of the column.
             words: text in place of the name.
         """
-        unit = self.of(column)
+        unit = self.unit_of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
 
     def heading(self, column: str) -> str:
@@ -142,7 +142,7 @@ class Units:
         Args:
             column: name of the column.
         """
-        unit = self.of(column)
+        unit = self.unit_of(column)
         return f"{column} [{unit}]" if unit else column
 
     def _derived(self, names: dict[str, float], power: int) -> str:

@@ -122,7 +122,7 @@ def test_flags_and_compilers_have_libraries_of_their_own(calls, tmp_path, monkey
     monkeypatch.setenv("CFLAGS", "-DNOTHING")
     area(domain)
     forget()
-    monkeypatch.setattr(_jit, "_program", lambda: "another compiler")
+    monkeypatch.setattr(_jit, "_compiler_id", lambda: "another compiler")
     area(domain)
     assert len(calls) == len(kept(tmp_path)) == 3
 

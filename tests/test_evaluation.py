@@ -214,7 +214,7 @@ def test_units():
               "enclosed_volume": "mm3", "strain_energy": "mJ", "dissipated_power": "mJ/s", "process_time": "s",
               "mass_error": "", "r": "mm", "contact_pressure": "MPa", "contact_length": "mm",
               "wall_of_outer": "mm", "X": "mm", "y": "mm", "r_top": "mm", "sag": "mm", "u_z_at_1_0": "mm"}
-    assert {name: units.of(name) for name in labels} == labels
+    assert {name: units.unit_of(name) for name in labels} == labels
     with pytest.raises(fx.InputError, match="length 'furlong' is not known"):
         fx.Units("furlong")
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..errors import instance, several
-from ..findings import Finding, alarming, found_at, worst_first
+from ..findings import Finding, findings_at, without_notes, worst_first
 from ..measures.targets import Target
 from ..results.path import Path
 from ..scene.scene import Scene
@@ -76,7 +76,7 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
         branches = [Finding("warning", "branch point", ANOTHER_PATH % (scene.describe(left), scene.describe(right)))
                     for left, right in scene.branch_points]
         before = check(scene.problem.scene, targets=targets, stages=stages, units=units).findings
-        return Report([*alarming(scene.findings()), *branches, *before])
+        return Report([*without_notes(scene.findings()), *branches, *before])
     instance("check: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
     instance("check: units", units, Units, "a formingx.Units")
     targets = several("check: targets", targets, "targets, such as [pole_stretch(3)]")
@@ -86,7 +86,7 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     for stage in stages:
         instance("check: stages: stage", stage, Stage, "a formingx.Stage")
     body = Body(scene, targets, stages, units)
-    return Report([*found_at("scene", body), *found_at("start", body)])
+    return Report([*findings_at("scene", body), *findings_at("start", body)])
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:
@@ -100,4 +100,4 @@ def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[St
     Returns:
         The findings, the worst first; `check` returns further ones.
     """
-    return found_at("start", Body(scene, targets, stages, NONE))
+    return findings_at("start", Body(scene, targets, stages, NONE))

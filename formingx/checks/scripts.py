@@ -12,7 +12,7 @@ from typing import Any
 import formingx
 
 from .. import runs
-from ..errors import InputError, place
+from ..errors import InputError, file_path
 from ..run_hooks import dry_runs
 from .check import Report, check
 
@@ -44,7 +44,7 @@ def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
     Raises:
         InputError: there is no such file, it is not Python, it runs no scene, or `check` refuses the scene or a target.
     """
-    file = place("check: script", script)
+    file = file_path("check: script", script)
     if not file.is_file():
         raise InputError(f"check: script {str(file)!r} is not there")
     _check_python(file)

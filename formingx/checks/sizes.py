@@ -97,7 +97,7 @@ class Body(Triangles):
             kind: "pressure", "travel" (a length), "force" or "stress".
             digits: number of significant digits.
         """
-        return f"{value:.{digits}g} {self._units.of(kind)}".rstrip()
+        return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
     def _values_of(self, target: Target, control: Any) -> list[PrescribedValue]:
         """Return the value of a target in a list; an empty list for a target that is no pressure and no travel.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, known, place, positive
+from ..errors import InputError, file_path, known, positive
 from ..units import LENGTHS, STRESSES
 from .numerals import is_number
 
@@ -98,7 +98,7 @@ def read(file: Any) -> Table:
         InputError: the file cannot be read (`records`). There is no header, fewer than two rows, or a row of another
             length.
     """
-    name = os.fspath(place("table", file))
+    name = os.fspath(file_path("table", file))
     cells = records(name)
     if not cells:
         raise InputError(f"table {name!r} is empty")

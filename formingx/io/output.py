@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..errors import place
+from ..errors import file_path
 
 
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
@@ -26,7 +26,7 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
     Raises:
         OSError: the file cannot be written; the message names it. No partial file remains.
     """
-    file = place("file", file)
+    file = file_path("file", file)
     target = Path(os.path.realpath(file))
     temporary = target.with_name(f"{target.name}.{os.getpid()}.part")
     options: dict[str, Any] = {} if "b" in mode else {"newline": "", "encoding": "utf-8"}

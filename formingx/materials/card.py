@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, place, positive, several
+from ..errors import InputError, file_path, positive, several
 from ..figures import figure
 from .constants import OfTemperature
 from .homogeneous import MODES
@@ -39,7 +39,7 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
     Raises:
         InputError: a constant depends on the temperature, and no temperatures are given.
     """
-    caller, path = f"{material}: report", place("report: file", file)
+    caller, path = f"{material}: report", file_path("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
     values = several(f"{caller}: temperatures", temperatures, "temperatures")
     if depends and not values:

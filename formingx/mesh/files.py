@@ -5,7 +5,7 @@ import os
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, place
+from ..errors import InputError, file_path
 from . import msh, text
 from .grid import to_grid, to_mesh
 from .mesh import Mesh
@@ -30,7 +30,7 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
     >>> list(fx.mesh.read("sheet.msh").boundaries)
     ['axis', 'rim', 'bottom', 'top']
     """
-    name = os.fspath(place("mesh.read: file", file))
+    name = os.fspath(file_path("mesh.read: file", file))
 
     def grid():
         if not os.path.isfile(name):
@@ -58,7 +58,7 @@ def write(mesh: Mesh, file: str | os.PathLike, shift: tuple[float, float] = (0.0
 
     >>> fx.mesh.write(sheet, "sheet.txt", numbering="around")                # nodes of an element in a circle
     """
-    name = os.fspath(place("mesh.write: file", file))
+    name = os.fspath(file_path("mesh.write: file", file))
     plain = to_grid(mesh)
     plain = plain._replace(points=plain.points + np.array(shift))
     if _is_text(name):

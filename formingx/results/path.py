@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError, as_points, count
 from ..figures import Axes
-from ..findings import Finding, found_at, worst_first
+from ..findings import Finding, findings_at, worst_first
 from ..solve.state import State
 from ..units import NONE, Units
 from .evaluate.profile import Profile
@@ -56,7 +56,7 @@ class Path(States):
         >>> path.findings()
         []
         """
-        return worst_first([*self.record.findings, *(found_at("end", self) if self.states else [])])
+        return worst_first([*self.record.findings, *(findings_at("end", self) if self.states else [])])
 
     def profile(self, state: State | None = None) -> Profile:
         """Return the deformed outline and the thickness of a sheet in a state (default: the last); collective.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from ..findings import Finding, found_at, register
+from ..findings import Finding, findings_at, register
 from ..mesh.triangles import Place
 from .arc_length import Curve
 from .branches import branches, determinant_sign
@@ -200,7 +200,7 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
         facts["aimed"] = equations.shown(attempt.control)[1]
     if last:
         facts |= _tangents(curve, states)
-    found = found_at("failure", Failure(facts, equations, last, curve.fixed_control, target))
+    found = findings_at("failure", Failure(facts, equations, last, curve.fixed_control, target))
     if pace and not found:
         found.append(Finding("note", "steps", pace, "more max_steps"))
     return Diagnosis(**facts, findings=tuple(found), examined=examined)

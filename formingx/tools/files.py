@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, finite, known, pair, place, positive, several
+from ..errors import InputError, count, file_path, finite, known, pair, positive, several
 from ..mesh import msh
 from ..units import LENGTHS, Units
 from . import cad, dxf, geo
@@ -55,7 +55,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
     >>> fx.tools.read("plug.geo", body=(0.0, -1.0))                             # the solid above
     Tool(2 lines from (0, 2) to (9, 0))
     """
-    name = os.fspath(place("tools.read: file", file))
+    name = os.fspath(file_path("tools.read: file", file))
     tags = None if curves is None else [_tag(t) for t in several("tools.read: curves", curves, "numbers of curves")]
     if tags == []:
         raise InputError("tools.read: curves = []: must name at least one curve")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite_array, place
+from ...errors import InputError, file_path, finite_array
 from ...io.csv_files import read
 from ...results import files
 from ...results.path import Path
@@ -84,7 +84,7 @@ class MeasuredWall:
         Raises:
             InputError: the file cannot be read, lacks a column, or has columns in different units.
         """
-        table = read(place("MeasuredWall: file", file))
+        table = read(file_path("MeasuredWall: file", file))
         units = {unit for unit in table.units.values() if unit is not None}
         if len(units) > 1:
             raise InputError(f"MeasuredWall: {table.name}: columns are in {', '.join(sorted(units))}: must be in one"
@@ -257,6 +257,6 @@ class WallComparison:
             out = csv.writer(stream)
             out.writerow(columns)
             out.writerows(zip(*(values.tolist() for values in columns.values())))
-        path = place("to_csv: file", file)
+        path = file_path("to_csv: file", file)
         files.on_root(self._comm, lambda: files.replace(path, write))
         return path

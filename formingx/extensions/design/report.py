@@ -9,7 +9,7 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...figures import figure, tools
-from ...findings import alarming
+from ...findings import without_notes
 from ...results import files
 from ...results.show import page, plots
 from ...units import Units
@@ -40,7 +40,7 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
              (f"{walls[0].min():.4g} → {walls[1].min():.4g}", units.label("wall", "minimum wall")),
              (f"{before.volume:.4g} → {best.volume:.4g}", units.label("volume", "volume of the whole part at rest")),
              (str(result.paths), "runs were taken")]
-    notes = [("bad", text) for text in [result.missed, *(f.text for f in alarming(best.path.findings()))]]
+    notes = [("bad", text) for text in [result.missed, *(f.text for f in without_notes(best.path.findings()))]]
     notes += [("", f"A run failed: {text}") for text in result.failed]
     notes += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     notes += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
@@ -82,7 +82,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
     cards = [(f"{wall.std() / wall.mean():.3g}", "unevenness, standard deviation over mean of the wall"),
              (f"{wall.min():.4g}", units.label("wall", "minimum wall")),
              (f"{run.volume:.4g}", units.label("volume", "volume of the whole part at rest"))]
-    notes = [("bad", found.text) for found in alarming(run.path.findings())]
+    notes = [("bad", found.text) for found in without_notes(run.path.findings())]
 
     def pictures() -> list[str]:
         """Return HTML elements with the pictures of the part, the wall and the effects."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...findings import alarming
+from ...findings import without_notes
 from ...units import NONE, Units
 from .confidence import Confidence, confidence
 from .run import DesignRun
@@ -151,7 +151,7 @@ class DesignResult:
         lines += [f"the run before predicted the wall to {100 * deviation:.2g} %"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(absent)}" for absent in [self.without_effect()] if absent]
-        lines += [f"the best run: {found.text}" for found in alarming(self.best.path.findings())]
+        lines += [f"the best run: {found.text}" for found in without_notes(self.best.path.findings())]
         return "\n".join([*lines, *[self.missed] * bool(self.missed), *(f"failed: {text}" for text in self.failed)])
 
     __repr__ = __str__

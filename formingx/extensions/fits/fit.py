@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, place
+from ...errors import InputError, file_path
 from ...figures import Axes
 from ...materials.material import Material
 from ...materials.relaxing import RelaxingMaterial
@@ -269,7 +269,7 @@ def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
         InputError: the file has a fourth column with the time.
     """
     found: dict[str, list] = {}
-    for mode, columns in read_tests(place("fit: data", file)):
+    for mode, columns in read_tests(file_path("fit: data", file)):
         if len(columns) != 2:
             raise InputError(f"fit: data: {file}: has times; a material that does not relax has none: leave the column"
                              f" out")
@@ -283,7 +283,7 @@ def _tests_in_time(file: Any) -> list[TimedTest]:
     Raises:
         InputError: the file has no fourth column with the time.
     """
-    tests = read_tests(place("fit: data", file))
+    tests = read_tests(file_path("fit: data", file))
     if any(len(columns) != 3 for _, columns in tests):
         raise InputError(f"fit: data: {file}: has no times: a material that relaxes needs a fourth column with"
                          f" the time")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, direction, instance, place, positive
+from ...errors import InputError, direction, file_path, instance, positive
 from ...io.stl import volume
 from ...mesh.edges import edges_of
 from .bodies import merged, separate_bodies
@@ -108,7 +108,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     >>> mould.triangles, round(mould.undercuts()["least_draft"], 1)
     (768, 5.0)
     """
-    name = os.fspath(place("solid: file", file))
+    name = os.fspath(file_path("solid: file", file))
     points, triangles = merged(*_read(name))
     points = points * positive("solid: scale", scale)
     _check_closed(points, triangles, f"solid: {name!r}")

@@ -111,7 +111,7 @@ class TopLoad:
     def __str__(self) -> str:
         def text(value: float, quantity: str, digits: int = 5) -> str:
             """Return a value with the unit of a quantity, as text."""
-            return f"{value:.{digits}g} {self.units.of(quantity)}".rstrip()
+            return f"{value:.{digits}g} {self.units.unit_of(quantity)}".rstrip()
 
         def pair(force: float, travel: float, between: str = ", ") -> str:
             """Return a force and a travel, as text."""

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, count, known, place
+from ...errors import InputError, count, file_path, known
 from ...results.files import replace
 from ...results.files.sheet import Sheet
 from . import effects, stored_runs
@@ -284,7 +284,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         known("study: goal", name, task.measure)
         known(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
-    folder = None if folder is None else stored_runs.checked(place("study: folder", folder), task, names)
+    folder = None if folder is None else stored_runs.checked(file_path("study: folder", folder), task, names)
     found = Study(task, names, goals, folder)
     found.runs += [] if folder is None else stored_runs.read(folder, names)
     todo = [case for case in cases if not any(run.values == case for run in found.runs)]

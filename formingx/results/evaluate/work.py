@@ -23,7 +23,7 @@ from ...contact import resultants
 from ...contact.step_limit import TrialStep
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...findings import Finding, tell
+from ...findings import Finding, log_findings
 from ...solve.newton import Failure
 from .step_polynomials import GAUSS, Polynomial, integral, interpolate
 
@@ -377,7 +377,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
     """
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
-    tell(new, path.problem.comm.rank)
+    log_findings(new, path.problem.comm.rank)
     path.record.findings += new
     return found
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
-from ...errors import InputError, instance, place
+from ...errors import InputError, file_path, instance
 from ...findings import Finding
 from ...measures.targets import Target
 from ...problem.problem import Problem
@@ -69,7 +69,7 @@ class Checkpoint:
     """
 
     def __init__(self, folder: Any, path: Any):
-        self.folder, self._path, self._comm = place("checkpoint", folder), path, path.problem.comm
+        self.folder, self._path, self._comm = file_path("checkpoint", folder), path, path.problem.comm
         self._n_written = self._begin()                         # states in the folder
 
     def write(self) -> None:
@@ -200,7 +200,8 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     Raises:
         InputError: there is no checkpoint, it is damaged, or it is of another scene.
     """
-    folder, problem = place("load: folder", folder), Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
+    folder = file_path("load: folder", folder)
+    problem = Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
 
     def look():
@@ -258,7 +259,7 @@ def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Proble
 
 def holds_states(folder: Any, comm: Any) -> bool:
     """Return True if a folder is a checkpoint with at least one state; collective."""
-    folder = place("checkpoint", folder)
+    folder = file_path("checkpoint", folder)
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(complete_states(folder)))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ...errors import InputError, place
+from ...errors import InputError, file_path
 from ...findings import SEVERITIES, Finding
 from ...solve.state import State
 from .arrays import unpack
@@ -33,7 +33,7 @@ def begun(folder: Any) -> bool:
     Raises:
         InputError: the folder holds other files.
     """
-    folder = place("checkpoint", folder)
+    folder = file_path("checkpoint", folder)
     if not folder.exists() or folder.is_dir() and all(entry.suffix == ".part" for entry in folder.iterdir()):
         return False
     read_json(folder / "scene.json")
@@ -54,7 +54,7 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    folder = place("checkpoint", folder)
+    folder = file_path("checkpoint", folder)
     _check_format(folder, read_json(folder / "scene.json"))
     n = len(complete_states(folder))
     if not n:
@@ -76,7 +76,7 @@ def ended(folder: Any) -> dict[str, Any] | None:
     Raises:
         InputError: the file is damaged.
     """
-    file = place("checkpoint", folder) / END
+    file = file_path("checkpoint", folder) / END
     if not file.exists():
         return None
     found = read_json(file)
@@ -99,7 +99,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
     """
-    folder = place("checkpoint", folder)
+    folder = file_path("checkpoint", folder)
     about = read_json(folder / "scene.json")
     _check_format(folder, about)
     states = read_states(folder, len(complete_states(folder)), MPI.COMM_WORLD)

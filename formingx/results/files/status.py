@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import non_negative, positive
-from ...findings import Finding, alarming
+from ...findings import Finding, without_notes
 from . import checkpoint_data
 
 _RECENT_STEPS = 20
@@ -57,7 +57,7 @@ class Status:
     @property
     def findings(self) -> list[Finding]:
         """Warnings and serious findings on the last state and, if the run has ended, on the run."""
-        ended = [] if self.ended is None else alarming(self.ended["findings"])
+        ended = [] if self.ended is None else without_notes(self.ended["findings"])
         state = [Finding("serious", "state", self.verdict)] if self.verdict else []
         return state + [finding for finding in ended if not (state and finding.about == "state")]
 

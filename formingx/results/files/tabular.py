@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, place
+from ...errors import InputError, file_path
 from ...io.output import replace
 from ...units import NONE, Units
 
@@ -130,7 +130,7 @@ def named(caller: str, file: Any, *endings: str) -> Any:
     Raises:
         InputError: the name has another ending.
     """
-    file = place(f"{caller}: file", file)
+    file = file_path(f"{caller}: file", file)
     if file.suffix.lower() not in endings:
         other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())
         raise InputError(f"{caller}: file {str(file)!r}: its name must end in {' or '.join(endings)}"

@@ -164,7 +164,7 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], u
     axes.plot(*point, "o", color="tab:red")
     axes.set(xlabel=x, ylabel=y)
     value = point[1] if abs(point[1]) > 1e-9 * np.abs(curve[1]).max() else 0.0
-    axes.set_title(f"{names[1].replace('_', ' ')} {value:.4g} {units.of(names[1])}".rstrip(), fontsize=10)
+    axes.set_title(f"{names[1].replace('_', ' ')} {value:.4g} {units.unit_of(names[1])}".rstrip(), fontsize=10)
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:

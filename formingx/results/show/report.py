@@ -260,7 +260,8 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
 def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
     """Return rows (name, value) of the force on each tool and of each pressure, where its magnitude is largest."""
     found = [(f"largest force on {name}", force, units.force) for name, force in record.forces.items()]
-    found += [(f"largest {words(c)}", v, units.of(c)) for c, v in record.measures.items() if c.endswith("pressure")]
+    found += [(f"largest {words(c)}", v, units.unit_of(c)) for c, v in record.measures.items()
+              if c.endswith("pressure")]
     return [(name, f"{v[np.argmax(np.abs(v))]:.4g} {unit}".rstrip()) for name, v, unit in found]
 
 
