@@ -21,7 +21,7 @@ class InternalVariables(NamedTuple):
 
     Attributes:
         time: process time of the last accepted state.
-        values: {name: values in the locally owned cells of the layers, shape (cells, points, components)}.
+        values: {name: values in the locally owned cells of the material's layers, shape (cells, points, components)}.
     """
 
     time: float
@@ -50,14 +50,20 @@ class MaterialHistory:
         self.start()
 
     def start(self) -> None:
-        """Set the internal variables of the reference configuration."""
+        """Set the internal variables of the reference configuration, at process time 0."""
         self._now = None
         for name, rest in self._terms.material.internal.items():
             self._set(name, self._cells, np.asarray(rest, dtype=float).ravel())
         self._terms.start.value = 0.0
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the internal variables to the current state of the forms; see `History.advance`."""
+        """Update the internal variables to the end of a step, for the state to which the forms are set.
+
+        Args:
+            x: not used; the fields of the forms count.
+            control: load parameter (control) at the end of the step, dimensionless.
+            start: not used.
+        """
         self._now = None
         for name, values in self._after(self._cells).items():
             self._set(name, self._cells, values)
@@ -74,7 +80,7 @@ class MaterialHistory:
         return dict(zip(self._sizes, parts, strict=True))
 
     def forget_motion(self) -> None:
-        """Reset the variables that `Material.motion_variables` names to their initial values."""
+        """Reset the internal variables listed in `Material.motion_variables` to their initial values."""
         for name in self._terms.material.motion_variables:
             self._now = None
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
@@ -111,7 +117,8 @@ class MaterialHistory:
             variables: values from `get`.
 
         Returns:
-            {"time": process time, "cells": cell numbers of the script's mesh, "values": {name: values in these cells}}.
+            {"time": process time, "cells": cell numbers of the script's mesh, "values": {name: values in these cells,
+            shape (cells, points, components)}}.
         """
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
@@ -142,13 +149,15 @@ class MaterialHistory:
 
     def transfer(self, source: MaterialHistory, variables: InternalVariables, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
-        """Interpolate the internal variables of the same material on another mesh; collective.
+        """Interpolate the internal variables of a material from another mesh to this one; collective.
+
+        The forms of both problems must be set to the state.
 
         Args:
             source: history of the material on the other mesh.
-            variables: its history variables.
-            x: unknowns of this problem, locally owned entries.
-            control: load parameter (control) of the state, dimensionless.
+            variables: history variables of `source` in the state.
+            x: not used.
+            control: not used.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
 
         Returns:
@@ -170,7 +179,7 @@ class MaterialHistory:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """Reference positions of the owned quadrature points, shape (n, coordinates), length."""
+        """Reference positions of the quadrature points in the locally owned cells, shape (n, coordinates), length."""
         X, components = self._forms.X, self._forms.X.ufl_shape[0]
         if not len(self._own):
             return np.zeros((0, components))

@@ -58,7 +58,7 @@ class MaterialTerms:
         self.past_integrals = {name: self.quadrature_function(np.shape(value)) for name, value in coefficients.items()}
 
     def _constant(self, name: str, value: Any) -> Any:
-        """Return the coefficient (UFL scalar) of a material constant with a name and a value."""
+        """Return the coefficient (UFL scalar) of the material constant `name`; value: a number or a `Varying`."""
         self._in_middle = name in self.material.flow_constants
         return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
 
@@ -89,10 +89,11 @@ class MaterialTerms:
         """Evaluate a function of the reference position at the quadrature points of the energy.
 
         Args:
-            function: f(R, Z), vectorised.
+            function: f(R, Z) of the reference position on the first mesh of a run (arrays, length). In a membrane, Z is
+                the height halfway through the layer.
 
         Returns:
-            `Function` with the exact values of f.
+            `Function` of a quadrature element with the values of f.
         """
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.preformed
 
@@ -106,7 +107,7 @@ class MaterialTerms:
         """Evaluate a function of the temperature at the quadrature points of the energy.
 
         Args:
-            function: f(T), vectorised.
+            function: f(T) of an array of temperatures.
 
         Returns:
             f (UFL scalar) at the end of a step. For a constant named in `Material.flow_constants`, f in the middle of
@@ -129,7 +130,7 @@ class MaterialTerms:
             coefficient.take(temperatures)
 
     def of_mesh(self, expression: Any) -> Any:
-        """Return a coefficient that is given on the scene's mesh.
+        """Return a coefficient that is a UFL expression on the scene's mesh, if the fields live on this mesh.
 
         Args:
             expression: UFL scalar.
@@ -146,7 +147,7 @@ class MaterialTerms:
         return expression
 
     def step_energy(self, F: Any) -> Any:
-        """Return the potential of the step per reference volume.
+        """Return the incremental potential of the step per reference volume.
 
         Args:
             F: elastic deformation gradient (UFL, shape (3, 3)).
@@ -172,11 +173,11 @@ class MaterialTerms:
         return self.material.stored_energy(F, self.internal | self.past_integrals, **self.constants)
 
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
-        """Return the virtual work that no potential has, per reference volume.
+        """Return the virtual work of stresses that have no potential, per reference volume.
 
         Args:
             F: elastic deformation gradient (UFL, shape (3, 3)).
-            derivative: function that returns the virtual change of a UFL expression.
+            derivative: function that returns the variation of a UFL expression by virtual displacements.
 
         Returns:
             Virtual work (UFL, stress); None if the tangent of the material is symmetric.
@@ -237,7 +238,7 @@ class MaterialTerms:
             {name: internal variable (UFL)}.
 
         Raises:
-            InputError: the material returns other variables than it has, or other shapes.
+            InputError: `Material.updated` returns other names or shapes than `Material.internal` has.
         """
         found = self.material.updated(F, self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}

@@ -25,8 +25,8 @@ class ExtendedMatrix:
     Args:
         form: compiled bilinear form of K.
         index_map: index map of its space (block size 1).
-        bcs: constrained unknowns, see `constrain`; all later ones must be among them.
-        rows: rows of C, see `constrain`; the nonzero entries of all later ones must be among theirs.
+        bcs: DirichletBCs as in `constrain`; later ones must constrain a subset of these unknowns.
+        rows: rows of C as in `constrain`; later rows must be 0 wherever these are 0.
         comm: MPI communicator.
         symmetric: True if K is symmetric.
 
@@ -75,7 +75,7 @@ class ExtendedMatrix:
 
         Args:
             blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to K, shape (n,
-                m, m). The unknowns of a block must share a cell.
+                m, m). The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
 
         Returns:
             The assembled matrix.

@@ -41,7 +41,7 @@ class MidSurface(Formulation):
     """Forms of a scene as a membrane; the only field is the displacement of the mid-surface.
 
     Attributes:
-        thicknesses: {layer: thickness normal to the mid-surface in the reference configuration (`Function`, length)}.
+        thicknesses: {layer: thickness along Z in the reference configuration (`Function`, length)}.
 
     Raises:
         InputError: the sheet is not a graph over R, or a load or support is not on a face or an end of the membrane.
@@ -122,7 +122,7 @@ class MidSurface(Formulation):
             Z: not used.
 
         Returns:
-            Z, shape (n,), length.
+            Heights, shape (n,), length.
         """
         low, high = self._ends[layer]
         return np.interp(R, self._R, (low + high) / 2)
@@ -201,7 +201,7 @@ class MidSurface(Formulation):
         return element, [basix.ufl.blocked_element(element, shape=(self.scene.kinematics.components,))]
 
     def _weight(self) -> Any:
-        """Return the kinematic weight times the thickness normal to the mid-surface; faces are given along Z."""
+        """Return the reference volume per arc length of the mid-surface: 2 pi R (plane strain: 1) times thickness."""
         direction = ufl.Jacobian(self.domain)[:, 0]
         direction = direction / ufl.sqrt(ufl.inner(direction, direction))
         self._tangent = ufl.sign(direction[0]) * direction                     # towards growing R
@@ -213,11 +213,11 @@ class MidSurface(Formulation):
         return self._area() * sum(self.thicknesses.values())
 
     def _area(self) -> Any:
-        """Return the kinematic weight times dR/dS: thickness along Z times this is volume per arc length (UFL)."""
+        """Return the factor from a thickness along Z to the reference volume per arc length S: (2 pi R or 1) dR/dS."""
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient in principal axes (meridian, normal, hoop)."""
+        """Return the deformation gradient diag(l1, 1/(l1 l2), l2) in principal axes: meridian, normal, hoop."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
         t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]

@@ -22,7 +22,7 @@ _SEARCH_PIECES = 8
 
 
 class Outline:
-    """Boundary of a deformed solid: m edges, each a parabola through its ends and its midpoint.
+    """Boundary of a deformed solid: m edges of all ranks, each a parabola through its ends and its midpoint.
 
     The body lies to the left of each edge.
 
@@ -31,7 +31,7 @@ class Outline:
 
     Attributes:
         rest: start, end and midpoint of each edge in the reference configuration, shape (m, 3, 2), length.
-        ends: numbers of the corners at start and end, equal for edges that meet, shape (m, 2).
+        ends: vertex numbers of start and end of each edge, shape (m, 2); edges that meet share a number.
     """
 
     def __init__(self, forms: Any):

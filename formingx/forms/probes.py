@@ -24,7 +24,8 @@ class Probe:
 
     Attributes:
         points: the reference positions, shape (n, 2), length.
-        earlier_displacement: displacement of the points before this mesh was made, shape (n, components), length.
+        earlier_displacement: displacement of the points from the first mesh of a run to this one, 0 without remeshing,
+            shape (n, components), length.
 
     Raises:
         InputError: a point outside the mesh.
@@ -48,7 +49,7 @@ class Probe:
             len(cells), self._components, self._problem.forms.displacement_element.dim)
 
     def displacement(self, x: Any) -> np.ndarray:
-        """Return the displacement at the points, on all ranks.
+        """Set the fields of the forms, and return the displacement at the points; collective.
 
         Args:
             x: unknowns (PETSc vector).

@@ -9,18 +9,20 @@ from typing import Any
 
 @dataclass(frozen=True)
 class StepData:
-    r"""Amplitudes of the items of a scene as linear functions of the control.
+    r"""Amplitudes of loads, supports and contacts (`Scene.items`) as linear functions of the control.
 
     .. math::
         a_i = \mathrm{base}_i + \mathrm{rate}_i \, \lambda
 
-    :math:`\lambda` is the control; amplitudes are dimensionless. The last entry of each list is the process time.
+    :math:`\lambda` is the control; amplitudes are dimensionless. The last entry of `base` and `rate` belongs to the
+    process time.
 
     Attributes:
-        base: one number for each item (0 for an item without control), then the process time.
+        base: amplitude of each item at control 0 (0 for an item without control), then the process time.
         rate: derivatives of the amplitudes and of the process time with respect to the control.
         inactive: numbers of the inactive items.
-        fading: True if the control removes, from 0 to 1, the unbalanced forces of a change of the active items.
+        fading: True if unbalanced forces, caused by a change of the active items, vanish as the control goes from 0
+            to 1.
         stage: number of the stage in its process.
         piece: number of the piece of the stage; each piece has one control.
         changed: numbers of the items that are deactivated or activated while the forces fade.
@@ -40,7 +42,7 @@ class StepData:
     def first(cls, scene: Any) -> StepData:
         """Return the step data of the unloaded scene with all its items.
 
-        A single controlled item follows the control.
+        If the scene has one controlled item, its amplitude is the control. All other amplitudes are 0.
 
         Args:
             scene: the `Scene`.
@@ -53,7 +55,9 @@ class StepData:
 
     @property
     def leading(self) -> int | None:
-        """Number of the controlled quantity: the time if it runs, else the one item that follows the control, or None.
+        """Index in `rate` of the quantity that the control changes; None if nothing changes.
+
+        This is the process time if it changes, else the first item whose amplitude changes.
         """
         if self.rate[-1]:
             return len(self.rate) - 1
@@ -61,7 +65,7 @@ class StepData:
 
     @property
     def rests(self) -> bool:
-        """True if no item follows the control: only the time changes, or nothing."""
+        """True if the control changes no amplitude, at most the process time."""
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
@@ -84,8 +88,8 @@ class StepData:
             control: load parameter (control), dimensionless.
 
         Returns:
-            The amplitude, 0 for an inactive load; while forces fade, the amplitude of a changed load times the control
-            or times 1 - control.
+            The amplitude; 0 for an inactive load. While forces fade, it is multiplied by the control for an activated
+            load, and by 1 - control for a deactivated load.
         """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:
@@ -104,12 +108,12 @@ class StepData:
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
-        """Return the same step data and control for the scales of another mesh.
+        """Return step data and control that give the same values in the user's units on the next mesh of a run.
 
         Args:
-            before: user's values over the amplitudes on the present mesh, then 1 for the time.
-            now: the same on the next mesh.
-            control: control on the present mesh.
+            before: `Formulation.scales` of the present mesh: values over amplitudes, then 1 for the time.
+            now: `Formulation.scales` of the next mesh.
+            control: control on the present mesh, dimensionless.
 
         Returns:
             Step data and control on the next mesh.

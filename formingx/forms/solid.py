@@ -28,7 +28,7 @@ class Solid(Formulation):
     """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """Return the measure of a boundary.
+        """Return the UFL measure of a boundary in the reference configuration.
 
         Args:
             name: name of the boundary.
@@ -217,8 +217,7 @@ def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
 
 
 def _colour(scene: Any) -> dict[str, int]:
-    """Return {layer: number of its pressure field}, so that adjacent bodies of different materials get different ones.
-    """
+    """Return {layer: number of its pressure field}; adjacent layers of different materials have different fields."""
     mesh = scene.mesh
     if not scene.model.pressure.continuous:
         return dict.fromkeys(mesh.layers, 0)

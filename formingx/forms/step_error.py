@@ -49,18 +49,19 @@ class StepError:
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Estimate the time integration error of a step by step doubling.
 
-        Errors are root mean squares over the body. They are divided by the largest stress: at the start of the step,
-        at its end, or in the fully relaxed body.
+        Errors and stresses are root mean squares over the body. Errors are divided by the largest of three stresses: at
+        the start of the step, at its end, and after complete relaxation. They are multiplied by 4 if errors of
+        successive steps have the same sign.
 
         Args:
-            past: k accepted states; the step begins at the last of them.
+            past: k accepted states, with x and time; the step begins at the last of them.
             share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
             x: unknowns at the end of the step, locally owned entries, shape (n,).
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Relative error of the stress at the end of the step; relative error that is left after another step of this
-            length. The second error adds up from step to step.
+            Relative error of the stress at the end of the step; relative error that is left after relaxation for
+            another step length. The second error adds up from step to step. Both are 0 in a step without time.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)

@@ -12,11 +12,11 @@ class Temperature:
     """Temperature of a problem's body at the last accepted state.
 
     Args:
-        given: temperature of the scene.
+        given: temperature of the scene (`GivenTemperature`).
 
     Attributes:
         T: DOLFINx `Function` (P2) of the temperature. After a change call `take_temperature` of the `Problem`.
-        before: values of T at an earlier time with ghosts, or None.
+        before: nodal values of T at an earlier time, with ghosts, shape (n,), or None.
         time: process time of `T`.
         time_before: process time of `before`.
         limits: lowest and highest possible temperature. Quadratic elements overshoot next to a suddenly chilled face;
