@@ -53,8 +53,8 @@ class FaceContact:
         increment: the present `Increment`.
         present: True if the contact is active in the stage.
         shift: reduction of the distances, shape (n,), length, or None.
-        unbalanced: contact forces minus reaction of the body at its nodes, shape (components,), stress length^2. The
-            perturbed runs of a design sensitivity set this round-off of positions.
+        unbalanced: resultant of contact forces minus nodal forces of the body, due to round-off of positions, shape
+            (components,), stress length^2. Perturbed runs of a design sensitivity set it; `force` subtracts it.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -127,7 +127,7 @@ class FaceContact:
         return self.points + self._length * self.displacement(fields) - self.travelled(control)
 
     def travelled(self, control: float) -> np.ndarray:
-        """Return the displacement vector of the tool at a control, shape (components,), length."""
+        """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
 
     def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
@@ -149,9 +149,9 @@ class FaceContact:
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return a mask of the contact points that touch the tool in a state, shape (n,).
+        """Return a mask of the points that are in contact with the tool in a state, shape (n,).
 
-        fields: locally owned unknowns of the state. control: its control.
+        fields: locally owned unknowns of the state. control: its load parameter (control), dimensionless.
         """
         return self.law.touching(self.positions(fields, control), self.history)
 
@@ -174,11 +174,11 @@ class FaceContact:
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Derivative of the forces in F by the positions in the last tangent, shape (n, c, c), 1/length."""
+        """Derivative of the forces in the residual by the positions in the last tangent, shape (n, c, c), 1/length."""
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add forces at the points, shape (n, components), to the locally owned entries `values` of the residual F."""
+        """Add dimensionless forces at the points, shape (n, c), to locally owned entries `values` of the residual."""
         self.rule.add(values, forces)
 
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
@@ -250,9 +250,9 @@ class FaceContact:
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the change of the contact stiffness from the last tangent to the next step, at an accepted state.
+        """Return the stiffness towards the next step (`ahead` of `tangent`) minus the stiffness in the last tangent.
 
-        The result has the shape (n, c, c), stress/length; 0 for points whose relative change is below 1e-3.
+        The state is an accepted one. Shape (n, c, c), stress/length; 0 for points whose relative change is below 1e-3.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -276,7 +276,7 @@ class FaceContact:
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return the stiffness by the unknowns, (n, m, m), from the stiffness by the positions, (n, c, c)."""
+        """Return dimensionless stiffness by unknowns, shape (n, m, m), from traction derivatives, shape (n, c, c)."""
         return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
@@ -285,7 +285,7 @@ class FaceContact:
         return self.contact.penalty * self._solid.stress / self.thickness
 
     def _law(self, penalty: np.ndarray | float) -> Any:
-        """Return the contact law at the points for a penalty over the reference penalty, shape () or (n,)."""
+        """Return the contact law at the points; penalty: present over reference penalty, shape () or (n,)."""
         law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
                                     self._temperatures())
         if self.shift is not None:
@@ -314,7 +314,7 @@ class FaceContact:
         self._start_at(self.points)
 
     def activate(self, fields: np.ndarray, control: float) -> None:
-        """Set the history variables of points not yet in contact, at the state in which the tool becomes active."""
+        """Set history variables of points without earlier contact, in the state (fields, control) of the activation."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
@@ -353,7 +353,7 @@ class FaceContact:
         self._take(FaceHistory(history, arrived, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Open the points under tension at a tool in three dimensions; return True if there were any. Collective."""
+        """Open the points under tension at a tool in three dimensions; return True if there are any. Collective."""
         if self._stored is None or not (self.contact.lagged and self.contact.separates):
             return False
         history, x = self._stored.history, self.positions(fields, control)
@@ -366,10 +366,10 @@ class FaceContact:
         return found
 
     def close_penetrated(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Close the contact of points that penetrated a tool in three dimensions during the step; collective.
+        """Close the gaps of open points that are deeper than `most` (length) in a tool in three dimensions; collective.
 
-        Each point sticks or slides from the position where its path in the step met the tool. Points that are deeper
-        than `most` (length) count. Return True if there are such points.
+        Each such point sticks or slides from the position where its path in the step met the tool. Return True if
+        there are such points.
         """
         if self._stored is None or not self.contact.lagged:
             return False
@@ -404,7 +404,7 @@ class FaceContact:
         self.increment = Increment(self.law, self.history)
 
     def save(self, variables: FaceHistory) -> dict[str, np.ndarray]:
-        """Return the history variables of all ranks as arrays, with the reference position of each point."""
+        """Return {name: array} of history variables and reference positions of the points of all ranks; collective."""
         parts = self.comm.allgather((self.points, *variables.history, variables.arrived, variables.penalty))
         names = ("points", *variables.history._fields, "arrived", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
@@ -432,10 +432,10 @@ class FaceContact:
 
         Args:
             source: the same contact on the other mesh.
-            variables: its history variables, or None.
+            variables: history variables of `source`, or None.
             x: locally owned unknowns of the state on this mesh.
             control: load parameter (control) of the state, dimensionless.
-            mapping: function that maps points of the other mesh to this mesh.
+            mapping: function from reference points of the other mesh, shape (n, components), to points of this mesh.
         """
         if variables is None:
             return None

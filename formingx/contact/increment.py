@@ -37,9 +37,9 @@ class Increment:
         self._last: tuple[np.ndarray, Tractions] | None = None
 
     def tractions(self, x: np.ndarray) -> Tractions:
-        """Return the tractions of the law at given positions.
+        """Return the tractions at given positions: of the law, or after `linearise(x)` of the linearised law.
 
-        They are computed once per position. After `linearise` at the same positions, the linearised law gives them.
+        They are stored for repeated calls with the same positions.
 
         Args:
             x: positions of the points relative to the tool, shape (n, c), length.

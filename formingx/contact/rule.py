@@ -20,7 +20,7 @@ class Rule(Protocol):
     """Quadrature rule of a face: the n contact points that this rank owns.
 
     Attributes:
-        dofs: local numbers of the unknowns that move each point, component by component of each of its nodes, (n, m).
+        dofs: local numbers of the m unknowns that move each point, for each of its nodes all components, shape (n, m).
         points: reference positions, shape (n, components), length.
         nodes: reference positions of the nodes of each point, shape (n, components) if a point is a node, else
             (n, nodes, components).
@@ -48,10 +48,10 @@ class Rule(Protocol):
         """Return the displacement of the contact points; collective.
 
         Args:
-            values: locally owned unknowns.
+            values: locally owned unknowns, any unit.
 
         Returns:
-            Displacement, shape (n, components), in the units of `values`.
+            Displacement, shape (n, components), in the unit of `values`.
         """
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -59,7 +59,7 @@ class Rule(Protocol):
 
         Args:
             values: locally owned entries of the residual, changed in place.
-            forces: forces at the points, shape (n, components), in the units of `values`.
+            forces: forces at the points, shape (n, components), in the unit of `values`.
         """
 
     def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:

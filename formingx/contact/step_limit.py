@@ -15,7 +15,7 @@ from .approach import LIMITS, Approach
 
 
 class EventPrediction(Protocol):
-    """Predicted contact events after an accepted state, and the path that they bend.
+    """Predicted contact events after an accepted state, and the predicted path with these events.
 
     The extension `formingx.extensions.contact_events` provides it. `StepLimit` calls `step_length` first, then
     `closures` and `bend` for the length that the step has in the end.
@@ -163,12 +163,12 @@ class StepLimit:
 
     @property
     def present(self) -> list[Approach]:
-        """Contacts (`Approach`) that are active in the present stage."""
+        """The `Approach` of each contact that is active in the present stage."""
         return [approach for approach in self._all if approach.face.present]
 
     @property
     def only_sticks(self) -> bool:
-        """True if every active contact with friction sticks, with plane tools.
+        """True if there is active contact with friction, all of it sticks, and its tools are plane (`Tool`).
 
         No contact slides then, so that a path does not end by sliding. The run may reduce a step to the shortest
         length.

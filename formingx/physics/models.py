@@ -1,18 +1,18 @@
 r"""Models of a body: a solid with one of two treatments of incompressibility, or a membrane.
 
-Both treatments are the penalty of Song (1993), eq. (3.4.1),
+Both treatments derive from the penalty of Song (1993), eq. (3.4.1), here with the shear modulus mu of the layer as a
+factor, which makes epsilon dimensionless:
 
 .. math::
-    W + \frac{\mu}{\epsilon} (I_3 - 1)^2,
+    W + \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad \text{in (3.4.1):} \quad W + \frac{1}{\epsilon} (I_3 - 1)^2
 
-with a dimensionless eps and the shear modulus mu of the layer. With the pressure p (tension positive) as an unknown the
-same penalty reads
+With the pressure p (positive in tension) as an unknown, the same penalty reads
 
 .. math::
     W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
 
-Both are equal for small J - 1. The second has far better Newton convergence, since the linearised constraint has no
-wrong stress k (J - 1). Models remove the isotropic stress of W in the reference configuration, see
+Both are equal for small J - 1. The second needs far fewer Newton iterations, since its stress does not contain the
+volume error of an iterate times k. Models remove the isotropic stress of W in the reference configuration, see
 `formingx.materials.material`.
 """
 

@@ -25,8 +25,8 @@ class Examination:
     Args:
         problem: the `Problem`.
         last: the last good state, or None.
-        attempt: point where Newton's method ended, with x, control and the last corrections dx and dcontrol; None if no
-            iteration failed.
+        attempt: last iterate of the failed Newton iteration, with x, control and the last corrections dx and dcontrol;
+            None if no iteration failed.
 
     Attributes:
         facts: {field of a `Diagnosis`: its value}.
@@ -55,7 +55,7 @@ class Examination:
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
     def _take_worst(self, shape: Body) -> None:
-        """Find the smallest J, the worst shape and the point nearest to a material's limit in the last good state."""
+        """Find the smallest J, the worst element shape and the point nearest to its largest I1 in the last state."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
         facts["shape"] = float((shape.quality / shape.initial_quality).min())
@@ -118,7 +118,7 @@ class Examination:
 
 
 def _layer(problem: Any, tag: int) -> str:
-    """Return the name of the layer with a tag."""
+    """Return the name of the layer with a tag of the mesh; "" if there is none."""
     return next((name for name, t in problem.scene.mesh.layers.items() if t == tag), "")
 
 
@@ -188,7 +188,7 @@ def _flips(problem: Any, attempt: Any) -> int | None:
 
 
 def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
-    """Draw elements, marked points and tools to a file."""
+    """Draw deformed elements coloured by J, marked points (label, position) and tools to a file."""
     from matplotlib.collections import PolyCollection
     size = np.ptp(shape.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]

@@ -50,7 +50,7 @@ class Problem(Stages, Units):
         contacts: contacts of the scene (`FaceContact`).
         present: contacts that are active in the present stage.
         histories: history variables on which F depends (`History`): contacts, then materials, then the temperature.
-        limit: limits of a step (`StepLimit`).
+        limit: contact's limits to the length of a step (`StepLimit`).
         admissible: admissibility check of the body, and its volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
@@ -135,9 +135,9 @@ class Problem(Stages, Units):
             out.array_w += (control - 1) * stage.unbalanced
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
-        """Return the force of the body on a driven support, along the motion of the support; collective.
+        """Return the force of the body on a driven support, positive along the displacement component; collective.
 
-        The force is minus the sum, over all ranks, of internal minus external forces at the driven unknowns.
+        The force is the sum of external minus internal forces at the driven unknowns of all ranks.
 
         Args:
             number: number of the support in `Scene.items`.
@@ -201,7 +201,7 @@ class Problem(Stages, Units):
         return values
 
     def folded(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if an element of the body is inverted at a state, see `Admissible.holds`.
+        """Return True if an element of the body is inverted or crosses the axis in a state, see `Admissible.holds`.
 
         Args:
             x: unknowns.

@@ -24,10 +24,10 @@ class _Stage(NamedTuple):
     Attributes:
         setting: the `StepData`.
         active: the active constraints.
-        place: values of the constrained owned unknowns at control 0, shape (n,).
+        place: values of the locally owned constrained unknowns at control 0, shape (n,).
         rate: their derivative with respect to the control, shape (n,).
-        means: values of the constrained means.
-        unbalanced: unbalanced forces that fading removes, over 1 - control, locally owned entries of F; or None.
+        means: prescribed values of the constrained means.
+        unbalanced: forces f of fading, locally owned entries of F: (1 - control) f is subtracted from F; or None.
     """
 
     setting: StepData
@@ -87,7 +87,7 @@ class Stages(Vectors):
 
     @property
     def constrained_rate(self) -> np.ndarray:
-        """Derivative of the constrained unknowns with respect to the control, in the order of `constrained`."""
+        """Derivative of the constrained unknowns with respect to the control, as `constrained`, shape (n,)."""
         return self._stage.rate
 
     @contextlib.contextmanager
@@ -119,7 +119,7 @@ class Stages(Vectors):
             self.forms.control.value = control
 
     def restore(self, state: Any) -> None:
-        """Restore the step data and history variables of an accepted state, to start a step from it.
+        """Restore step data, history variables and process time of an accepted state, to start a step from it.
 
         Args:
             state: the state, see `state_context`.
@@ -133,9 +133,10 @@ class Stages(Vectors):
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Unbalanced forces that decrease to 0 as the control goes to 1, over 1 - control, shape (n,), or None.
+        """Forces f of the fading of unbalanced forces, shape (n,); None if the step data have no fading.
 
-        They are dimensionless, for the locally owned field unknowns. None if the step data have no such forces.
+        At a control the unbalanced forces are (1 - control) f. They are dimensionless, for the locally owned field
+        unknowns.
         """
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
 
@@ -160,7 +161,7 @@ class Stages(Vectors):
             control: load parameter (control), dimensionless.
 
         Returns:
-            The multipliers, on all ranks.
+            Lagrange multipliers of the constrained means, shape (means,), the same on all ranks.
         """
         self.forms.control.value = control
         self.set_fields(x.array_r)

@@ -32,7 +32,7 @@ class Vectors(Histories):
 
     @cached_property
     def _metric(self) -> np.ndarray:
-        """Lumped mass of the displacement over the volume, locally owned entries, shape (n,)."""
+        """Lumped mass matrix of the displacement for density 1/V, locally owned diagonal entries, shape (n,)."""
         return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
 
     def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
@@ -46,7 +46,9 @@ class Vectors(Histories):
         self.set_fields(x)
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the mean over the reference volume of the product of two displacement fields.
+        r"""Return the inner product of two displacement fields with a lumped mass matrix.
+
+        .. math:: \frac{1}{V} \int_V a \cdot b \, dV
 
         Args:
             a: first vector of unknowns.
@@ -103,7 +105,7 @@ class Vectors(Histories):
         Args:
             out: vector that receives the values.
             values: values of the fields, shape (n,).
-            tail: values of the multipliers; default 0.
+            tail: values of the multipliers, used on the last rank; None: 0.
         """
         array = out.array_w
         array[: self._n] = values
