@@ -6,7 +6,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from test_contact import cup, form
 
-from formingx.solve import compliance
+from formingx.solve import compliance, linear
 from formingx.solve.linear import DirectSolver
 
 N, ROWS = 60, np.array([3, 4, 17, 18, 40])
@@ -43,6 +43,22 @@ def test_entries_of_the_inverse(solver):
     assert out.array_r == pytest.approx(inverse.T @ rhs[:, 0], rel=1e-10, abs=1e-13)
 
 
+def test_sparse_right_hand_sides(solver, monkeypatch):
+    """Right-hand sides that are zero in most rows have the same solutions as sparse and as dense ones."""
+    made, dense = solver
+    monkeypatch.setattr(linear, "CONDENSATION", linear.Condensation(rows=N // 4))
+    random = np.random.default_rng(4)
+    rhs = np.zeros((N, 3))
+    rhs[ROWS[:4]] = random.normal(size=(4, 3))
+    rhs[ROWS[0], 1] = 0.0
+    rhs[:, 2] = 0.0                                         # the force on a constrained point
+    sparse = made._sparse(rhs)
+    assert sparse.getType() == "transpose" and made._sparse(random.normal(size=(N, 3))) is None is made._sparse(0 * rhs)
+    sparse.destroy()
+    for right in (rhs, random.normal(size=(N, 3)), rhs):
+        assert made.solve_all(right) == pytest.approx(np.linalg.solve(dense, right), rel=1e-10, abs=1e-13)
+
+
 def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     """Motions, changes of the control and updates agree, for a constraint on all unknowns and a tool that moves."""
     made, _ = solver
@@ -54,7 +70,7 @@ def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     def moved(dx, step):
         return dx[ROWS] * 2 - step * np.arange(len(ROWS))
     full = compliance.columns(made, E, border)
-    monkeypatch.setattr(compliance, "CONDENSATION", compliance.Condensation(columns=7, rows=N))
+    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(columns=7, rows=N))
     condensed = compliance.columns(made, E, border)
     assert isinstance(full, compliance.Columns) and isinstance(condensed, compliance.CondensedColumns)
     forces = random.normal(size=(7, 2))
@@ -71,7 +87,7 @@ def test_a_cup_with_condensed_solutions(monkeypatch):
     made = []
     condensed = compliance.CondensedColumns.__init__
     monkeypatch.setattr(compliance.CondensedColumns, "__init__", lambda *args: made.append(1) or condensed(*args))
-    monkeypatch.setattr(compliance, "CONDENSATION", compliance.Condensation(columns=0, rows=0))
+    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(columns=0, rows=0))
     found = form(cup("stick", (30, 1)), 10.0)
     assert made and found.counts.iterations == full.counts.iterations
     assert found.profile().thickness == pytest.approx(full.profile().thickness, rel=1e-8)

@@ -10,7 +10,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from .equations import Array
-from .linear import DirectSolver
+from .linear import CONDENSATION, DirectSolver
 
 Border: TypeAlias = Callable[[Array], Array]
 """Function that maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; it returns the changes of
@@ -18,21 +18,6 @@ the control, shape (m,)."""
 
 Moved: TypeAlias = Callable[[Array, float], Array]
 """Linear function of an update of the unknowns, shape (n,), and of the control; it returns motions, shape (k,)."""
-
-@dataclass(frozen=True)
-class Condensation:
-    """Sizes from which solutions are condensed (`CondensedColumns`).
-
-    Attributes:
-        columns: number of right-hand sides from which entries of the inverse cost less than full solutions.
-        rows: number of unknowns from which the difference counts.
-    """
-
-    columns: int = 12
-    rows: int = 10_000
-
-
-CONDENSATION = Condensation()
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -20,6 +21,22 @@ class _Scaling(IntEnum):
     KEPT = -1                           # from the factorisation before
 
 
+@dataclass(frozen=True)
+class Condensation:
+    """Sizes from which solutions are condensed (`CondensedColumns`), and zeros of right-hand sides passed over.
+
+    Attributes:
+        columns: number of right-hand sides from which entries of the inverse cost less than full solutions.
+        rows: number of unknowns, per nonzero entry of a right-hand side, from which the difference counts.
+    """
+
+    columns: int = 12
+    rows: int = 10_000
+
+
+CONDENSATION = Condensation()
+
+
 def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
     """Set a PETSc solver to one direct solution with the matrix by MUMPS: LU factors, or LDL^T if it is symmetric."""
     ksp.setOperators(matrix)
@@ -29,6 +46,7 @@ def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
     pc.setFactorSolverType("mumps")
     pc.setFactorSetUpSolverType()
     pc.getFactorMatrix().setMumpsIcntl(14, 100)      # workspace over MUMPS' own estimate, percent
+    pc.getFactorMatrix().setMumpsIcntl(27, -64)      # right-hand sides at a time
 
 
 class DirectSolver:
@@ -99,8 +117,12 @@ class DirectSolver:
             The solutions as columns, locally owned rows, shape (n, m).
         """
         given, found = self._dense(*rhs.shape)
-        given.getDenseArray()[:] = rhs
-        self._ksp.getPC().getFactorMatrix().matSolve(given, found)
+        sparse = self._sparse(rhs)
+        if sparse is None:
+            given.getDenseArray()[:] = rhs
+        self._ksp.getPC().getFactorMatrix().matSolve(given if sparse is None else sparse, found)
+        if sparse is not None:
+            sparse.destroy()
         return found.getDenseArray().copy()
 
     def inverse(self, rows: Array) -> Array | None:
@@ -157,6 +179,18 @@ class DirectSolver:
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(33, 1)
         if self._inertia:                # without ScaLAPACK for the last block: it counts no pivots
             self._ksp.getPC().getFactorMatrix().setMumpsIcntl(13, 1)
+
+    def _sparse(self, rhs: Array) -> PETSc.Mat | None:
+        """Return right-hand sides, shape (n, m), as a sparse matrix; None if MUMPS gains nothing by their zeros."""
+        (n, m), rows = rhs.shape, CONDENSATION.rows
+        if self._matrix.comm.size > 1 or rows * np.count_nonzero(rhs[:, 0]) > n:
+            return None
+        column, row = np.nonzero(rhs.T)
+        if not 0 < rows * len(row) <= n * m:
+            return None
+        starts = np.searchsorted(column, np.arange(m + 1)).astype(PETSc.IntType)
+        transposed = PETSc.Mat().createAIJ((m, n), csr=(starts, row.astype(PETSc.IntType), rhs[row, column]))
+        return PETSc.Mat().createTranspose(transposed)
 
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
