@@ -1,4 +1,4 @@
-"""Reduced contact in C: the same forces, rates and statuses as array operations (`reference.reduced_contact`)."""
+"""Gap closures and reduced contact in C: the same values as array operations (`reference.reduced_contact`)."""
 
 from types import SimpleNamespace
 
@@ -7,8 +7,11 @@ import pytest
 from mpi4py import MPI
 from reference.reduced_contact import ReferencePoints
 
+import formingx as fx
+from formingx.contact.gap_closures import crossing, gap_closures
 from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
 from formingx.physics.contact_law import ContactStatus
+from formingx.physics.penalty import Law
 
 
 def system(seed):
@@ -70,3 +73,29 @@ def test_forces_that_do_not_exist_are_not_numbers():
     near = near._replace(curvature=np.zeros(m))
     same, outside = points.forces_at_end(u, status, near, force, to)
     assert same is force and np.isnan(outside).all() and points.rates(u, status, near, force) is None
+
+
+class _Arrays(Law):
+    """Law whose distances are computed in array operations only."""
+
+    profile = None
+
+
+@pytest.mark.parametrize("shift", [0.0, "each"])
+@pytest.mark.parametrize("tool", [fx.tools.cup(radius=1.0, depth=1.0, mouth=0.1, fillet=0.2),
+                                  fx.tools.sphere(radius=0.5), fx.Tool([(0, 0), (1, 0), (1, 1), (0, 1)], closed=True)])
+def test_gap_closures_are_those_of_array_operations(tool, shift):
+    """To the last bit: of points that come, that are open or closed, inside or away, and of one point (`crossing`)."""
+    random, n, theta = np.random.default_rng(2), 400, 1e-2
+    x, w, free = random.uniform(-0.2, 1.3, (n, 2)), random.normal(size=(n, 2)), random.random(n) < 0.8
+    shift = random.uniform(0, 0.1, n) if shift == "each" else shift
+    laws = [kind(tool, np.inf, 1.0, theta, 1e-3, shift) for kind in (Law, _Arrays)]
+    assert [law.profile for law in laws] == [tool, None]
+    times, expected = (gap_closures(law, x, w, free, 0.3) for law in laws)
+    np.testing.assert_array_equal(times, expected)
+    came = np.flatnonzero(times < 0.3)
+    assert 20 < len(came) < n and free[came].all()
+    for i in came:
+        there = x[i] + times[i] * w[i]
+        found, again = (crossing(law, i, there, w[i], -0.01, 1e-3, 3) for law in laws)
+        assert found == pytest.approx(again, rel=1e-12, abs=1e-15)

@@ -321,7 +321,7 @@ def test_no_compiler(tmp_path, monkeypatch):
     from formingx.tools import nearest
 
     def compiled():
-        return _jit.functions.__wrapped__("nearest", nearest._HEADER, nearest._SOURCE)
+        return _jit.functions.__wrapped__("nearest", nearest._HEADER, nearest.SOURCE)
     monkeypatch.setattr(_jit, "_compiler", lambda: ("false",))
     monkeypatch.setattr(_jit.jit, "get_options", lambda: {"cache_dir": tmp_path})
     with pytest.raises(RuntimeError, match="the C compiler failed, with status 1: false"):

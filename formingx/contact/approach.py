@@ -8,13 +8,13 @@ friction, are those of the last accepted state.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from ..ranks import gathered
 from .face import FaceContact
+from .gap_closures import gap_closures
 
 
 @dataclass(frozen=True)
@@ -410,30 +410,3 @@ class Approach:
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
         late = (history.distance <= -law.theta) & (F > 0) & wrong
         return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
-
-
-def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Return the arc lengths at which open points on straight paths reach the outer edge of the ramp of their tool.
-
-    Args:
-        law: contact law.
-        start: positions of the points relative to the tool, shape (n, c), length.
-        velocity: their derivatives by arc length, shape (n, c), length.
-        free: mask of the open points, shape (n,).
-        length: arc length of the paths.
-
-    Returns:
-        Arc length of the first gap closure of each point, shape (n,); `length` for points that stay open or were
-        closed.
-    """
-    at, times = length * np.linspace(0, 1, 17), np.full(len(start), length)
-    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
-    near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
-    if len(near):
-        gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
-        hit = np.flatnonzero((gap[1:] <= 0).any(0))
-        k = np.argmax(gap[1:, hit] <= 0, axis=0)
-        before, now = np.maximum(gap[k, hit], 0.0), gap[k + 1, hit]
-        share = np.divide(before, before - now, out=np.zeros(len(hit)), where=before > 0)
-        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
-    return times

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from ..tools.shapes import Nearest
+from ..tools.profile import Nearest, Tool
 from ..tools.tool import PlaneTool
 
 FAR = 1e30
@@ -157,6 +157,11 @@ class ContactLaw:
     has_history: bool = False
     pulls: bool = False
     predictable: bool = False
+
+    @property
+    def profile(self) -> Tool | None:
+        """Tool of lines and arcs whose distance, less `shift`, is the distance of the law; None for other distances."""
+        return None
 
     @property
     def sticks(self) -> np.ndarray | bool:
@@ -353,6 +358,11 @@ class NormalLaw(ContactLaw):
         if x.ndim == 2:
             return self.nearest(x).distance
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
+
+    @property
+    def profile(self) -> Tool | None:
+        own = type(self).distance is NormalLaw.distance and type(self).nearest is NormalLaw.nearest
+        return self.tool if own and type(self.tool) is Tool else None
 
     def nearest(self, x: np.ndarray) -> Nearest:
         """Return the geometry of the tool nearest to given positions.

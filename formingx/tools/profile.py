@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._jit import address
 from ..errors import InputError, as_points, finite, instance, non_negative, pair, several
 from ..mesh.boxes import overlapping
 from .nearest import nearest
@@ -141,6 +142,11 @@ class Tool:
             x: points, shape (n, 2), length.
         """
         return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
+
+    @property
+    def compiled_table(self) -> tuple[int, int, Any]:
+        """Number of all pieces, number of lines, and address of the table of the pieces (`nearest`), for C."""
+        return len(self._table), self._lines, address(self._table)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """Return the tool shifted in its plane.

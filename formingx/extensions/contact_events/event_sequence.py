@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...contact.approach import gap_closures
+from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import FAR, ContactStatus
 from .reduced_contact import Points
 from .response import Response
@@ -156,6 +156,7 @@ class ContactEventSequence:
         self._free = [~face.law.touching(x, face.history) & (face.rule.area > 0) for face, x in zip(faces, start)]
         self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
+        self._sticks = [np.broadcast_to(face.law.friction == np.inf, len(x)) for face, x in zip(faces, start)]
         self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
         blank = np.zeros((0, start[0].shape[1]))
@@ -336,16 +337,10 @@ class ContactEventSequence:
         """Return the gap closure of point i of face f near an arc length, where the points have these positions."""
         closure = None
         if rank == self._comm.rank:
-            face, x, w = self._faces[f], positions[f][[i]], self._pieces[-1].speed[f][[i]]
-            law, ds = face.law.part([i]), 0.0
-            for _ in range(_SETTINGS.to_surface):
-                near = law.nearest(x + ds * w)
-                gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ w[0])
-                if abs(gap) < _SETTINGS.same_place * law.theta or not rate > 0:
-                    break
-                ds = max(ds - gap / rate, self._pieces[-1].begins - time)
-            closure = GapClosure(time + ds, rank, f, i, (x + ds * w)[0], float(face.rule.lengths[i]),
-                                 bool(np.isinf(np.ravel(law.friction)[0])))
+            face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
+            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.same_place, _SETTINGS.to_surface)
+            closure = GapClosure(time + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
+                                 bool(self._sticks[f][i]))
         return self._comm.bcast(closure, root=rank)
 
     def _settle(self, length: float) -> bool:
