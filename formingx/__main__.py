@@ -23,13 +23,13 @@ The header of THEIRS names its columns and may state units: pressure [psi]."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line.
+    """Run a command of `python3 -m formingx`.
 
     Args:
-        arguments: command line arguments; default the arguments of the process.
+        arguments: words of the command line after `formingx`; None: the words of this process.
 
     Returns:
-        The exit status: 0, or 2 for an argument that is not allowed.
+        Exit status of the process: 0, or 2 for an argument that is not allowed.
     """
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _overview() -> str:
-    """Return the list of commands and demos, which is printed if there are no arguments."""
+    """Return the list of commands and demos as text, which is printed if there are no arguments."""
     lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
              "  check SCRIPT               look over the scene of a script before it runs",
@@ -110,7 +110,7 @@ def _overview() -> str:
 
 
 def _folder() -> Path:
-    """Return the folder of the demos."""
+    """Return the folder of the repository that contains the demos."""
     return Path(__file__).resolve().parents[1] / "demos"
 
 
@@ -185,7 +185,7 @@ def _open(options: argparse.Namespace) -> None:
 
 
 def _states(record: report.Record) -> list[str]:
-    """Return lines of a table of states: evenly spaced ones, limit points, jumps, and the last of each stage."""
+    """Return the lines of a table of states: every few states, limit points, jumps, and the last of each stage."""
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -235,11 +235,11 @@ def _watch(options: argparse.Namespace) -> None:
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
-    """Return the two parts of a word OURS=THEIRS.
+    """Return the two parts of the value OURS=THEIRS of an option.
 
     Args:
-        option: name of the option, for messages.
-        word: the word.
+        option: name of the option, for error messages.
+        word: the value.
         both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
 
     Raises:

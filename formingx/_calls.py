@@ -43,9 +43,10 @@ class _WrongCall(InputError, TypeError):
 
 
 def explain(module: types.ModuleType) -> None:
-    """Make the public functions and classes of a module, and their methods, explain calls that fail.
+    """Make the public functions and classes of a module, and their methods, explain calls with wrong arguments.
 
-    module: a module of the package; the explained functions replace the plain ones.
+    A call that fails then raises an `InputError` that names the wrong argument and its type. The functions of `module`,
+    a module of the package, are replaced.
     """
     for name, item in list(vars(module).items()):
         if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):
@@ -59,7 +60,7 @@ def explain(module: types.ModuleType) -> None:
 
 
 def _explain_class(cls: type) -> None:
-    """Make the public methods of a class and of its bases explain calls that fail."""
+    """Make the public methods of a class and of its bases explain calls with wrong arguments."""
     _explained_classes.add(cls)
     for base in cls.__mro__:
         if base.__module__.startswith(_PACKAGE):
@@ -72,7 +73,7 @@ def _is_internal(cls: type) -> bool:
 
 
 def _explain_methods(cls: type) -> None:
-    """Make the constructor and the public methods that a class defines itself explain calls that fail."""
+    """Make the constructor and the public methods that a class itself defines explain calls with wrong arguments."""
     internal = _is_internal(cls)
     for name, method in list(vars(cls).items()):
         constructs = name in ("__init__", "__new__")
@@ -87,11 +88,11 @@ def _explain_methods(cls: type) -> None:
 
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
-    """Return a function that calls another and explains its errors by its arguments.
+    """Return a function that calls another function, and turns its errors into messages about wrong arguments.
 
     Args:
-        call: the function.
-        name: name of the function, for messages.
+        call: the function that is called.
+        name: name of the function, for error messages.
         skip: number of first arguments (self, cls) that a user does not write.
     """
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
@@ -166,13 +167,13 @@ def _parameter(p: inspect.Parameter) -> str:
 
 
 def _short(value: Any) -> str:
-    """Return a value as text of at most 100 characters."""
+    """Return a value as text, cut to 100 characters."""
     text = repr(value)
     return text if len(text) < 100 else text[:97] + "..."
 
 
 def _matches(value: Any, kind: Any) -> bool:
-    """Return True if a value fits an annotation, or if the annotation does not decide this."""
+    """Return True if a value fits a type annotation, or if the annotation cannot be checked."""
     origin, of = typing.get_origin(kind) or kind, typing.get_args(kind)
     if kind is Any or isinstance(kind, typing.TypeVar):
         return True
@@ -209,7 +210,7 @@ def _matches(value: Any, kind: Any) -> bool:
 
 
 def _alternatives(kinds: Sequence[Any]) -> list[Any]:
-    """Return the types of a union, with `ArrayLike`, which is a union itself, as one entry."""
+    """Return the types of a union. The types of `ArrayLike`, which is a union itself, become one entry."""
     array = set(typing.get_args(ArrayLike))
     return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 

@@ -28,22 +28,22 @@ _compiled: dict[str, Any] = {}
 
 
 def compile_form(form: Any) -> Any:
-    """Return a UFL form compiled by `_jit`, a form of DOLFINx that can be assembled."""
+    """Return the compiled DOLFINx form of a UFL form, which can be assembled; `_jit` compiles it."""
     return _compiled_by_jit(lambda: fem.form(form, jit_options=JIT_OPTIONS))
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
-    """Return a UFL expression compiled for points of the reference cell, shape (n, 2).
+    """Return the compiled DOLFINx `Expression` of a UFL expression at points of the reference cell, shape (n, 2).
 
-    The variables of the expression are numbered from 0 here. UFL numbers the variables of a process one after the
-    other, and these numbers are part of the signature, so that each problem would compile its own expression.
+    The variables of the expression are numbered from 0 here. UFL numbers all variables of a process consecutively, and
+    these numbers are part of the signature. So each problem would otherwise compile its own expression.
     """
     numbered = map_expr_dag(_Numbered(), expression)
     return _compiled_by_jit(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
 
 
 class _Numbered(MultiFunction):
-    """Replacement of the labels of UFL variables in an expression by labels with the numbers 0, 1, ..."""
+    """Map of a UFL expression to the same expression whose variables have labels with the numbers 0, 1, ..."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
 
 
 def _compiled_by_jit(compiled: Any) -> Any:
-    """Return the result of `compiled()`, a call of DOLFINx in which `_jit` compiles the form or expression.
+    """Return the result of `compiled()`, in which DOLFINx requests a form or an expression and `_jit` compiles it.
 
     Each form is compiled once in a process.
     """
@@ -130,7 +130,7 @@ def assemble_matrix(matrix: Any, form: Any, bcs: Any, diagonal: float = 1.0) -> 
     Args:
         matrix: the PETSc matrix.
         form: the compiled form.
-        bcs: boundary conditions of DOLFINx; the rows and columns of their unknowns receive no entries.
+        bcs: list of `dolfinx.fem.DirichletBC`; the rows and columns of their unknowns receive no other entries.
         diagonal: diagonal entry of these rows.
     """
     fem_petsc.assemble_matrix(matrix, form, bcs, diagonal)  # type: ignore[misc]  # types of another variant
@@ -139,8 +139,12 @@ def assemble_matrix(matrix: Any, form: Any, bcs: Any, diagonal: float = 1.0) -> 
 def assemble_vector(vector: Any, form: Any) -> Any:
     """Assemble a compiled linear form into a `la.Vector`, with the contributions of other ranks; collective.
 
+    Args:
+        vector: the vector; its entries are replaced.
+        form: the compiled form.
+
     Returns:
-        The owned entries, shape (n,): a view of the vector.
+        Locally owned entries, shape (n,), a view of the vector.
     """
     vector.array[:] = 0
     fem.assemble_vector(vector.array, form)

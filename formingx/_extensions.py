@@ -13,7 +13,7 @@ _FOLDER = Path(__file__).parent / "extensions"
 
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
-    """Provide a block that ends silently if it imports an extension whose folder is missing.
+    """Provide a context in which the import of an extension is skipped if the folder of the extension is missing.
 
     Raises:
         ModuleNotFoundError: another module is missing.
@@ -27,6 +27,6 @@ def optional() -> Iterator[None]:
 
 
 def add(module: types.ModuleType, *objects: Any) -> None:
-    """Add functions or classes of an extension to a module, each as the attribute of its own name."""
+    """Add functions or classes of an extension to a module, as attributes with their own names."""
     for found in objects:
         setattr(module, found.__name__, found)

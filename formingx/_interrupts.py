@@ -7,7 +7,7 @@ _usual = sys.excepthook
 
 
 def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
-    """Print an uncaught KeyboardInterrupt as one line, other errors as before (arguments of `sys.excepthook`)."""
+    """Print an uncaught KeyboardInterrupt as one line, and other errors as usual; a `sys.excepthook`."""
     if isinstance(error, KeyboardInterrupt):
         print("interrupted while formingx was imported", file=sys.stderr)
     else:
@@ -15,7 +15,7 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def restore_excepthook() -> None:
-    """Restore `sys.excepthook` when the import of the package is complete."""
+    """Restore the `sys.excepthook` that was in place before the import of the package."""
     if sys.excepthook is _one_line:
         sys.excepthook = _usual
 

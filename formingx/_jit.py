@@ -40,16 +40,17 @@ NULL = _FFI.NULL
 
 
 def supported(jit_options: dict[str, Any]) -> bool:
-    """Return True if this module can compile forms; otherwise DOLFINx does.
+    """Return True if this module can compile forms; otherwise DOLFINx compiles them.
 
-    FFCx must be of version 0.9, there must be a C compiler, and no option may concern the build by distutils.
+    FFCx must be of version 0.9, and a POSIX system must have a C compiler. The options of DOLFINx for debugging and for
+    verbose builds must be off.
     """
     return (ffcx.__version__.startswith("0.9.") and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
 
 
 def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) -> str:
-    """Return the name of the library of a form, a digest of everything on which its machine code depends.
+    """Return the name of the library of a form: a digest of the form, the options and the compiler.
 
     Args:
         item: UFL form, or (UFL expression, points).
@@ -62,7 +63,7 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
-    """Return compiled forms and expressions; rank 0 builds the missing ones by one call of the C compiler. Collective.
+    """Return compiled forms and expressions; rank 0 builds those that the cache lacks, in one library. Collective.
 
     Args:
         comm: MPI communicator.
@@ -94,7 +95,7 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
-    """Return the compiled objects by their keys, after building those without a library in the cache `folder`.
+    """Return {key: compiled object} of all items; build those that have no library in the cache `folder`.
 
     Raises:
         RuntimeError: the compiler failed, or a new library cannot be loaded.
@@ -116,7 +117,7 @@ def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str,
 
 
 def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
-    """Return (object of FFCx, namespace, (None, None)) from the library of a form, or None if it cannot be loaded.
+    """Return (object of FFCx, namespace, (None, None)) from the library of a form; None if it cannot be loaded.
 
     Args:
         ffi: declarations of FFCx.
@@ -136,7 +137,7 @@ def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
 
 @functools.cache
 def _declarations(scalar: str) -> cffi.FFI:
-    """Return the cffi interface with the structures of FFCx for a scalar type, such as "float64".
+    """Return the cffi interface with the declarations of the C structures of FFCx for a scalar type, such as "float64".
 
     Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them.
     """
@@ -148,7 +149,7 @@ def _declarations(scalar: str) -> cffi.FFI:
 
 
 def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
-    """Build one library of all items, with a link in the cache `folder` under the key of each."""
+    """Build one library with all items, and link it in the cache `folder` under the key of each item."""
     code = "\n".join(ffcx.compiler.compile_ufl_objects([item], prefix=name, options=form_options)[1]
                      for name, item in items.items())
     files = [folder / f"{name}.so" for name in items]
@@ -168,10 +169,10 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
 
 
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
-    """Return the file of a library of C functions, compiled if the cache does not contain it.
+    """Return the path of a shared library of C functions; compile it if the cache does not contain it.
 
     Args:
-        name: first part of the file name.
+        name: first part of the file name of the library.
         code: C source.
         flags: flags of the compiler.
 
@@ -194,15 +195,15 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 
 @functools.cache
 def functions(name: str, header: str, code: str) -> Any:
-    """Return functions in C as attributes of an object, compiled at the first call.
+    """Return an object whose attributes are functions in C, compiled at the first call.
 
     Args:
-        name: name of the library in the cache.
-        header: their declarations.
-        code: their definitions.
+        name: first part of the file name of their library in the cache.
+        header: declarations of the functions.
+        code: definitions of the functions.
 
     Raises:
-        RuntimeError: the C compiler failed. It could not compile forms, either.
+        RuntimeError: the C compiler failed.
     """
     ffi = cffi.FFI()
     ffi.cdef(header)
@@ -210,12 +211,12 @@ def functions(name: str, header: str, code: str) -> Any:
 
 
 def address(values: Any) -> Any:
-    """Return the address of an array of floats for a function in C; a copy is passed if it is not contiguous."""
+    """Return a pointer to an array of floats for a function in C; to a copy if the array is not contiguous."""
     return _FFI.from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
 
 
 def address_of_integers(values: Any) -> Any:
-    """Return the address of an array of integers (long in C), as `address` does of floats."""
+    """Return a pointer to an array of integers (long in C); to a copy if the array is not contiguous."""
     return _FFI.from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
 
 
@@ -239,7 +240,7 @@ def compile_c(command: list[str], code: str) -> None:
 
 
 def _command(jit_options: dict[str, Any]) -> list[str]:
-    """Return the command that compiles C from standard input to a library, without the option for the file name."""
+    """Return the words of the command that compiles C from standard input to a library, without the file name."""
     flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), *shlex.split(os.environ.get("CFLAGS", "")),
              "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
     libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]
@@ -259,14 +260,14 @@ def _compiler() -> tuple[str, ...] | None:
 
 @functools.cache
 def _compiler_id() -> str:
-    """Return path, size and date of the C compiler as text; they change with its version."""
+    """Return path, size and date of the C compiler as text, which changes with its version."""
     program = Path(shutil.which((_compiler() or ("cc",))[0]) or "").resolve()
     status = program.stat()
     return f"{program} {status.st_size} {status.st_mtime_ns}"
 
 
 def _writable(folder: Path) -> Path:
-    """Return the folder in which libraries are built: the cache `folder`, or a temporary one if it is read-only."""
+    """Return a folder for new libraries: the cache `folder`, or a temporary folder if the cache is read-only."""
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     return folder if os.access(folder, os.W_OK) else Path(_temporary_folder().name)
@@ -280,9 +281,10 @@ def _temporary_folder() -> tempfile.TemporaryDirectory:
 
 @contextlib.contextmanager
 def _locked(folder: Path, name: str) -> Iterator[None]:
-    """Lock the build of form `name` in a folder for a block, so that a second process finds the library of the first.
+    """Lock the build of the form `name` in a folder within a block.
 
-    The lock ends with its process. On a file system without locks both processes build.
+    A second process waits, and then finds the library of the first. The lock ends with its process. On a file
+    system without locks both processes build.
     """
     import fcntl
     file = folder / f"{name}.lock"

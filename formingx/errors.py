@@ -26,12 +26,12 @@ class InputError(ValueError):
 
 
 class ConvergenceError(RuntimeError):
-    """Failure of a run that could not be continued.
+    """Failure of a run that did not reach its target.
 
     Args:
         message: the message.
         path: path computed so far.
-        diagnosis: cause of the failure.
+        diagnosis: cause of the failure, which is added to the message, or None.
 
     Attributes:
         path: path computed so far (`formingx.Path`), with a converged last state, or None.
@@ -50,7 +50,7 @@ class ConvergenceError(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """End of a run by Ctrl-C; uncaught, it prints one line.
+    """Interruption of a run by Ctrl-C; if it is not caught, one line is printed in place of a traceback.
 
     Args:
         message: the message.
@@ -72,7 +72,7 @@ _usual: list[Any] = []
 
 
 def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
-    """Print an uncaught `Interrupted` as one line, other errors as before (arguments of `sys.excepthook`)."""
+    """Print an uncaught `Interrupted` as one line, and other errors as usual; a `sys.excepthook`."""
     if isinstance(error, Interrupted):
         print(error, file=sys.stderr)
     else:
@@ -80,10 +80,10 @@ def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
 
 
 def positive(name: str, value: Any) -> float:
-    """Return a positive number as a float.
+    """Return an argument that must be a positive number as a float.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:
@@ -96,10 +96,10 @@ def positive(name: str, value: Any) -> float:
 
 
 def non_negative(name: str, value: Any) -> float:
-    """Return a non-negative number as a float.
+    """Return an argument that must be a number of 0 or more as a float.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:
@@ -112,10 +112,10 @@ def non_negative(name: str, value: Any) -> float:
 
 
 def fraction(name: str, value: Any) -> float:
-    """Return a number between 0 and 1, neither 0 nor 1, as a float.
+    """Return an argument that must lie in the open interval (0, 1) as a float.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:
@@ -128,10 +128,10 @@ def fraction(name: str, value: Any) -> float:
 
 
 def finite(name: str, value: Any) -> float:
-    """Return a finite number as a float.
+    """Return an argument that must be a finite number as a float.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:
@@ -152,10 +152,10 @@ def finite(name: str, value: Any) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """Return a positive integer as an int.
+    """Return an argument that must be a positive integer as an int.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:
@@ -168,10 +168,10 @@ def count(name: str, value: Any) -> int:
 
 
 def instance(name: str, value: Any, kind: Any, what: str) -> Any:
-    """Return an argument that is of a given type.
+    """Return an argument, which must be of a given type.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
         kind: the type, or a union of types.
         what: description of the type, for the message.
@@ -185,10 +185,10 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
 
 
 def several(name: str, values: Any, what: str) -> list[Any]:
-    """Return a sequence as a list.
+    """Return an argument that must be a sequence as a list.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the argument.
         what: description of the items, for the message.
 
@@ -202,10 +202,10 @@ def several(name: str, values: Any, what: str) -> list[Any]:
 
 
 def pair(name: str, values: Any) -> tuple[float, float]:
-    """Return two finite numbers as floats.
+    """Return an argument that must be two finite numbers as floats.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the argument.
 
     Raises:
@@ -216,10 +216,10 @@ def pair(name: str, values: Any) -> tuple[float, float]:
 
 
 def triple(name: str, values: Any) -> tuple[float, float, float]:
-    """Return three finite numbers as floats.
+    """Return an argument that must be three finite numbers as floats.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the argument.
 
     Raises:
@@ -230,10 +230,10 @@ def triple(name: str, values: Any) -> tuple[float, float, float]:
 
 
 def direction(name: str, values: Any) -> np.ndarray:
-    """Return a direction as a unit vector, shape (3,).
+    """Return an argument with three components of a direction as a unit vector, shape (3,).
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: three numbers.
 
     Raises:
@@ -246,13 +246,13 @@ def direction(name: str, values: Any) -> np.ndarray:
 
 
 def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
-    """Return the n finite numbers of an argument as floats.
+    """Return an argument that must be n finite numbers as floats.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the argument.
-        n: number of numbers.
-        what: description of the argument, for the message.
+        n: required length of the argument.
+        what: description of the argument, for the error message.
 
     Raises:
         InputError: the argument is not n finite numbers.
@@ -264,10 +264,10 @@ def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
 
 
 def finite_array(name: str, values: Any) -> np.ndarray:
-    """Return an array of finite floats, of any shape.
+    """Return an argument that must be finite numbers as an array of floats, of the same shape.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the argument.
 
     Raises:
@@ -283,10 +283,10 @@ def finite_array(name: str, values: Any) -> np.ndarray:
 
 
 def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
-    """Return points as an array of floats, shape (n, components).
+    """Return an argument with coordinates of points as an array of floats, shape (n, components).
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         values: the points, shape (..., components).
         components: number of coordinates.
 
@@ -303,7 +303,7 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 
 
 def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the values of a user's function of arrays, as floats of their shape.
+    """Call a user's function of arrays, and return its values as floats, of the shape of the arrays.
 
     Args:
         name: name of the function, for the message.
@@ -334,7 +334,7 @@ def file_path(name: str, value: Any) -> Path:
     """Return the name of a file or a folder as a path.
 
     Args:
-        name: name of the argument, for the message.
+        name: name of the argument, for the error message.
         value: the argument.
 
     Raises:

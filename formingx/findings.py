@@ -28,9 +28,9 @@ class Finding(NamedTuple):
 
     Attributes:
         severity: "serious", "warning" or "note" (`SEVERITIES`).
-        about: part of the scene or of the result that the finding is about.
-        text: description of the fault, with numbers and its place.
-        advice: advice on how to mend it, or "".
+        about: part of the scene or of the result to which the finding refers, such as "mesh".
+        text: description of the fault, with its numbers and position.
+        advice: advice on how to mend the fault, or "".
     """
 
     severity: Severity
@@ -50,7 +50,7 @@ class Check(Protocol[Subject]):
     """
 
     def __call__(self, subject: Subject, /) -> Iterable[Finding]:
-        """Return the findings on a subject; collective."""
+        """Return or yield the findings on a subject; collective."""
 
 
 _registered: dict[Moment, list[Check[Any]]] = {"scene": [], "start": [], "end": [], "failure": []}
@@ -75,11 +75,11 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
 
 
 def findings_at(moment: Moment, subject: Any) -> list[Finding]:
-    """Return the findings of all checks that are registered for a moment, the worst first; collective.
+    """Call all checks that are registered for a moment, and return their findings, the worst first; collective.
 
     Args:
-        moment: the moment, one of `Moment`.
-        subject: subject of the checks (`Check`).
+        moment: "scene", "start", "end" or "failure" (`Moment`).
+        subject: subject of the checks, such as the `Path` after a run (`Check`).
     """
     return worst_first(finding for check in _registered[moment] for finding in check(subject))
 
@@ -90,7 +90,7 @@ def worst_first(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def without_notes(findings: Iterable[Finding]) -> list[Finding]:
-    """Return those findings that are more severe than notes, in the given order."""
+    """Return the warnings and serious findings among some findings, in the given order."""
     return [finding for finding in findings if finding.severity != "note"]
 
 

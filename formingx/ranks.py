@@ -6,7 +6,7 @@ import numpy as np
 
 
 def gathered(comm: Any, own: Any) -> np.ndarray:
-    """Return an array with the rows of all ranks, one rank after the other; collective.
+    """Return an array with the rows of all ranks, in the order of the ranks; collective.
 
     Args:
         comm: MPI communicator.

@@ -13,10 +13,10 @@ from .scene.scene import Scene
 
 
 class RunExtension:
-    """Extension of a run: `formingx.Remesh` for `trace(remesh=)`, `formingx.instability` for `trace(stop_at=)`.
+    """Base class of extensions that take part in a run: `formingx.Remesh` and the result of `formingx.instability`.
 
     Attributes:
-        argument: argument of `formingx.trace` that takes the extension, "remesh" or "stop_at".
+        argument: name of the argument of `formingx.trace` for the extension, "remesh" or "stop_at".
     """
 
     argument = ""
@@ -34,9 +34,9 @@ class RunExtension:
         """
 
     def attach(self, path: Path) -> None:
-        """Register functions in `path.record.hooks` (`RunHooks`), which the run calls.
+        """Register functions that the run calls in `path.record.hooks` (`RunHooks`).
 
-        A function that sets `path.record.ended` to a text, the reason, ends the run.
+        Such a function ends the run if it sets `path.record.ended` to the reason, as text.
 
         Args:
             path: the path that the run continues.
@@ -55,11 +55,11 @@ class MeshAdaptation(Protocol):
         """
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
-        """Return the adapted mesh.
+        """Return a mesh of the same body that is adapted to the states of a run.
 
         Args:
             path: the first run.
-            options: arguments of `formingx.mesh.adapted`; their names are checked before.
+            options: {name: value} of arguments of `formingx.mesh.adapted`; the caller has checked the names.
         """
 
 
@@ -69,11 +69,11 @@ def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
     Args:
         caller: name of the calling function, for messages.
         argument: "remesh" or "stop_at".
-        given: the argument.
-        what: description of the extension, for the message.
+        given: value of the argument.
+        what: description of the required extension, for the error message.
 
     Raises:
-        InputError: the argument is no extension, or one for another argument.
+        InputError: the value is no extension, or an extension for the other argument.
     """
     if not isinstance(given, RunExtension) or given.argument != argument:
         raise InputError(f"{caller}: {argument} = {given!r}: must be {what}")

@@ -30,16 +30,19 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
 
     Args:
         caller: name of the calling function, `trace` or `Process`, for messages.
-        adapt_mesh: argument of this function: True, or {argument of `mesh.adapted`: value}.
-        start: argument of this function; must be None.
-        resume: argument of this function; must be False.
+        adapt_mesh: argument of the calling function: True, or {argument of `mesh.adapted`: value}.
+        start: argument of the calling function; must be None.
+        resume: argument of the calling function; must be False.
         scene: the scene on the first mesh.
         checkpoint: folder of the checkpoint of the second run, or None.
         run: function of a scene and a checkpoint that returns the path of a run.
 
+    Returns:
+        Path of the second run; `Path.pilot` is the path of the first.
+
     Raises:
         InputError: an argument is not allowed.
-        ConvergenceError: a run failed; a first run of three states or more is used nevertheless.
+        ConvergenceError: the second run failed, or the first run failed with fewer than three states.
     """
     if start is not None or resume:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
@@ -96,9 +99,9 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     Args:
         curve: solver of the states of the new path.
         start: the other path, or the state; None to begin without states.
-        columns: {name: quantity} of additional columns.
+        columns: {name: quantity} of additional columns, the argument `record` of `trace`.
         allow_inadmissible: argument of `trace`.
-        found: findings of the checks before the run, which are logged here.
+        found: findings of the checks before the run, which this function logs.
         timed: True if the process time is a column.
     """
     record = Record(curve.problem, curve)
@@ -113,7 +116,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
 
 
 def write_checkpoints(path: Path, checkpoint: Any) -> None:
-    """Make a run write a checkpoint after each step and at its end.
+    """Register functions that write a checkpoint after each step and at the end of a run.
 
     Args:
         path: path of the run.
@@ -126,14 +129,14 @@ def write_checkpoints(path: Path, checkpoint: Any) -> None:
 
 
 def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
-    """Return the path that a run continues, or None: `start`, or with `resume` the path in the checkpoint.
+    """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
 
     Args:
         caller: name of the calling function, `trace` or `Process`, for messages.
-        resume: argument of this function, True or False.
-        checkpoint: argument of this function, a folder or None.
+        resume: argument of the calling function, True or False.
+        checkpoint: argument of the calling function, a folder or None.
         scene: the scene.
-        start: argument of this function, a path or None.
+        start: argument of the calling function, a path or None.
 
     Raises:
         InputError: `resume` is given together with `start`, or without a checkpoint.
@@ -147,9 +150,9 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
 
 @contextlib.contextmanager
 def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
-    """Attach the computed path to the errors of a run within a block, and call the functions for the end of the run.
+    """Attach the computed path to the errors of a run within a block.
 
-    These functions are `path.record.hooks.on_end`.
+    At the end of the block the functions `path.record.hooks.on_end` are called.
 
     Args:
         checkpoint: folder of the checkpoint, for messages; or None.
@@ -199,11 +202,11 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 
 def _call_listeners(path: Path, failure: str, found: list[Finding]) -> None:
-    """Call the functions for the end of a run.
+    """Call the functions that are registered for the end of a run, `path.record.hooks.on_end`.
 
     Args:
         path: path of the run.
-        failure: error message, or "".
+        failure: error message of a failed run, or "".
         found: findings of the checks after the run.
     """
     for listener in path.record.hooks.on_end:

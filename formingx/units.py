@@ -22,11 +22,11 @@ _COORDINATES = {*"rzxyRZXY", "r_bottom", "z_bottom", "r_top", "z_top", "sag"}
 
 @dataclass(frozen=True)
 class Units:
-    """Units of the numbers of a script.
+    """Names of the units of the numbers of a script, for labels; numbers are not converted.
 
     Attributes:
         length: "m", "cm", "mm", "um", "in" or "ft"; None if not given.
-        stress: "Pa", "kPa", "MPa", "GPa", "N/mm2", "bar", "atm", "psi" or "kg/cm2"; None if not given.
+        stress: "Pa", "kPa", "MPa", "GPa", "N/mm2", "bar", "atm", "psi", "kg/cm2" or "kgf/cm2"; None if not given.
         time: name of the unit of process time.
 
     Raises:
@@ -53,17 +53,17 @@ class Units:
 
     @property
     def area(self) -> str:
-        """Unit of areas; "" if the unit of length is not given."""
+        """Unit of areas, such as "mm2"; "" if the unit of length is not given."""
         return self._whole(f"{self.length}2" if self.length else "")
 
     @property
     def volume(self) -> str:
-        """Unit of volumes; "" if the unit of length is not given."""
+        """Unit of volumes, such as "mm3"; "" if the unit of length is not given."""
         return self._whole(f"{self.length}3" if self.length else "")
 
     @property
     def weight(self) -> str:
-        """Unit of weights, "g"."""
+        """Unit of weights, "g"; in plane strain per unit depth, such as "g/mm"."""
         return self._whole("g")
 
     @property
@@ -90,7 +90,7 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """Return the unit of a quantity of the whole body, such as its volume; in plane strain it is per depth."""
+        """Return a unit of an integral over the body, such as its volume; in plane strain per unit of depth."""
         return unit
 
     @property
@@ -131,7 +131,7 @@ class Units:
 
         Args:
             column: name of the column.
-            words: text in place of the name.
+            words: text in place of the name; "" for the name.
         """
         unit = self.unit_of(column)
         return (words or column.replace("_", " ")) + (f", {unit}" if unit else "")
@@ -149,7 +149,7 @@ class Units:
         """Return the unit of stress times a power of length.
 
         Args:
-            names: {named unit: its size in SI units}; a unit of equal size gives its name.
+            names: {name of a unit: size in SI units}; the name of a unit of equal size is preferred.
             power: power of length.
         """
         if not (self.length and self.stress):
@@ -163,7 +163,7 @@ class _UnitsPerDepth(Units):
     """Units of the numbers of a script in plane strain, per unit depth."""
 
     def _whole(self, unit: str) -> str:
-        """Return a unit of the whole body divided by the unit of length."""
+        """Return a unit of an integral over the body, divided by the unit of length."""
         return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 
