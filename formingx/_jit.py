@@ -63,7 +63,7 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
-    """Return compiled forms and expressions; rank 0 builds those that the cache lacks, in one library. Collective.
+    """Return compiled forms and expressions; rank 0 builds all missing ones as one library. Collective.
 
     Args:
         comm: MPI communicator.
@@ -95,7 +95,7 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
-    """Return {key: compiled object} of all items; build those that have no library in the cache `folder`.
+    """Return {key: compiled object} of all items; build the missing libraries in the cache `folder`.
 
     Raises:
         RuntimeError: the compiler failed, or a new library cannot be loaded.

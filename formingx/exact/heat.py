@@ -167,11 +167,11 @@ def sheet_on_tool(sheet: Slab, tool: Slab, conductance: float, start: float, too
 def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
     r"""Return m inverse Laplace transforms at a time t > 0, shape (m,), by the fixed Talbot method with n points.
 
-    .. math::
-        f(t) = \frac{r}{n} \left\{\tfrac{1}{2} e^{r t} \hat f(r) + \sum_{k=1}^{n-1} \mathrm{Re}
-        \left[e^{s_k t} \hat f(s_k) \, (1 + i \sigma_k)\right]\right\}, \quad
-        s_k = r \theta_k (\cot\theta_k + i), \quad \sigma_k = \theta_k + (\theta_k \cot\theta_k - 1) \cot\theta_k,
-        \quad \theta_k = \frac{k \pi}{n}, \quad r = \frac{2 n}{5 t}
+    .. math:: f(t) = \frac{r}{n} \left[\frac{1}{2} e^{r t} \hat f(r) + \sum_{k=1}^{n-1} \Re (w_k \hat f(s_k))\right]
+
+    .. math:: s_k = r \theta_k (\cot\theta_k + i), \quad w_k = e^{s_k t} (1 + i \sigma_k), \quad r = \frac{2 n}{5 t}
+
+    .. math:: \sigma_k = \theta_k + (\theta_k \cot\theta_k - 1) \cot\theta_k, \quad \theta_k = \frac{k \pi}{n}
 
     (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms.
     """

@@ -29,8 +29,8 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
     .. math:: \frac{dw_i}{dt} = \frac{d \ln l_i}{dt} - \frac{f_i(w)}{2 \tau}
 
-    Here :math:`l_i` is the principal stretch of the body, w_i the elastic strain of a branch, tau its relaxation time
-    and f the flow law of the material, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
+    Here :math:`l_i` is the principal stretch of the body, w_i the elastic strain and tau the relaxation time of a
+    branch. The flow law of the material is f, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
 
     Args:
         flow: flow law f, a function from w to f(w), both of shape (branches, 3), dimensionless.

@@ -305,7 +305,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     called `axis` if both points have R = 0.
 
     Args:
-        inner: corners (R, Z) of the inner face, shape (n, 2), n at least 2, length.
+        inner: corners (R, Z) of the inner face, shape (n, 2), n > 1, length.
         outer: corners (R, Z) of the outer face, shape (n, 2), length.
         elements: (number between successive corners, division of the layers as in `disc`). The first entry may be a
             list of n - 1 numbers, one for each interval.
