@@ -152,13 +152,16 @@ def _demo(words: list[str]) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Print the findings on the first scene of a script (command `check`)."""
+    """Run the command `check`: print the findings on the first scene of the script `options.script`."""
     from .checks.scripts import check_script
     _say(str(check_script(options.script, options.arguments)))
 
 
 def _compare(options: argparse.Namespace) -> None:
-    """Compare two curves, print the differences, and write picture and pairs (command `compare`)."""
+    """Run the command `compare`: print the differences of two curves, and write a picture and a table of pairs.
+
+    `options` has the files `ours` and `theirs`, their `columns` and `units`, and the folder `out`.
+    """
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
     units: dict[str, float | str] = {}
@@ -176,7 +179,7 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _open(options: argparse.Namespace) -> None:
-    """Print scene, states and end of the run in a checkpoint (command `open`)."""
+    """Run the command `open`: print scene, states and end of the run in the checkpoint `options.folder`."""
     about, states = checkpoint_data.contents(options.folder)
     record = report.of_checkpoint(about, states)
     width = max(map(len, record.summary))
@@ -185,7 +188,10 @@ def _open(options: argparse.Namespace) -> None:
 
 
 def _states(record: report.Record) -> list[str]:
-    """Return the lines of a table of states: every few states, limit points, jumps, and the last of each stage."""
+    """Return the lines of a table of states of a recorded run.
+
+    They show limit points, jumps, the last state of each stage, and evenly spaced other states.
+    """
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -199,7 +205,7 @@ def _states(record: report.Record) -> list[str]:
 
 
 def _report(options: argparse.Namespace) -> None:
-    """Write the report of a checkpoint to an HTML file (command `report`)."""
+    """Run the command `report`: write the report of the checkpoint `options.folder` to an HTML file."""
     out = options.out or Path(options.folder) / "report.html"
     record = report.of_checkpoint(*checkpoint_data.contents(options.folder))
     report.write(record, out, options.title, None, MPI.COMM_WORLD, _units(options.units), options.density,
@@ -208,7 +214,7 @@ def _report(options: argparse.Namespace) -> None:
 
 
 def _units(given: str | None) -> Units:
-    """Return the units of the option --units, such as mm,MPa; None gives units without names.
+    """Return the units of the value of the option --units, such as mm,MPa; for None units without names.
 
     Raises:
         InputError: the option has another form.
@@ -222,12 +228,12 @@ def _units(given: str | None) -> Units:
 
 
 def _status(options: argparse.Namespace) -> None:
-    """Print the status of a run with a checkpoint (command `status`)."""
+    """Run the command `status`: print the status of the run with the checkpoint `options.folder`."""
     _say(str(status.of_folder(options.folder)))
 
 
 def _watch(options: argparse.Namespace) -> None:
-    """Print the status of a run with a checkpoint after each new state (command `watch`)."""
+    """Run the command `watch`: print the status of the run with the checkpoint `options.folder` at each new state."""
     if not checkpoint_data.begun(options.folder):
         _say(f"waiting up to {options.patience:g} s for a run to write its first state to {options.folder}")
     for found in status.watch(options.folder, options.every, options.patience):

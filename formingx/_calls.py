@@ -150,7 +150,7 @@ def _fault(call: Callable, name: str, skip: int, args: tuple, given: dict[str, A
 
 
 def _typo(signature: inspect.Signature, given: Mapping[str, Any]) -> str:
-    """Return the unknown keyword arguments of a call, each with the most similar known name, as text; or ""."""
+    """Return the keyword arguments `given` that a signature lacks, each with the most similar name, as text; or ""."""
     kinds = {p.kind for p in signature.parameters.values()}
     unknown = [] if inspect.Parameter.VAR_KEYWORD in kinds else [n for n in given if n not in signature.parameters]
     close = {n: difflib.get_close_matches(n, [p for p in signature.parameters if p not in given], 1) for n in unknown}
@@ -173,7 +173,7 @@ def _short(value: Any) -> str:
 
 
 def _matches(value: Any, kind: Any) -> bool:
-    """Return True if a value fits a type annotation, or if the annotation cannot be checked."""
+    """Return True if a value fits the type annotation `kind`, or if the annotation cannot be checked."""
     origin, of = typing.get_origin(kind) or kind, typing.get_args(kind)
     if kind is Any or isinstance(kind, typing.TypeVar):
         return True
@@ -210,7 +210,7 @@ def _matches(value: Any, kind: Any) -> bool:
 
 
 def _alternatives(kinds: Sequence[Any]) -> list[Any]:
-    """Return the types of a union. The types of `ArrayLike`, which is a union itself, become one entry."""
+    """Return the types `kinds` of a union, in which `ArrayLike`, a union itself, becomes one entry."""
     array = set(typing.get_args(ArrayLike))
     return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
 
@@ -224,7 +224,7 @@ def _is_numeric(value: Any) -> bool:
 
 
 def _described(kind: Any) -> str:
-    """Return an annotation as text for messages, such as "a number or None"."""
+    """Return the type annotation `kind` as text for error messages, such as "a number or None"."""
     origin, of = typing.get_origin(kind) or kind, [k for k in typing.get_args(kind) if k is not Ellipsis]
     if kind is np.ndarray or kind == ArrayLike:
         return "numbers"

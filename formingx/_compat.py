@@ -57,9 +57,13 @@ class _Numbered(MultiFunction):
 
 
 def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
-    """Compile UFL forms by one call of the compiler, which takes less time than a call for each; collective.
+    """Compile UFL forms by one call of the compiler, which takes less time than a call for each form; collective.
 
     `compile_form` then finds the compiled forms.
+
+    Args:
+        comm: MPI communicator.
+        forms: the UFL forms, the same on all ranks.
     """
     options, form_options = jit.get_options(JIT_OPTIONS), ffcx.get_options({"scalar_type": default_scalar_type})
     if not _jit.supported(options):

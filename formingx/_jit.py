@@ -42,8 +42,10 @@ NULL = _FFI.NULL
 def supported(jit_options: dict[str, Any]) -> bool:
     """Return True if this module can compile forms; otherwise DOLFINx compiles them.
 
-    FFCx must be of version 0.9, and a POSIX system must have a C compiler. The options of DOLFINx for debugging and for
-    verbose builds must be off.
+    FFCx must be of version 0.9, and a POSIX system must have a C compiler.
+
+    Args:
+        jit_options: options of `dolfinx.jit`; `cffi_debug` and `cffi_verbose` must be off.
     """
     return (ffcx.__version__.startswith("0.9.") and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
@@ -211,12 +213,12 @@ def functions(name: str, header: str, code: str) -> Any:
 
 
 def address(values: Any) -> Any:
-    """Return a pointer to an array of floats for a function in C; to a copy if the array is not contiguous."""
+    """Return a pointer to the array `values` of floats for a function in C; to a copy if it is not contiguous."""
     return _FFI.from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
 
 
 def address_of_integers(values: Any) -> Any:
-    """Return a pointer to an array of integers (long in C); to a copy if the array is not contiguous."""
+    """Return a pointer to the array `values` of integers (long in C); to a copy if it is not contiguous."""
     return _FFI.from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
 
 

@@ -167,7 +167,10 @@ class Body:
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """Return the differences T of the Cauchy stresses in directions 1 and 3 at all points, shape (n,), stress."""
+        """Return the differences T of the Cauchy stresses in directions 1 and 3 at all points, shape (n,), stress.
+
+        s: degree of freedom; w: elastic strains, shape (n, branches, 3).
+        """
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu

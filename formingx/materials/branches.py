@@ -107,7 +107,7 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
 
 
 def _pieces(times: np.ndarray, values: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield the indices (first, last) of the end points of each part of a table in which the values change linearly."""
+    """Yield the indices (first, last) of the ends of each interval of `times` in which `values` change linearly."""
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.diff(values) / np.diff(times)
     scale = 1e-9 * np.abs(rates[np.isfinite(rates)]).max(initial=0)

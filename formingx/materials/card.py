@@ -58,7 +58,7 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
 
 
 def _shift(material: Any, temperature: float) -> float:
-    """Return the shift factor aT at a temperature: relaxation times are aT times those at the reference temperature."""
+    """Return the shift factor aT of a material at a temperature, by which its relaxation times are multiplied."""
     law = material.parameters.get("aT")
     return float(law(temperature)) if isinstance(law, OfTemperature) else 1.0
 
@@ -66,7 +66,8 @@ def _shift(material: Any, temperature: float) -> float:
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
     """Return rows (quantity, value) of a table for a material at one temperature: moduli and limits of stretch.
 
-    `name` is the temperature as text, "" if none is given; `shift` is the factor of the relaxation times at it.
+    `name` is the temperature as text, or "". `shift` is the factor of the relaxation times at this temperature. `unit`
+    and `unit_of_time` are the units of stress and time.
     """
     def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
@@ -96,7 +97,8 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
     """Return a PNG image, base64-encoded, with curves of true stress against stretch in the three tests of `MODES`.
 
-    `cases` holds (temperature as text, material, factor of the relaxation times) for each temperature.
+    `cases` has (temperature as text, material, factor of the relaxation times) for each temperature. `rates` are Hencky
+    rates; it is empty for a material that does not relax. `unit` and `unit_of_time` are for labels.
     """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):

@@ -186,7 +186,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
-        """Return the margins of three criteria at the stretches l of a test, shape (3, n): positive where one holds.
+        """Return the margins of three criteria, positive where they hold, at stretches l of a test, shape (3, n).
 
         The first is 1 where the stress is finite, else not a number. The second is l^2 dP/dl, the third the smaller
         eigenvalue of the Hessian of W in the logarithmic strains. Both are divided by the size of Hessian and stress.
@@ -248,7 +248,7 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """Return two programs: the 3 first derivatives of an energy W by the stretches, and these with the 6 second ones.
+    """Return programs for the 3 first derivatives of an energy W by the stretches, and for these with 6 second ones.
 
     W is a UFL expression of `_STRETCHES` and of the first n entries of `_CONSTANTS`. The second derivatives follow in
     the order 11, 12, 13, 22, 23, 33.

@@ -136,7 +136,9 @@ class Relaxing(Material):
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
-        """Return the nominal stress after complete relaxation in a test, shape of `stretches`; 0 if all stress relaxes.
+        """Return the nominal stress after complete relaxation in the test `mode`, of the shape of `stretches`, stress.
+
+        It is 0 if all stress relaxes.
         """
         return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 

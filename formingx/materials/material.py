@@ -337,7 +337,7 @@ class Material(Energies):
             The materials.
 
         Raises:
-            InputError: the class defines none.
+            InputError: the class defines no initial constants.
         """
         raise InputError(f"fit: {cls.__name__} has no first guess of its own: give a material with constants near the"
                          f" wanted ones instead of the class")
@@ -408,7 +408,7 @@ class Material(Energies):
             raise InputError(f"{self} is not isotropic: its stresses depend on the direction that is pulled")
 
     def _beyond(self, mode: str, stretch: float) -> str:
-        """Return the error message for a stretch in a test that is beyond the limit of the material."""
+        """Return the error message for a stretch in the test `mode` that is beyond the limit of the material."""
         k = MODES[mode]
         if math.isfinite(self.largest_I1):
             I1 = stretch**2 + stretch**(2 * k) + stretch**(-2 - 2 * k)

@@ -87,7 +87,7 @@ class RelaxingMaterial(Relaxing):
 
     @property
     def internal(self) -> dict[str, tuple]:  # type: ignore[override]  # read only here
-        """Internal variables, {name: entries (11, 22, 12, 33) of the tensor in the reference configuration}."""
+        """Internal variables, symmetric tensors: {name: entries (11, 22, 12, 33) in the reference configuration}."""
         return dict.fromkeys(self.tensor_powers, IDENTITY)
 
     @property
@@ -330,14 +330,16 @@ class RelaxingMaterial(Relaxing):
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
         """Return the data of earlier states that a step of the branches needs; None if no C is stored.
 
-        By default they are the entries of the isochoric C at the beginning of the step.
+        By default they are the entries of the isochoric C at the beginning of the step. `internal` are the internal
+        variables there, and `time_step` is the length of the step.
         """
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
         """Return {name: value} of the internal variables, besides the tensors of the branches, for the next step.
 
-        `C` has the entries at the end of the present step, `internal` the variables at its beginning.
+        `C` has the entries at the end of the present step, `internal` the variables at its beginning. The length of the
+        step is `time_step`.
         """
         return {"C": C} if self._stores_C else {}
 
@@ -346,7 +348,7 @@ class RelaxingMaterial(Relaxing):
     def _metric(self, A: Entries) -> Entries:
         """Return the entries of the tensor M of a branch with the internal variable A.
 
-        F M F^T is the elastic left Cauchy-Green tensor of the branch.
+        F M F^T, with the isochoric F, is the elastic left Cauchy-Green tensor of the branch.
         """
         raise NotImplementedError
 
@@ -386,6 +388,9 @@ class RelaxingMaterial(Relaxing):
 
 
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
-    """Return the relaxation time aT(T) tau as a function of the temperature; `shift` is the law aT."""
+    """Return the relaxation time aT(T) tau as a function of the temperature; `shift` is the law aT.
+
+    `name` is the name of the constant, for error messages.
+    """
     shift, tau = checked_shift(name, shift), positive(name, tau)
     return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))

@@ -102,13 +102,16 @@ def checked_grading(kind: str, grading: Any) -> float:
 
 
 def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
-    """Return the number of elements along the sheet, and the ends of elements through each layer on [0, 1].
+    """Return the number of elements along a sheet, and the ends of the elements through each layer.
 
     Args:
         kind: name of the calling function, for error messages.
         along_what: direction along the sheet, such as "radius", for error messages.
         elements: argument of that function: (number along the sheet, division of the layers), see `disc`.
         layers: number of layers.
+
+    Returns:
+        The number; for each layer the ends on [0, 1] of its n elements, shape (n + 1,).
 
     Raises:
         InputError: `elements` has another form, or there are too many elements.

@@ -195,10 +195,10 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 
 
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the names and contents of the sections of a file, which must consist of sections alone.
+    """Yield the names and contents of the sections of a file with the content `data`.
 
     Raises:
-        InputError: a section has no end, or there is text outside the sections.
+        InputError: a section has no end, or there is content outside the sections.
     """
     begin, offset = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
     while match := begin.match(data, offset):

@@ -134,7 +134,7 @@ def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
 
 
 def checked_dimension(dim: int, section: Section) -> int:
-    """Return the dimension `dim` of an entity.
+    """Return the dimension `dim` of an entity, checked; `section` gives the name for the error message.
 
     Raises:
         InputError: the dimension is not between 0 and 3.

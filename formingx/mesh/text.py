@@ -43,7 +43,8 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
     Args:
         grid: the grid.
         file: name of the file.
-        numbering: order of the nodes of an element, "corners" or "around".
+        numbering: order of the six nodes of an element: "corners" (the corners first) or "around" (corner, middle,
+            corner, ...).
 
     Raises:
         InputError: the numbering is unknown, or the triangles have three nodes.

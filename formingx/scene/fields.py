@@ -151,13 +151,13 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
 
 
 def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
-    """Raise an InputError unless the mask `inside` is True for all points; `name` is the name of a file."""
+    """Raise an InputError unless the mask `inside` is True for all points; `name` is the file, `axes` "RZ" or "xy"."""
     if not np.all(inside):
         raise InputError(f"{name}: point {_first_false(points, inside, axes)} of the body lies outside the points of"
                          f" the file")
 
 
 def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
-    """Return the first point whose entry in the mask is False, as text with the names of the axes."""
+    """Return the first point of shape (n, 2) whose entry in the mask is False, as text; `axes` is "RZ" or "xy"."""
     first, second = points[np.argmin(mask)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

@@ -35,9 +35,9 @@ class MirrorPlanes:
     r"""Mirror planes of a scene: the modelled body is a half, a quarter or an eighth of the whole part.
 
     With m planes the whole part consists of :math:`2^m` images of the body. A `Symmetry` is a mirror plane if its
-    boundary is flat, lies at an end of the body, and is no guide. The axis of an axisymmetric body does not count:
-    results belong to the whole ring. Two parallel planes do not count: the body is a strip of an endless one, and
-    results belong to the strip.
+    boundary is flat and lies at an end of the body, unless it has `guide=True`. The axis of an axisymmetric body does
+    not count: results belong to the whole ring. Two parallel planes do not count: the body is one period of an endless
+    body, and results belong to this period.
 
     Args:
         planes: mirror planes with different normals.
