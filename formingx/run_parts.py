@@ -180,7 +180,7 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         yield register
     except (ConvergenceError, InputError) as error:
         error.path = path = first_with_states()
-        if path is not None and isinstance(error, ConvergenceError):       # on all ranks
+        if path is not None and isinstance(error, ConvergenceError):       # all ranks raise it
             _call_listeners(path, str(error), path.findings() if path.record.hooks.on_end else [])
         if isinstance(error, ConvergenceError) and error.diagnosis is not None:
             without_traceback = copy.copy(error)            # the diagnosis names the cause

@@ -106,7 +106,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
         return _varying_membrane(pole_stretch, radius, thickness, c10, c01)
     k = c01 / positive("c10", c10)
 
-    def derivatives(R, y):                         # lengths over R0 p/(c10 h0), tensions over c10 h0: pressure is 1
+    def derivatives(R, y):                         # lengths over c10 h0/p, tensions over c10 h0: pressure is 1
         l1, r, _, theta = y.tolist()          # floats: several times faster here than NumPy's scalars
         l2 = r / R
         l3 = 1 / (l1 * l2)

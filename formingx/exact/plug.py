@@ -247,7 +247,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
 
     lengths = np.concatenate([np.linspace(0.01, 1, 30) * edge_length, edge_length + np.linspace(0.01, 3, 60)])
     found = [rim_error(lengths[0])]
-    with np.errstate(over="ignore", invalid="ignore"):      # too long
+    with np.errstate(over="ignore", invalid="ignore"):      # lengths beyond the solution
         while not found[-1] <= 0 and len(found) < len(lengths):
             found.append(rim_error(lengths[len(found)]))
     if not (len(found) > 1 and found[-2] > 0 >= found[-1]):

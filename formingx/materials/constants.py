@@ -186,7 +186,7 @@ class OfMesh(Varying):
         domain = ufl.domain.extract_unique_domain(self._expression)
         if self._expression.ufl_shape != () or domain is not None and domain is not sample.domain.ufl_domain():
             raise InputError(f"the constant {self!r} must be a scalar of the scene's own mesh")
-        compiled = _compat.compile_expression(self._expression, sample.places)         # by all ranks
+        compiled = _compat.compile_expression(self._expression, sample.places)         # collective
         return compiled.eval(sample.domain, sample.cells).ravel() if len(sample.cells) else np.zeros(0)
 
     def expression(self, fields):

@@ -23,7 +23,7 @@ MODES = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}
 
 _DOMAIN = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
 _STRETCHES = [ufl.variable(ufl.Constant(_DOMAIN)) for _ in range(3)]
-_CONSTANTS: list[Any] = []                     # as many as the most constants of an energy so far
+_CONSTANTS: list[Any] = []                     # as many as the energy with the most constants needs
 
 
 class Response:

@@ -60,7 +60,7 @@ class FreeInflation:
         for _ in range(_HALVINGS):
             axial = (low + high) / 2
             around, lengthwise = self._forces(np.stack([hoop, axial]))
-            short = lengthwise * axial < around * hoop / 2            # not a number (beyond the limit): too long
+            short = lengthwise * axial < around * hoop / 2            # not a number: beyond the limit, so too long
             low, high = np.where(short, axial, low), np.where(short, high, axial)
         found = self._forces(np.stack([hoop, axial]))[0] / (self._radius * hoop * axial)
         return np.where(np.isfinite(found), found, np.inf)
@@ -103,6 +103,6 @@ def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
     """
     stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
-    found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # up to the largest stretch
+    found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # below the limit of the materials
     falls = np.flatnonzero(found[1:] < found[:-1] * (1 - 1e-12))
     return Peak(float(stretches[falls[0]]), float(found[falls[0]])) if len(falls) else None

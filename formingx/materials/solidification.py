@@ -52,7 +52,7 @@ class Solidification(Material):
         for name in {"G_set", "set_end", "set_middle"} & base.parameters.keys():
             raise InputError(f"Solidification: the base has a constant {name!r}: the name belongs to a constant of"
                              f" Solidification; give it another name")
-        # a step extrapolates the logarithm of a constant in proportion to time: here phi itself, also from 0
+        # a step extrapolates the logarithm of a constant linearly in time; the logarithm of exp(phi) is phi
         exp_phi = OfTemperature(lambda T: np.exp(self._phi(T)), f"exp({self._phi})")
         self.integral, self.stores_energy, self.symmetric = base.integral, base.stores_energy, base.symmetric
         self.parameters = {**base.parameters, "G_set": positive("Solidification: modulus", modulus), "set_end": exp_phi,

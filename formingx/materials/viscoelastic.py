@@ -147,7 +147,7 @@ class TransientNetwork(RelaxingMaterial):
         two are 0 if the previous motion is unknown. The last is reduced if BDF2 would be unstable.
         """
         s, change = time_step * internal["pace"], entries(internal["change"])
-        near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow by more leave BDF2 unstable
+        near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
         small = ufl.lt(-inner(entries(internal["C"]), change), 1)       # else M is not positive definite
         share = ufl.conditional(small, near * s / (1 + s), 0)
         return cofactor(entries(internal["C"])), tuple(s * c for c in change), share
@@ -189,7 +189,7 @@ class TransientNetwork(RelaxingMaterial):
 def _mean_decay(x: Any) -> Any:
     """Return m(x) = (1 - e^-x)/x (UFL), by its series for x < 0.01."""
     small = ufl.lt(x, 1e-2)
-    y = ufl.conditional(small, 1, x)                            # the branch not taken must be finite too
+    y = ufl.conditional(small, 1, x)                            # the value that is not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
 
 

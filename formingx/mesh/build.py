@@ -342,7 +342,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     if names[0] == names[1]:
         names = ["start", "end"]
     if np.sum(outline[:, 0] * np.roll(outline[:, 1], -1) - np.roll(outline[:, 0], -1) * outline[:, 1]) < 0:
-        # the body lies to the left of `inner`
+        # reverse the lines, so that the body lies to the left of `inner`
         lines, names, ends = [line[::-1] for line in lines], names[::-1], pieces - ends[::-1]
 
     def between(coordinate: np.ndarray) -> np.ndarray:

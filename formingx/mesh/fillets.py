@@ -103,7 +103,7 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
     number = np.ceil(np.hypot(*pieces.T) / (_PIECE * np.ptp(outline, axis=0).max())).astype(int)
     x = np.concatenate([a + d * ((np.arange(n) + 0.5) / n)[:, None] for a, d, n in zip(outline, pieces, number)])
     closest = tool.nearest(x)
-    x = x - closest.distance[:, None] * closest.normal                   # chords of an arc lie beside it
+    x = x - closest.distance[:, None] * closest.normal                   # from the chords of an arc onto the arc
     closest = tool.nearest(x - 1e-6 * length * closest.normal)
     on_axis = face[0, 0] <= 1e-9 * length, face[-1, 0] <= 1e-9 * length
     first, last = (int(x[:, 0].argmin() if axis else np.hypot(*(x - end).T).argmin())
@@ -161,7 +161,7 @@ def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray)
         touches[1:-1] |= free >= (1 - 1e-9) * radius
         line = points[touches]
         for end, neighbour in on_axis:
-            line[end, 1] = np.clip(line[neighbour, 1], *sorted((face[end, 1], x[end, 1])))     # it moves along the axis
+            line[end, 1] = np.clip(line[neighbour, 1], *sorted((face[end, 1], x[end, 1])))  # the pole
         chord = np.hypot(*np.diff(line, axis=0).T)
         arc = np.maximum(2 * radius * np.arcsin(np.minimum(chord / (2 * radius), 1.0)), chord)
         along, known = np.concatenate([[0.0], np.cumsum(arc)]), sticks[touches]

@@ -103,7 +103,7 @@ class Scene:
             materials = dict.fromkeys(mesh.layers, materials)
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
-        mesh.check()                                           # its nodes may have been moved
+        mesh.check()                                           # a script may have moved its nodes
         if preformed is not None and not hasattr(preformed, "gradient"):
             raise InputError(f"Scene: preformed = {preformed!r}: must be what trace(remesh=) makes, or None")
         self.mesh, self.preformed = mesh, preformed
@@ -153,7 +153,7 @@ class Scene:
         self.model.check(self)
         if self.model.solid:
             support_checks.check_hinges(self)
-        for contact in self.contacts if preformed is None else ():      # else tools have moved already
+        for contact in self.contacts if preformed is None else ():      # after remeshing they have moved
             contact_checks.check_start(self, contact)
         if heat is not None:
             if not hasattr(heat, "check") or isinstance(heat, type):

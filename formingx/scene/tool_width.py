@@ -46,7 +46,7 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
     `ends` are the end points of the element edges of the face, shape (n, 2, 2), length.
     """
     outline = contact.tool.surface()[0]
-    if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # it goes on beyond the axis
+    if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # its other half
         outline = np.concatenate([outline, outline * (-1, 1)])
     angles = np.linspace(0, np.pi, _DIRECTIONS, endpoint=False)
     width = float(np.ptp(outline @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
@@ -82,7 +82,7 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
             break
         travel += gap
         if gap > furthest or travel > 5 * furthest:
-            return                                          # it goes elsewhere
+            return                                          # the tool misses the face
     depth = tool.signed_distance(places.reshape(-1, places.shape[-1]) - travel * way).reshape(places.shape[:2]).max(1)
     worst = int(np.argmax(depth))
     if depth[worst] > CUT * thickness:
