@@ -13,7 +13,7 @@ import basix.ufl
 import numpy as np
 
 from .. import _compat
-from ..mesh.nodes import of_cells, own_cells
+from ..mesh.nodes import cell_node_positions, own_cells
 
 _MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
 """Midpoints of the edges. Corners are left out: where a free side turns onto a plate, the determinant has no limit."""
@@ -70,7 +70,7 @@ class Admissible:
         shapes: Any = forms.displacement_element.tabulate(1, points)                    # (1 + dim, points, dofs)
         geometry = basix.ufl.element("Lagrange", domain.basix_cell(), _compat.coordinate_map(domain).degree)
         map_shapes: Any = geometry.tabulate(1, points)
-        nodes = of_cells(domain, own)
+        nodes = cell_node_positions(domain, own)
         self._X = np.einsum("pk,ckx->cpx", map_shapes[0], nodes)
         self._values, self._on_axis = shapes[0], np.abs(self._X[..., 0]) <= 1e-12 * forms.length
         self._R = np.where(self._on_axis, 1.0, self._X[..., 0])

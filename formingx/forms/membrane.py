@@ -27,7 +27,7 @@ from dolfinx import mesh as dolfinx_mesh
 from .. import _compat
 from ..errors import InputError
 from ..mesh.mesh import Mesh
-from ..mesh.nodes import of_cells, own_cells
+from ..mesh.nodes import cell_node_positions, own_cells
 from ..physics.supports import Constrained
 from ..ranks import gathered
 from .formulation import Formulation
@@ -144,7 +144,7 @@ class MidSurface(Formulation):
         Returns:
             Temperatures at the quadrature points, shape (1, cells, q).
         """
-        nodes = of_cells(self.domain, terms.cells)
+        nodes = cell_node_positions(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
         R, Z = np.einsum("qk,nkd->dnq", shapes[0], nodes)
@@ -233,7 +233,7 @@ class MidSurface(Formulation):
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
     """Return lowest and highest Z of a layer at ascending R, shape (n,) each; (inf, -inf) where the layer is absent."""
     cells = mesh.cells.find(mesh.layers[layer])
-    nodes = of_cells(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
+    nodes = cell_node_positions(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them
     halves = [(a, b) for a, b, _ in edges]
     if nodes.shape[1] == 6:

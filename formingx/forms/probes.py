@@ -11,7 +11,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..mesh.locate import locate
-from ..mesh.nodes import of_cells, own_cells
+from ..mesh.nodes import cell_node_positions, own_cells
 from ..ranks import gathered
 
 
@@ -153,7 +153,7 @@ class MidSurfaceProbe(Probe):
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
         element, domain = problem.forms.displacement_element, problem.forms.domain
-        nodes = of_cells(domain, self._cells)
+        nodes = cell_node_positions(domain, self._cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(domain).degree, shape=())
         self._middle = np.einsum("kj,kji->ki", _basis(geometry, 0, self._reference), nodes)
         tangent = np.einsum("kj,kji->ki", _basis(geometry, 1, self._reference), nodes)       # dX/dxi
@@ -172,7 +172,7 @@ class MidSurfaceProbe(Probe):
     def _take_ends(self, element: Any, geometry: Any) -> None:
         """Average the slopes of both elements at points where two elements meet."""
         forms, domain = self._problem.forms, self._problem.forms.domain
-        nodes = of_cells(domain, own_cells(domain))
+        nodes = cell_node_positions(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]
         at, cells, end = np.nonzero(np.abs(R[:, None, None] - nodes[None, :, :2, 0]) < 1e-9 * forms.length)
         meet = self._problem.comm.allreduce(np.bincount(at, minlength=len(R))) == 2

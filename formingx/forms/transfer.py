@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem
 
 from .. import _compat
-from ..mesh.nodes import of_cells, own_cells
+from ..mesh.nodes import cell_node_positions, own_cells
 from ..ranks import gathered
 from .probes import Probe
 
@@ -91,10 +91,10 @@ def take_fields(source: Any, state: Any, problem: Any) -> None:
     with source.state_context(state):
         fields = [whole.u / part.length] + [whole.stress / part.stress * p for p in ufl.split(whole.w)[1:]]
         known = [in_own_cells(domain, f, _PLACES) for f in fields]
-    corners = gathered(source.comm, of_cells(domain, own_cells(domain))[:, :3])
+    corners = gathered(source.comm, cell_node_positions(domain, own_cells(domain))[:, :3])
     rows = {key: k for k, key in enumerate(map(_key, corners))}
     known = [gathered(source.comm, values) for values in known]
-    mine = of_cells(part.domain, slice(None))[:, :3]
+    mine = cell_node_positions(part.domain, slice(None))[:, :3]
     found = np.array([rows[_key(c)] for c in mine], dtype=int)
     order = np.array([[np.flatnonzero(np.all(c == corner, axis=1))[0] for corner in corners[k]]
                       for c, k in zip(mine, found, strict=True)], dtype=int).reshape(-1, 3)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..mesh.nodes import of_space
+from ..mesh.nodes import dof_positions
 
 
 class Quantity:
@@ -156,7 +156,7 @@ class Sag(Quantity):
         if (preformed := forms.scene.preformed) is not None:
             space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
             order = np.argsort(numbers)
-            nodes_at = of_space(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
+            nodes_at = dof_positions(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
             self._earlier = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:

@@ -10,7 +10,7 @@ from .. import _compat
 from ..errors import InputError
 from .check import check_elements
 from .mesh import Mesh
-from .nodes import numbers_of_facets, own_cells
+from .nodes import facet_nodes, own_cells
 
 # DOLFINx numbers a mid-edge node like the opposite corner; in a grid edges are 01, 12, 20
 _TO_DOLFINX, _FROM_DOLFINX = [0, 1, 2, 4, 5, 3], [0, 1, 2, 5, 3, 4]
@@ -74,7 +74,7 @@ def gathered(mesh: Mesh) -> Grid:
     numbers = domain.geometry.index_map().local_to_global(np.arange(len(X), dtype=np.int32))
     cells = numbers[np.asarray(_compat.cell_nodes(domain))[:owned]]
     marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
-    ends = {name: numbers_of_facets(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
+    ends = {name: facet_nodes(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
     parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < owned]] for name, found in marks.items()},
                             {name: numbers[found] for name, found in ends.items()}))
     points = np.zeros((domain.geometry.index_map().size_global, 2))

@@ -13,7 +13,7 @@ from .. import _compat
 from ..errors import InputError, known, pair
 from ..ranks import gathered
 from .check import check_elements
-from .nodes import numbers_of_facets, of_facets, own_cells
+from .nodes import facet_node_positions, facet_nodes, own_cells
 
 
 class Columns(NamedTuple):
@@ -142,7 +142,7 @@ class Mesh:
             raise InputError(f"{caller}: within = {within!r}: the first must be below the second")
         domain, axis = self.domain, "rz".index(along)
         comm, facets = self.comm, self.facets_of(of)
-        ends = of_facets(domain, facets)[:, :2, axis]
+        ends = facet_node_positions(domain, facets)[:, :2, axis]
         tolerance = 1e-8 * comm.allreduce(np.abs(domain.geometry.x).max(initial=0.0), MPI.MAX)
         lowest, highest = ends.min(1), ends.max(1)
         inside = (lowest > low - tolerance) & (highest < high + tolerance)
@@ -200,7 +200,7 @@ class Mesh:
             Coordinates (R, Z), shape (n, 2), in three dimensions (x, y, z), shape (n, 3), length; equal on all ranks.
         """
         domain, facets = self.domain, self.facets_of(boundary)
-        nodes = np.unique(numbers_of_facets(domain, facets))
+        nodes = np.unique(facet_nodes(domain, facets))
         points = gathered(self.comm, domain.geometry.x[nodes, :domain.geometry.dim])
         scale = np.ptp(points, axis=0).max() if len(points) else 1.0
         keys = np.round(points / (scale or 1.0), 12)
@@ -222,7 +222,7 @@ class Mesh:
         Raises:
             InputError: the boundary is not one line with two ends.
         """
-        edges = gathered(self.comm, of_facets(self.domain, self.facets_of(boundary)))
+        edges = gathered(self.comm, facet_node_positions(self.domain, self.facets_of(boundary)))
         size = max(np.ptp(edges, axis=(0, 1)).max(), 1e-300)
         corners, ends = np.unique(np.round(edges[:, :2].reshape(-1, edges.shape[-1]) / size, 12), axis=0,
                                   return_inverse=True)

@@ -23,7 +23,7 @@ def own_cells(domain: Any) -> np.ndarray:
     return np.arange(domain.topology.index_map(domain.topology.dim).size_local, dtype=np.int32)
 
 
-def of_mesh(domain: Any) -> np.ndarray:
+def node_positions(domain: Any) -> np.ndarray:
     """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, 2), length."""
     return domain.geometry.x[:, :COORDINATES]
 
@@ -38,12 +38,12 @@ def span(domain: Any, comm: Any) -> np.ndarray:
     Returns:
         Lowest, then highest coordinates, shape (2, 2), length, equal on all ranks.
     """
-    X = of_mesh(domain)
+    X = node_positions(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
 
 
-def of_space(space: Any) -> np.ndarray:
+def dof_positions(space: Any) -> np.ndarray:
     """Return the reference positions of the (blocked) unknowns of a function space, shape (n, 2), length."""
     return space.tabulate_dof_coordinates()[:, :COORDINATES]
 
@@ -66,7 +66,7 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.sqrt(np.take_along_axis(squares, numbers[..., None], -1)[..., 0]), numbers
 
 
-def of_cells(domain: Any, cells: Any) -> np.ndarray:
+def cell_node_positions(domain: Any, cells: Any) -> np.ndarray:
     """Return the positions of the nodes of some cells, corners first, shape (cells, nodes, coordinates), length.
 
     Args:
@@ -77,17 +77,17 @@ def of_cells(domain: Any, cells: Any) -> np.ndarray:
     return geometry.x[np.asarray(_compat.cell_nodes(domain))[cells], :geometry.dim]
 
 
-def of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
+def facet_node_positions(domain: Any, facets: np.ndarray) -> np.ndarray:
     """Return the positions of the nodes of some facets, ends first, shape (facets, 2 or 3, coordinates), length.
 
     Args:
         domain: the DOLFINx mesh.
         facets: local numbers of the facets.
     """
-    return domain.geometry.x[numbers_of_facets(domain, facets), :domain.geometry.dim]
+    return domain.geometry.x[facet_nodes(domain, facets), :domain.geometry.dim]
 
 
-def numbers_of_facets(domain: Any, facets: np.ndarray) -> np.ndarray:
+def facet_nodes(domain: Any, facets: np.ndarray) -> np.ndarray:
     """Return the nodes of some facets, ends first, as row indices of `domain.geometry.x`, shape (facets, 2 or 3).
 
     Args:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..ranks import gathered
 from .mesh import Mesh
-from .nodes import of_cells, own_cells
+from .nodes import cell_node_positions, own_cells
 
 
 class Place(NamedTuple):
@@ -78,7 +78,7 @@ class Triangles:
         mesh: the mesh.
 
     Attributes:
-        corners: corners (R, Z), shape (m, 3, 2), length.
+        corners: corners (R, Z), in three dimensions (x, y), shape (m, 3, 2), length.
         layer: names of their layers, shape (m,).
         edge: longest edges, shape (m,), length.
         area: areas, shape (m,), length^2.
@@ -94,7 +94,7 @@ class Triangles:
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        self.corners = gathered(mesh.comm, of_cells(mesh.domain, owned)[:, :3, :2])  # in three dimensions (x, y)
+        self.corners = gathered(mesh.comm, cell_node_positions(mesh.domain, owned)[:, :3, :2])
         self.layer = gathered(mesh.comm, names).astype(str)
         edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
                           for i, j in ((0, 1), (1, 2), (2, 0))], 1)

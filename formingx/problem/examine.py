@@ -12,7 +12,7 @@ from .. import figures
 from ..contact.tooling import Tooling
 from ..errors import InputError
 from ..forms.elements import Body, body
-from ..mesh.nodes import of_space
+from ..mesh.nodes import dof_positions
 from ..mesh.triangles import Place, place
 
 _COMPRESSED_STRETCH = 0.9       # stretch along the section below which a sheet is compressed
@@ -136,7 +136,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
     out.destroy()
     vectors, numbers = space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = of_space(vectors)[: len(dofs)]
+    points = dof_positions(vectors)[: len(dofs)]
     own = dofs[:, 0] < n
     dofs, points = dofs[own], points[own]
     is_u = np.zeros(n, dtype=bool)
@@ -158,7 +158,7 @@ def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
     """Return the deformed position in a state of the node at a reference point, shape (2,), length."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = of_space(vectors)[: len(dofs)]
+    points = dof_positions(vectors)[: len(dofs)]
     own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
     away = np.hypot(*(points[own] - point).T)
     at = int(np.argmin(away)) if len(away) else 0

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..mesh.nodes import of_mesh
+from ..mesh.nodes import node_positions
 from ..physics.contact import Contact
 from ..physics.supports import Constrained
 from ..ranks import gathered
@@ -42,7 +42,7 @@ def check_start(scene: Any, contact: Contact) -> None:
                          f" does that; must be direction=(0, ...), or PlaneStrain()")
     face = mesh.nodes_of(contact.on)
     comm = mesh.comm
-    points = gathered(comm, of_mesh(mesh.domain))
+    points = gathered(comm, node_positions(mesh.domain))
     depth = contact.tool.signed_distance(points)
     worst = int(np.argmax(depth))
     if depth[worst] > near:

@@ -9,7 +9,7 @@ import numpy as np
 from .. import _compat
 from ..materials.constants import Sample
 from ..mesh.mesh import Mesh
-from ..mesh.nodes import COORDINATES, of_cells, own_cells
+from ..mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from .temperature import GivenTemperature
 
 
@@ -31,6 +31,6 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
     places: Any = basix.make_quadrature(basix.CellType.triangle, degree)[0]
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
-    nodes = of_cells(domain, cells)[..., :COORDINATES]
+    nodes = cell_node_positions(domain, cells)[..., :COORDINATES]
     T = None if temperature is None else temperature.in_cells(cells, places).ravel()
     return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, nodes.shape[-1]), cells, places, domain, T)

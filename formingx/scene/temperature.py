@@ -7,7 +7,7 @@ from dolfinx import fem
 from numpy.typing import ArrayLike
 
 from ..mesh import Mesh
-from ..mesh.nodes import of_space
+from ..mesh.nodes import dof_positions
 from ..ranks import gathered
 from . import fields
 
@@ -51,7 +51,7 @@ class GivenTemperature:
         self.given, self._text = given, "a function" if callable(given) and not hasattr(given, "check") else repr(given)
         self.mesh = mesh
         self.T = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2)), name="temperature")
-        points = of_space(self.T.function_space)
+        points = dof_positions(self.T.function_space)
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:

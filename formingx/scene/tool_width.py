@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..mesh.nodes import of_facets
+from ..mesh.nodes import facet_node_positions
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
@@ -34,7 +34,7 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
         InputError: the tool could pass between two contact points, or penetrate the face by more than 10 % (`CUT`) of
             the thickness before it meets a contact point.
     """
-    ends = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(contact.on))[:, :2])
+    ends = gathered(mesh.comm, facet_node_positions(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
         _check_width(contact, ends, axisymmetric)
     _check_first_touch(contact, ends, Triangles(mesh).thickness)

@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from ... import _compat
 from ...errors import ConvergenceError
 from ...mesh import Mesh
-from ...mesh.nodes import of_space
+from ...mesh.nodes import dof_positions
 from ...physics import kinematics as kin
 from ...ranks import gathered
 from ...results.evaluate.profile import distance_to_line
@@ -91,7 +91,7 @@ class Conduction(HeatVectors):
         self.space = fem.functionspace(domain, ("Lagrange", degree))
         self.T, self._change, self._fixed_values = (fem.Function(self.space) for _ in range(3))
         self._n = self.space.dofmap.index_map.size_local
-        self.points = of_space(self.space)[: self._n]
+        self.points = dof_positions(self.space)[: self._n]
         self._X, self._v = ufl.SpatialCoordinate(domain), ufl.TestFunction(self.space)
         self._dx = ufl.Measure("dx", domain, subdomain_data=mesh.cells,
                                metadata={"quadrature_degree": 2 * degree + 2})

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ... import _compat
 from ...errors import ConvergenceError, InputError, finite, instance, known, positive, several
 from ...mesh import Mesh
-from ...mesh.nodes import of_space
+from ...mesh.nodes import dof_positions
 from ...physics.kinematics import Axisymmetric
 from ...scene import fields
 from ...values.temperature import ABSOLUTE_ZERO
@@ -132,7 +132,7 @@ class _Displacement:
     def on(self, mesh: Mesh) -> fem.Function:
         """Return the displacement as a quadratic `Function` on another mesh of the same body, length."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
-        points = of_space(u.function_space)
+        points = dof_positions(u.function_space)
         u.x.array[:] = (self(points) - points).ravel()
         return u
 

@@ -14,7 +14,7 @@ import numpy as np
 from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...forms.probes import Probe
 from ...forms.transfer import MovingLeastSquares
-from ...mesh.nodes import of_mesh, of_space
+from ...mesh.nodes import dof_positions, node_positions
 
 _OUTLINE_DISTANCE = 0.02
 """Distance from the outline over the length of an edge below which a point is moved onto it: new edges differ from old.
@@ -56,7 +56,7 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
         Positions on the first mesh, shape (n, 2), length.
     """
     old, state = preformed.before
-    nodes = of_mesh(old.forms.domain)
+    nodes = node_positions(old.forms.domain)
     first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
     found = MovingLeastSquares(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
     return np.clip(found, first.min(0), first.max(0))
@@ -77,7 +77,7 @@ def scene_on(mesh: Any, preformed: Any) -> Any:
         return old.scene.with_mesh(mesh, preformed)
     with old.state_context(state):
         field = old.temperature.T.copy()
-    nodes, T = of_space(field.function_space), field.x.array
+    nodes, T = dof_positions(field.function_space), field.x.array
     moved = nodes + Probe(old, nodes).displacement_in(state)
     return old.scene.with_mesh(mesh, preformed, lambda R, Z: np.clip(
         MovingLeastSquares(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))

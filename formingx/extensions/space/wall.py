@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError, direction, pair, positive, triple
 from ...mesh.edges import edges_of
-from ...mesh.nodes import COORDINATES, of_cells, own_cells
+from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...ranks import gathered
 from ...results.files.sheet import Sheet
 from .sheet import MAX_TRIANGLES
@@ -252,7 +252,7 @@ def wall_of(path: Any, state: Any) -> SheetWall:
         now = forms.length * forms.w.x.array[dofs]
     cells = vectors.dofmap.list[own]
     X = vectors.tabulate_dof_coordinates()
-    middles = of_cells(domain, own).mean(1)[:, :COORDINATES].T
+    middles = cell_node_positions(domain, own).mean(1)[:, :COORDINATES].T
     h = {name: given(*middles) for name, given in problem.scene.thickness.items()}
     order = np.argsort(gathered(comm, domain.topology.original_cell_index[own]))
     rest, moved = (gathered(comm, part)[order].reshape(-1, 3) for part in (X[cells], X[cells] + now[cells]))

@@ -10,7 +10,7 @@ import numpy as np
 from ...contact import resultants
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...mesh.nodes import nearest, of_facets
+from ...mesh.nodes import facet_node_positions, nearest
 from ...ranks import gathered
 from ..files.sheet import Sheet
 
@@ -125,7 +125,7 @@ class ContactFace:
         The edges of all ranks are returned; ghost edges occur twice. Collective.
         """
         mesh = self._path.problem.scene.mesh
-        X = gathered(mesh.comm, of_facets(mesh.domain, mesh.facets_of(self._contact.contact.on)))
+        X = gathered(mesh.comm, facet_node_positions(mesh.domain, mesh.facets_of(self._contact.contact.on)))
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 

@@ -34,7 +34,7 @@ from petsc4py import PETSc
 from ... import _compat
 from ...errors import InputError, as_points, known, pair
 from ...mesh.locate import LocatedPoints, locate
-from ...mesh.nodes import COORDINATES, of_cells, own_cells
+from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...physics.kinematics import BLOCK
 from ...ranks import gathered
 from .patches import Patches
@@ -287,7 +287,7 @@ class Stresses:
             The stresses, shape (m,), and the positions (R, Z) of the corners, shape (m, 2), length.
         """
         owned = own_cells(self.problem.forms.domain)
-        X = of_cells(self.problem.forms.domain, owned)[:, :3]
+        X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
         assert self._patches is not None
         largest = np.linalg.eigvalsh(_cauchy(self._patches.at(fitted.cubics, X)))[..., -1]
         top = (owned, largest.argmax(1))

@@ -12,7 +12,7 @@ import numpy as np
 from ... import _compat
 from ...errors import InputError, finite
 from ...forms.probes import probe
-from ...mesh.nodes import of_cells, of_facets
+from ...mesh.nodes import cell_node_positions, facet_node_positions
 from ...ranks import gathered
 from ..files.sheet import Sheet
 from .profile import Profile, distance_to_line
@@ -176,7 +176,7 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
             pairs.setdefault(tuple(sorted(layer[cells].tolist())), []).append(facet)
     found = {}
     for pair in sorted(set().union(*mesh.comm.allgather(set(pairs)))):
-        points = gathered(mesh.comm, of_facets(domain, np.array(pairs.get(pair, []), dtype=np.int32)))
+        points = gathered(mesh.comm, facet_node_positions(domain, np.array(pairs.get(pair, []), dtype=np.int32)))
         chain = [0, 2, 1] if points.shape[1] == 3 else [0, 1]
         found[tuple(names[k] for k in pair)] = np.concatenate([points[:, [a, b]] for a, b in zip(chain, chain[1:])])
     return found
@@ -207,5 +207,5 @@ def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> n
 def _middle_of(mesh: Any, layer: str, profile: Profile) -> float:
     """Return the mean distance of a layer's nodes from the bottom face in the reference configuration, length."""
     cells = mesh.cells.find(mesh.layers[layer])
-    points = gathered(mesh.comm, of_cells(mesh.domain, cells))
+    points = gathered(mesh.comm, cell_node_positions(mesh.domain, cells))
     return float(distance_to_line(points.reshape(-1, points.shape[-1]), profile.reference_bottom).mean())

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from ...materials.constants import Varying
 from ...materials.material import Material
-from ...mesh.nodes import COORDINATES, of_cells, own_cells
+from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...scene.summary import text
 
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
@@ -120,7 +120,7 @@ def _mesh(problem: Any) -> dict[str, Any]:
     """
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
-    x = of_cells(domain, owned)[..., :COORDINATES] / problem.forms.length
+    x = cell_node_positions(domain, owned)[..., :COORDINATES] / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)
