@@ -42,7 +42,7 @@ class Mutant(NamedTuple):
 MUTANTS = [Mutant(*row) for row in [
     # contact and friction
     ("contact/rule.py", "+= share * whole", "+= share * whole / 2", "details"),
-    ("contact/face.py", "        if ahead:\n            arrived", "        if False:\n            arrived",
+    ("contact/face.py", "        if ahead:\n            newly_closed", "        if False:\n            newly_closed",
      "contact plugs jumps"),
     ("contact/face.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
      "contact derivatives"),

@@ -32,7 +32,7 @@ def by_hand(law, i, near, x, old, sense, expected):
     F, slope = ramp(at, law.pulls, bonded)
     N, T, sliding, kept = k * (F + slope * (d - at)), 0.0, 0.0, 0.0
     if law.has_friction:
-        came = (old.position if touched else old.arrival)[i]
+        came = (old.position if touched else old.closure)[i]
         g = old.slip[i] + (0.0 if math.isnan(came[0]) else t @ (x[i] - came))
         predicted = g if expected is None else expected.slip[i]
         if mu >= STICKS:

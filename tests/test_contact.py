@@ -349,13 +349,14 @@ def test_coulomb_goes_over_into_free_and_stick():
 
 
 @pytest.mark.parametrize("friction, close", [("none", 1e-8), ("stick", 1e-4), (0.3, 1e-3)])
-def test_points_that_arrive_cost_few_iterations_and_change_no_state(friction, close, monkeypatch):
+def test_gap_closures_cost_few_iterations_and_change_no_state(friction, close, monkeypatch):
     """At the outer edge of the ramp an iteration halves their penetration, unless they are settled by themselves.
 
     (Fewer iterations make other steps, which with friction decide by so much where points slide.)
     """
     settled = form(cup(friction), 15.0)
-    monkeypatch.setattr(Increment, "arrivals", property(lambda increment: np.zeros(len(increment.status), dtype=bool)))
+    monkeypatch.setattr(Increment, "newly_closed",
+                        property(lambda increment: np.zeros(len(increment.status), dtype=bool)))
     plain = form(cup(friction), 15.0)
     assert settled.counts.iterations < 0.8 * plain.counts.iterations
     np.testing.assert_allclose(settled.profile().thickness, plain.profile().thickness, rtol=close)

@@ -81,7 +81,7 @@ def test_tractions_have_their_stiffness():
     far = np.array([1e-4] * 3 + [1e-2] * 3)[:, None]
     old = law.start(x)._replace(distance=np.full(6, 1e-3), position=x + far * rng.normal(size=(6, 3)),
                                 slip=1e-4 * rng.normal(size=(6, 3)))
-    old = old._replace(arrival=old.position)
+    old = old._replace(closure=old.position)
     found = law.tractions(x, old)
     assert found.status.tolist() == [ContactStatus.STICKS] * 3 + [ContactStatus.SLIDES] * 3
     np.testing.assert_allclose(found.tangential[3:], 0.3 * 100 * 1e-3, rtol=1e-12)
@@ -89,7 +89,7 @@ def test_tractions_have_their_stiffness():
     for k, e in enumerate(1e-7 * np.eye(3)):
         quotient = (law.tractions(x + e, old).force - law.tractions(x - e, old).force) / 2e-7
         np.testing.assert_allclose(found.stiffness[:, :, k], quotient, atol=1e-6)
-    np.testing.assert_allclose(law.pressure_ahead(old._replace(arrival=law.at_pressure(old, np.full(6, 0.12)))), 0.12)
+    np.testing.assert_allclose(law.pressure_ahead(old._replace(closure=law.at_pressure(old, np.full(6, 0.12)))), 0.12)
 
 
 def test_pressure_on_tools_has_its_derivatives():

@@ -118,7 +118,7 @@ def test_contact_comes_back_as_it_was(points):
     assert found.history.slip == pytest.approx(kept.history.slip, rel=1e-9)
     assert found.history.distance[touched] == pytest.approx(kept.history.distance[touched], rel=1e-9)
     assert np.all(found.history.distance[~touched] < -here.contacts[0].law.theta)
-    assert np.array_equal(found.arrived, kept.arrived)
+    assert np.array_equal(found.newly_closed, kept.newly_closed)
     force = here.contacts[0].tractions(path.last.x, path.last.control).force
     with path.problem.state_context(path.last) as problem:
         there = problem.contacts[0].tractions(path.last.x, path.last.control).force

@@ -124,7 +124,7 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.moved(direction, slope)
         free = ~face.law.touching(start, face.history)
-        if face.contact.lagged:                             # a tangent of a long step predicts no arrivals
+        if face.contact.lagged:                             # a tangent of a long step predicts no gap closures
             most = LIMITS.largest_approach * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
@@ -181,9 +181,9 @@ class Approach:
                 tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
                 slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - times[at_end])
                 at_end[at_end] = slip <= LIMITS.largest_slip * face.rule.lengths[at_end]
-            face.expect_arrivals(np.where(at_end[:, None], np.nan, places), guessed)
+            face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
         elif ends and self.lags:
-            face.expect_arrivals(places)
+            face.set_closures(places)
 
     def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if too many points came into contact in a step.
@@ -245,7 +245,7 @@ class Approach:
         now = face.tractions(new, control).normal
         if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
             return False
-        face.expect_arrivals(law.at_pressure(face.history, now))
+        face.set_closures(law.at_pressure(face.history, now))
         return True
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
@@ -265,7 +265,7 @@ class Approach:
         if variables is None or not face.contact.lagged or face.contact.sticks:
             return False
         old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
-        history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), arrival=old.position)
+        history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
         now = law.pressure(history)
         sums = np.array([face.rule.area @ np.abs(now - law.pressure_ahead(old)), face.rule.area @ now])
         change, pressure = self._comm.allreduce(sums, MPI.SUM)
@@ -404,9 +404,9 @@ class Approach:
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
         if face.contact.sticks:
-            wrong = np.isnan(history.arrival[:, 0]) & (np.abs(slid) > LIMITS.largest_slip * face.rule.lengths)
+            wrong = np.isnan(history.closure[:, 0]) & (np.abs(slid) > LIMITS.largest_slip * face.rule.lengths)
         else:
-            counted = np.einsum("ni,ni->n", near.tangent, end - history.arrival)
+            counted = np.einsum("ni,ni->n", near.tangent, end - history.closure)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
         late = (history.distance <= -law.theta) & (F > 0) & wrong
         return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))

@@ -24,13 +24,13 @@ class FaceHistory(NamedTuple):
 
     Attributes:
         history: history variables of the contact law.
-        arrived: mask of the points that came into contact in the step to this state, shape (n,).
+        newly_closed: mask of the points that came into contact in the step to this state, shape (n,).
         penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
             (`Contact.present_area`).
     """
 
     history: ContactHistory
-    arrived: np.ndarray
+    newly_closed: np.ndarray
     penalty: np.ndarray
 
 
@@ -163,7 +163,7 @@ class FaceContact:
         """
         if self._stored is None or not self.contact.lagged:
             return self.rule.area
-        return np.where(self._stored.arrived, 0.0, self.rule.area)
+        return np.where(self._stored.newly_closed, 0.0, self.rule.area)
 
     # equations
 
@@ -271,8 +271,8 @@ class FaceContact:
     def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
         """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""
         if ahead:
-            arrived = self._stored.arrived if self._stored else np.zeros(len(self.points), dtype=bool)
-            return self.law.stiffness_ahead(self.positions(fields, control), self.history, arrived)
+            newly_closed = self._stored.newly_closed if self._stored else np.zeros(len(self.points), dtype=bool)
+            return self.law.stiffness_ahead(self.positions(fields, control), self.history, newly_closed)
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
@@ -322,16 +322,16 @@ class FaceContact:
         n = len(x)
         self._take(FaceHistory(self.law.start(x), np.zeros(n, dtype=bool), np.ones(n)) if self.has_history else None)
 
-    def expect_arrivals(self, arrival: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.arrival`).
+    def set_closures(self, closure: np.ndarray, guessed: np.ndarray | None = None) -> None:
+        """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.closure`).
 
         Args:
-            arrival: positions relative to the tool, shape (n, c), length; NaN for no friction in the step.
+            closure: positions relative to the tool, shape (n, c), length; NaN for no friction in the step.
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
         """
         self._guessed = guessed
         if self._stored is not None:
-            self._take(self._stored._replace(history=self._stored.history._replace(arrival=arrival)))
+            self._take(self._stored._replace(history=self._stored.history._replace(closure=closure)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Update the history variables to an accepted state; they do not change while the tool is inactive.
@@ -346,18 +346,18 @@ class FaceContact:
         old, theta = self._stored.history, self.law.theta
         history = self.law.tractions(self.positions(x, control), old).history
         penalty = self._penalty if self.contact.present_area else self._stored.penalty
-        arrived = (old.distance <= -theta) & (history.distance > -theta)
+        newly_closed = (old.distance <= -theta) & (history.distance > -theta)
         if self.contact.lagged:                             # no point has moved since a stage began here
-            moved = np.abs(history.arrival - old.arrival).max(1, initial=0.0)
-            arrived |= self._stored.arrived & (moved < 1e-12 * self._length)
-        self._take(FaceHistory(history, arrived, penalty))
+            moved = np.abs(history.closure - old.closure).max(1, initial=0.0)
+            newly_closed |= self._stored.newly_closed & (moved < 1e-12 * self._length)
+        self._take(FaceHistory(history, newly_closed, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
         """Open the points under tension at a tool in three dimensions; return True if there are any. Collective."""
         if self._stored is None or not (self.contact.lagged and self.contact.separates):
             return False
         history, x = self._stored.history, self.positions(fields, control)
-        free = self.law.pulling(x, history) & ~self._stored.arrived
+        free = self.law.pulling(x, history) & ~self._stored.newly_closed
         found = bool(self.comm.allreduce(int(free.sum())))
         if found:
             self._take(self._stored._replace(history=history._replace(
@@ -405,8 +405,8 @@ class FaceContact:
 
     def save(self, variables: FaceHistory) -> dict[str, np.ndarray]:
         """Return {name: array} of history variables and reference positions of the points of all ranks; collective."""
-        parts = self.comm.allgather((self.points, *variables.history, variables.arrived, variables.penalty))
-        names = ("points", *variables.history._fields, "arrived", "penalty")
+        parts = self.comm.allgather((self.points, *variables.history, variables.newly_closed, variables.penalty))
+        names = ("points", *variables.history._fields, "newly_closed", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     def load(self, data: dict[str, Any]) -> FaceHistory:
@@ -422,7 +422,7 @@ class FaceContact:
         like = self.law.start(self.points)
         history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
                         for name in ContactHistory._fields))
-        return FaceHistory(history, np.array(data["arrived"], dtype=bool)[rows], np.array(data["penalty"])[rows])
+        return FaceHistory(history, np.array(data["newly_closed"], dtype=bool)[rows], np.array(data["penalty"])[rows])
 
     def transfer(self, source: FaceContact, variables: FaceHistory | None, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> FaceHistory | None:
@@ -440,10 +440,10 @@ class FaceContact:
         if variables is None:
             return None
         interpolation, history = MovingLeastSquares(self.comm, mapping(source.points), self.points), variables.history
-        distance, arrived, penalty = (interpolation.all(values)[interpolation.nearest] for values in
-                                      (history.distance, variables.arrived, variables.penalty))
+        distance, newly_closed, penalty = (interpolation.all(values)[interpolation.nearest] for values in
+                                      (history.distance, variables.newly_closed, variables.penalty))
         touched, position, theta = distance > -source.law.theta, self.positions(x, control), self.law.theta
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)
         slip = np.where(touched, interpolation.fitted(history.slip), 0.0)
         distance = np.where(touched, distance * theta / source.law.theta, free)
-        return FaceHistory(ContactHistory(position, distance, slip, position), arrived, penalty)
+        return FaceHistory(ContactHistory(position, distance, slip, position), newly_closed, penalty)

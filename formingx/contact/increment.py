@@ -15,8 +15,8 @@ class Increment:
     An increment begins with each run of Newton's method, and with each evaluation of a state. It ends when the state is
     accepted. In each iteration the contact calls `tractions(x)` for the residual, with x the positions of the points
     relative to the tool, shape (n, c). It then calls `linearise(x)` at the same positions. From then on `tractions(x)`
-    contains the tangent of the iteration. The local solve of contact (`LocalSolve`) then reads `status`, `arrivals`,
-    `taken` and `predicted`, and calls `expect` to set the sense of sliding for the next iteration.
+    contains the tangent of the iteration. The local solve of contact (`LocalSolve`) then reads `status`,
+    `newly_closed`, `taken` and `predicted`, and calls `expect` to set the sense of sliding for the next iteration.
 
     Args:
         law: contact law.
@@ -78,7 +78,7 @@ class Increment:
         return self._now[1].status
 
     @property
-    def arrivals(self) -> np.ndarray:
+    def newly_closed(self) -> np.ndarray:
         """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
             return np.zeros(len(self._now[0]), dtype=bool)

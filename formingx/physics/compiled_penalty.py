@@ -43,11 +43,11 @@ void ramp(long points, double theta, long pulls, const double *d, const double *
 
 /* elastic slip g that sticking points would have at x, and its gradient dg */
 void elastic_slips(long points, double theta, const double *x, const double *normal, const double *curvature,
-                   const double *position, const double *distance, const double *slip, const double *arrival,
+                   const double *position, const double *distance, const double *slip, const double *closure,
                    double *g, double *dg)
 {
     for (long i = 0; i < points; i++) {
-        const double *n = normal + 2 * i, *from = (distance[i] > -theta ? position : arrival) + 2 * i;
+        const double *n = normal + 2 * i, *from = (distance[i] > -theta ? position : closure) + 2 * i;
         double u = x[2 * i] - from[0], v = x[2 * i + 1] - from[1], slips = !isnan(u);
         if (!slips) u = v = 0.0;
         double across = n[0] * u + n[1] * v, along = n[0] * v - n[1] * u;

@@ -39,14 +39,14 @@ class ContactHistory(NamedTuple):
         position: positions, shape (n, c), length.
         distance: signed distances from the tool, shape (n,), length.
         slip: elastic slips g, shape (n,), length.
-        arrival: predicted position of an open point when its gap closes in the next step, shape (n, c), length. NaN
+        closure: predicted position of an open point when its gap closes in the next step, shape (n, c), length. NaN
             excludes the point from friction in that step.
     """
 
     position: np.ndarray
     distance: np.ndarray
     slip: np.ndarray
-    arrival: np.ndarray
+    closure: np.ndarray
 
 
 class Tractions:
@@ -220,7 +220,7 @@ class ContactLaw:
         """
         raise NotImplementedError
 
-    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
         A point whose gap has just closed lies at the outer edge of the contact ramp, where the stiffness is 0. A law
@@ -229,7 +229,7 @@ class ContactLaw:
         Args:
             x: positions relative to the tool, shape (n, c), length.
             old: history variables of the accepted state; None: there are none.
-            arrived: mask of the points whose gap closed in the last step, shape (n,).
+            newly_closed: mask of the points whose gap closed in the last step, shape (n,).
 
         Returns:
             Derivative of the tractions with respect to the positions, shape (n, c, c), stress/length.

@@ -270,7 +270,7 @@ class Law(NormalLaw):
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
-    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, arrived: np.ndarray) -> np.ndarray:
+    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
         A point whose gap just closed lies at the outer edge of the ramp, where it has no stiffness. With this stiffness
@@ -280,7 +280,7 @@ class Law(NormalLaw):
         Args:
             x: positions relative to the tool, shape (n, 2), length.
             old: history variables of the accepted state, or None.
-            arrived: mask of the points whose gap closed in the last step, shape (n,).
+            newly_closed: mask of the points whose gap closed in the last step, shape (n,).
 
         Returns:
             Derivative of the tractions with respect to the positions, shape (n, 2, 2), stress/length.
@@ -288,7 +288,7 @@ class Law(NormalLaw):
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
         about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * RAMP_EDGE
-        touching = (arrived | about) & (now.sense == 0)
+        touching = (newly_closed | about) & (now.sense == 0)
         press = np.where(touching, np.maximum(-0.5 * self.theta - near.distance, 0.0), 0.0)
         if old is not None:
             distance = np.where(self._bonded(old), old.distance, near.distance + press)
@@ -310,6 +310,6 @@ class Law(NormalLaw):
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
-    """Return the `ContactHistory` of points at x, shape (n, 2), with distances d and slips, shape (n,); `arrival` is x.
+    """Return the `ContactHistory` of points at x, shape (n, 2), with distances d and slips, shape (n,); `closure` is x.
     """
     return ContactHistory(x, d, slip, x)

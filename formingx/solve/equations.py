@@ -107,7 +107,7 @@ class Increment(Protocol):
         """Contact status of each point in the last linearisation, shape (n,), hashable as bytes."""
 
     @property
-    def arrivals(self) -> Array:
+    def newly_closed(self) -> Array:
         """Mask of points that touch now but did not touch at the start of Newton's method, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:

@@ -84,7 +84,7 @@ class LocalSolve:
         Called once after each linearisation.
         """
         now = [contact.increment.status for contact in self._contacts]
-        self._marked = self._marked or [contact.increment.arrivals for contact in self._contacts]
+        self._marked = self._marked or [contact.increment.newly_closed for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
             mark |= a != b
         self._status = now

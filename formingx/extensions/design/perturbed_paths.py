@@ -201,19 +201,19 @@ class _PerturbedPaths:
         if history is None or not law.has_friction or not face.present:
             return none
         distance = law.distance(face.positions(state.x[:n], state.control))
-        arrived = (history.distance <= -law.theta) & (distance > -law.theta)
-        closing = arrived & (np.isnan(history.arrival[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
+        newly_closed = (history.distance <= -law.theta) & (distance > -law.theta)
+        closing = newly_closed & (np.isnan(history.closure[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
         velocity = face.moved(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
-        inside = np.flatnonzero(arrived & ~closing)
+        inside = np.flatnonzero(newly_closed & ~closing)
         if len(inside):
-            gap = law.part(inside).distance(history.arrival[inside])
+            gap = law.part(inside).distance(history.closure[inside])
         for run in self.runs:
-            perturbed, arrival = run.problem.contacts[number], history.arrival.copy()
+            perturbed, closure = run.problem.contacts[number], history.closure.copy()
             if len(inside):
-                position = perturbed.positions(run.x[:n], run.control)[inside] + history.arrival[inside] - start[inside]
-                arrival[inside] = _projected(perturbed.law.part(inside), position, velocity[inside], gap)
-            perturbed.expect_arrivals(arrival)
+                position = perturbed.positions(run.x[:n], run.control)[inside] + history.closure[inside] - start[inside]
+                closure[inside] = _projected(perturbed.law.part(inside), position, velocity[inside], gap)
+            perturbed.set_closures(closure)
         return closing
 
     def _copy_contact_status(self, state: State) -> None:
@@ -241,7 +241,7 @@ class _PerturbedPaths:
                     history.position[closing] = _projected(
                         perturbed.law.part(closing), perturbed.positions(run.x[:n], run.control)[closing],
                         self._velocity[number][closing], base.history.distance[closing])
-                perturbed.put(variables._replace(history=history, arrived=base.arrived))
+                perturbed.put(variables._replace(history=history, newly_closed=base.newly_closed))
         for run in self.runs:
             run.history_variables = run.problem.history_variables
         self._closing = []

@@ -52,7 +52,7 @@ class LaggedFriction(LaggedStick):
 
     The equations are stated in the module. The history variables (`ContactHistory`) have these meanings. `position` is
     the position at the last accepted state, and `slip` the elastic slip there, shape (n, 3), length. For a point in
-    contact `distance` is the pressure at this state over the penalty k. `arrival` is a position at the depth N_0/k in
+    contact `distance` is the pressure at this state over the penalty k. `closure` is a position at the depth N_0/k in
     the tool, with the pressure N_0 that limits friction.
 
     Args:
@@ -120,7 +120,7 @@ class LaggedFriction(LaggedStick):
     def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, in which it is constant.
 
-        It is the penalty times the depth of `ContactHistory.arrival`, at most 10 times above or below the last
+        It is the penalty times the depth of `ContactHistory.closure`, at most 10 times above or below the last
         pressure.
 
         Args:
@@ -130,7 +130,7 @@ class LaggedFriction(LaggedStick):
             Pressure of each point, shape (n,), stress.
         """
         if self._ahead is None or self._ahead[0] is not old:
-            now, change = np.maximum(old.distance, 0.0), old.arrival - old.position
+            now, change = np.maximum(old.distance, 0.0), old.closure - old.position
             depth = now
             if change.any():
                 depth = now + np.einsum("ni,ni->n", self.tool.distances(old.position).normal, change)
@@ -138,7 +138,7 @@ class LaggedFriction(LaggedStick):
         return self._ahead[1]
 
     def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
-        """Return the positions `ContactHistory.arrival` for which `pressure_ahead` returns a given pressure.
+        """Return the positions `ContactHistory.closure` for which `pressure_ahead` returns a given pressure.
 
         Args:
             old: history variables of the last accepted state.
