@@ -19,7 +19,7 @@ from .results.files.checkpoint import read
 from .results.path import Path
 from .run_hooks import RunExtension, check_argument
 from .run_parts import check_start, first_path, new_path, run_errors, run_on_adapted_mesh, write_checkpoints
-from .scene import aims, clearance
+from .scene import clearance, target_checks
 from .scene.scene import Scene
 from .solve.arc_length import Curve
 from .solve.load_control import FixedControlCurve
@@ -114,7 +114,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     known("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
-    aims.check(scene, [until, *intermediate])
+    target_checks.check(scene, [until, *intermediate])
     if start is not None and (not isinstance(start, Path) or start.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"
                          " back")

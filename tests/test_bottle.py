@@ -3,7 +3,7 @@
 import pytest
 
 import formingx as fx
-from formingx.scene import aims
+from formingx.scene import target_checks
 
 
 def bottle(room, elements=60):
@@ -38,8 +38,8 @@ def test_a_tube_that_stands_on_its_mould_buckles():
 def test_a_tube_with_room_below_it_is_blown():
     path = fx.trace(bottle(27.5), until=fx.pressure(0.1), progress=False)
     assert path.last.kind == "target" and path["contact_length"][-1] > 100
-    room, _ = aims._mould_volume(path.scene, path.scene.contacts[0])
+    room, _ = target_checks._mould_volume(path.scene, path.scene.contacts[0])
     assert path["enclosed_volume"][-1] == pytest.approx(room, rel=0.01)
-    assert aims.unreachable(path.scene, fx.enclosed_volume(room)) is None
+    assert target_checks.unreachable(path.scene, fx.enclosed_volume(room)) is None
     with pytest.raises(fx.InputError, match="enclosed volume = .* has room for 3.615e"):
         fx.trace(path.scene, until=fx.enclosed_volume(1.01 * room), progress=False)

@@ -8,8 +8,8 @@ from mpi4py import MPI
 from ..findings import Finding, register
 from ..physics.models import DisplacementPenalty
 from ..physics.supports import PrescribedDisplacement, Symmetry
-from ..scene.aims import unreachable
 from ..scene.scene import Scene
+from ..scene.target_checks import unreachable
 from ..tools.shapes import Arc
 from .sizes import Body
 

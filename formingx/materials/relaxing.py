@@ -28,8 +28,8 @@ from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample
 from .homogeneous import MODES
-from .in_time import Relaxing, checked_pairs, checked_shift
 from .material import Material, brief
+from .relaxation import Relaxing, checked_pairs, checked_shift
 from .tensors import IDENTITY, Entries, entries, inner, isochoric
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..forms.schedule import StepData
-from ..scene.aims import implausible
 from ..scene.scene import Scene
+from ..scene.target_checks import implausible
 
 
 class Units:

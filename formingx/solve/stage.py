@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, finite, instance, known, positive, several
 from ..measures.targets import Target
-from ..scene import aims
+from ..scene import target_checks
 from ..scene.scene import Scene
 from .equations import Array
 from .stepping import StepControl
@@ -260,12 +260,13 @@ def plan(scene: Scene, stage: Stage) -> Plan:
         supports = [item for item in present if item in scene.supports]
         scene.check_constrained(supports, any(contact in present for contact in scene.contacts))
         scene.check_driven(supports)
-        aims.check(scene, [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None], inactive)
+        targets = [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None]
+        target_checks.check(scene, targets, inactive)
     except InputError as error:
         raise InputError(f"{caller}: {error}") from None
     for number, (_, table) in zip(numbers, stage.tables):
         item, most = scene.items[number], float(np.abs(table[:, 1]).max())
-        if (why := aims.implausible(scene, item.quantity, most)) is not None:
+        if (why := target_checks.implausible(scene, item.quantity, most)) is not None:
             raise InputError(f"{caller}: the table of {item!r} goes to {most:g}: {why}")
     tables = [(i, table) for number, (_, table) in zip(numbers, stage.tables) for i in scene.same_tool(number)]
     return Plan(stage, scene.same_tool(numbers[0]) if stage.control is not None else [], tables, inactive,

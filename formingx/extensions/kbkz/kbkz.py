@@ -21,8 +21,8 @@ from ...errors import InputError, finite_array, instance, known, positive
 from ...materials import branches
 from ...materials.constants import OfTemperature, Sample
 from ...materials.homogeneous import MODES
-from ...materials.in_time import Relaxing, checked_pairs, checked_shift
 from ...materials.material import Material
+from ...materials.relaxation import Relaxing, checked_pairs, checked_shift
 from ...materials.tensors import inner, isochoric
 from .damping import Damping
 from .integral import Integral
