@@ -15,7 +15,7 @@ class InputError(ValueError):
     """Argument that is not allowed; the message gives its name, its value and the allowed values.
 
     Attributes:
-        path: path computed before, if a process refuses a stage during a run; else None.
+        path: path computed so far, if a process refuses a stage during a run; else None.
 
     >>> fx.NeoHookean(c10=-1.0)
     Traceback (most recent call last):

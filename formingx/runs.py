@@ -51,9 +51,9 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         max_steps: largest number of accepted states. Default: the run ends when it no longer approaches its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: path of this scene to be continued, for example from `formingx.load`; it is not changed. Without `step`
-            the step length continues, too. Targets that the path has met count as met. If another target lies behind
-            the start, the run goes back. A target pressure is approached forward, because the pressure may pass it
-            again.
+            the run begins with the last step length of this path. Targets that the path has met count as met. If
+            another target lies before the last state of this path, the run follows the path backwards. Only a target
+            pressure is always approached forwards, because the pressure may reach it again.
         checkpoint: folder to which every accepted state is written (`formingx.load`).
         record: {name: quantity} of additional columns. A quantity is a function of the `Problem` that returns a number,
             or a target such as `displacement(0, at=(1, 0))`, whose quantity is recorded.
@@ -66,21 +66,21 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         resume: continue from the states in the checkpoint, which must be of this scene; begin if there are none.
         allow_inadmissible: continue, with a warning, through states that no body can have: self-penetrated, inside a
             tool, with inverted elements. `State.verdict` gives the reason. By default the run ends there.
-        adapt_mesh: run twice: on the mesh of the scene, which may be coarse, and on `mesh.adapted(path)`. True, or
-            arguments of `adapted`, such as {"error": 0.02}. `Path.pilot` is the first run; it may have ended before the
-            target.
+        adapt_mesh: True to run twice: on the mesh of the scene, which may be coarse, and on `mesh.adapted(path)`. Or
+            arguments of `adapted`, such as {"error": 0.02}. `Path.pilot` is the path of the first run, which may have
+            ended before the target.
         remesh: a `Remesh`, which replaces crushed elements by a new mesh of the deformed body. A state of kind "remesh"
             stores the relative change of force, energy and volume in `jump`. For solids of one layer, on one rank.
-        stop_at: `instability(modes=range(2, 9))` ends the run, as a result, when the body is unstable in one of these
-            modes. `Path.ended` names it.
+        stop_at: `instability(modes=range(2, 9))` ends the run when the body becomes unstable in one of these modes.
+            This is a result, no error; `Path.ended` names the mode.
 
     Returns:
         The path with all accepted states.
 
     Raises:
         InputError: there is no controlled item. A target needs an item that the scene does not have. A target cannot be
-            met: its place is supported or inside a tool, or its value lies behind the start or beyond the strength of
-            the material. `start` or the checkpoint belongs to another run.
+            met: its point is constrained or would lie inside a tool, or its value lies before the start or beyond the
+            largest stretch of the material. `start` or the checkpoint belongs to another run.
         ConvergenceError: the target was not reached. The error carries the path so far and gives advice.
         OSError: the checkpoint cannot be written; its states are kept.
 
@@ -217,10 +217,10 @@ class Process:
 
         Args:
             stages: the stages.
-            step: step control at the start of stages without their own; default `StepControl()`. In a flow its lengths
-                are fractions of the duration.
+            step: step control at the start of stages without their own; default `StepControl()`. In a stage that
+                prescribes another quantity than the control over time, its lengths are fractions of the duration.
             tolerances: convergence criteria; default `Tolerances()`.
-            max_steps: largest number of accepted states of a stage, or of a straight piece of its tables. Default: the
+            max_steps: largest number of accepted states of a stage, or of a linear piece of its tables. Default: the
                 run ends when it no longer approaches its target.
             progress: show a progress bar on runs of more than two seconds (rank 0).
             start: path of these stages to be continued, for example from `formingx.load`, or one of its states.

@@ -108,7 +108,7 @@ class PointReader:
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file, shape (n,).
 
-    The file has the column T and one or both coordinates as columns. `names` is "RZ" or "xy", the names of these.
+    The file has the column T and one or both coordinates as columns. `names` is "RZ" or "xy", their names.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError

@@ -206,7 +206,7 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """Items whose pressure, displacement or travel a run can control; of a tool with several faces one contact."""
+        """Items whose pressure, displacement or travel a run can control; of a tool with several faces the first."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.same_tool(i)[0] == i]
 
