@@ -1,4 +1,4 @@
-"""formingx: how polymers are formed, simulated with finite elements on FEniCSx.
+"""formingx: finite element simulation of polymer forming with FEniCSx.
 
 The examples of all classes and functions begin with these lines (mm and MPa):
 

@@ -1,4 +1,4 @@
-"""Calls of DOLFINx that differ between its versions: 0.9 or later, which are distinguished by their features."""
+"""Calls of DOLFINx that differ between its versions from 0.9 on. Features distinguish the versions."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Strain energies, homogeneous tests and fits."""
+"""Materials: strain energies, internal variables, and stresses in homogeneous tests."""

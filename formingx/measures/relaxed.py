@@ -1,4 +1,4 @@
-"""Measures of the relaxation of a body: pole stress over its equilibrium value, elastic stretches of branches."""
+"""Relaxation of a body: stress at the pole over its equilibrium value, elastic stretches of relaxing branches."""
 
 from typing import Any
 

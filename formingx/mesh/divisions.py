@@ -1,4 +1,4 @@
-"""Division of a sheet into elements: thickness of its layers, grading along it, levels of nodes through it."""
+"""Division of a sheet into elements: thickness of the layers, grading along the sheet, rows of nodes through it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

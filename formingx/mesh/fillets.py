@@ -1,8 +1,9 @@
 """Estimate of the part of an undeformed sheet that reaches each fillet of a tool.
 
-A sheet under pressure is nearly a membrane. In the tool its free surface has the shape of a ball, whose radius falls as
-the pressure grows. So a point of the tool is touched when this radius falls to the radius of the largest ball that
-touches the tool there. Points that touch stick, and the free part of the sheet stretches evenly along the section.
+A sheet under pressure is nearly a membrane. In the tool its free surface is a part of a sphere, whose radius decreases
+as the pressure increases. So the sheet touches a point of the tool when this radius equals the radius of the largest
+ball that touches the tool there. Points in contact stick, and the free part of the sheet stretches evenly along the
+section.
 In a cup the estimated position of the material on the fillet is wrong by at most 5 % of the length of the sheet
 (tests/test_accuracy_in_moulds.py).
 """

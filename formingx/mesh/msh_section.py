@@ -1,4 +1,4 @@
-"""Section of a gmsh mesh file: reads its numbers in order, text or binary."""
+"""Reader of the numbers in a section of a gmsh mesh file, text or binary."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Check for targets that a run cannot reach, before anything is solved."""
+"""Checks for targets that a run cannot reach, before anything is solved."""
 
 from collections.abc import Collection, Iterable
 from typing import Any
