@@ -95,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _overview() -> str:
     """Return the list of commands and demos as text, which is printed if there are no arguments."""
-    lines = ["formingx: how polymers are formed, simulated with finite elements.", "", "Commands:",
+    lines = ["formingx: finite element simulation of polymer forming.", "", "Commands:",
              "  demo NAME [OPTIONS]        run a demo (demo NAME --help: its options)",
              "  check SCRIPT               look over the scene of a script before it runs",
              "  compare OURS THEIRS        compare two curves (compare --help)",
