@@ -46,7 +46,7 @@ class Check(Protocol[Subject]):
     """Interface of a check: a function of its subject.
 
     The subject is the body before a run (`formingx.checks.sizes.Body`), the `Path` after a run, or a failed run
-    (`formingx.solve.diagnose.Failure`).
+    (`formingx.solve.diagnose.FailedRun`).
     """
 
     def __call__(self, subject: Subject, /) -> Iterable[Finding]:

@@ -172,7 +172,7 @@ def test_a_target_met_on_a_far_part_of_the_path_is_a_failure(monkeypatch):
         asked.append(new)
         return -1.0 if len(asked) == 1 else true(self, old, new)
     monkeypatch.setattr(Curve, "progress", behind_at_first)
-    monkeypatch.setattr(branches, "_turns", lambda curve, states: [])            # it measures progress, too
+    monkeypatch.setattr(branches, "_orientation_changes", lambda curve, states: [])     # it measures progress, too
     path = fx.trace(treloar((6, 1)), until=fx.pole_height(0.3), progress=False)
     assert path.counts.failures == 1 and all(state is not asked[0] for state in path.states)
 
@@ -204,12 +204,12 @@ def test_a_jump_does_not_pass_its_target():
 def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():
     """Out of balance by 3 where it begins and by 1 where it ends; one that has turned since counts for nothing."""
     way = snap_through._Motion.__new__(snap_through._Motion)
-    way.problem, way.lost, way._pull = SimpleNamespace(comm=MPI.COMM_SELF), 0.0, np.array([3.0, 0.0])
-    way._lose(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
-    assert way.lost == pytest.approx((3 + 1) / 2 * 2)
+    way.problem, way.dissipated, way._pull = SimpleNamespace(comm=MPI.COMM_SELF), 0.0, np.array([3.0, 0.0])
+    way._add_dissipation(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
+    assert way.dissipated == pytest.approx((3 + 1) / 2 * 2)
     way._pull = np.array([-3.0, 0.0])
-    way._lose(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
-    assert way.lost == pytest.approx(4 + 1 / 2 * 2)
+    way._add_dissipation(np.zeros(2), np.array([2.0, 5.0]), np.array([1.0, 0.0]))
+    assert way.dissipated == pytest.approx(4 + 1 / 2 * 2)
 
 
 def test_a_jump_that_fails_leaves_what_is_remembered():
@@ -240,7 +240,7 @@ def test_every_mutant_stands_in_its_file(monkeypatch):
 
 def test_a_state_with_an_element_inside_out_is_none(monkeypatch):
     path = fx.trace(treloar((4, 1)), until=fx.pole_height(0.2), progress=False)
-    monkeypatch.setattr(Problem, "folded", lambda *_: True)
+    monkeypatch.setattr(Problem, "has_inverted_element", lambda *_: True)
     with path.problem.state_context(path.last), pytest.raises(Failure, match="inside out"):
         path.record.curve.step(path.last, 1e-3)
 

@@ -46,8 +46,9 @@ def test_target_below_a_limit_point():
 def test_a_limit_point_that_a_path_has_left_behind_is_no_cause():
     """It rose above the first maximum again."""
     facts = {"what": "travel", "limit_points": (0.54, 0.51)}
-    assert list(diagnose._of_limits(diagnose.Failure({**facts, "control": 0.53}, None, None, target=0.9)))
-    assert not list(diagnose._of_limits(diagnose.Failure({**facts, "control": 0.73}, None, None, target=0.9)))
+    for control, is_cause in ((0.53, True), (0.73, False)):
+        run = diagnose.FailedRun({**facts, "control": control}, None, None, target=0.9)
+        assert bool(list(diagnose._limit_point_findings(run))) is is_cause
 
 
 def test_a_pressure_in_time_beyond_its_maximum():
@@ -218,5 +219,5 @@ def test_a_script_that_stops_in_an_error_ends():
 def test_a_tangent_that_becomes_singular_is_named(grown, named):
     """Its condition number has grown within a few states, and no limit point explains it."""
     facts = {"what": "pressure", "condition_before": 1e10, "condition": grown * 1e10}
-    found = list(diagnose._of_branches(diagnose.Failure(facts, None, None)))
+    found = list(diagnose._branch_findings(diagnose.FailedRun(facts, None, None)))
     assert any("becomes singular, and there is no limit point" in cause.text for cause in found) == named

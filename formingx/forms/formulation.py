@@ -75,10 +75,10 @@ class Formulation(BodyModel):
         load_works: virtual work of each load of the scene at its present value (UFL, rank 1, user's units).
         temperature: `Temperature` of the body, or None.
         faces: contact faces of the problem (`FaceContact`); the problem sets them.
-        slack_at_rest: True if the body in the reference configuration has no stiffness in some direction.
+        singular_unloaded: True if the body in the reference configuration has no stiffness in some direction.
     """
 
-    slack_at_rest, ratio_before = False, 1.0
+    singular_unloaded, ratio_before = False, 1.0
 
     def __init__(self, scene: Any):
         self.scene = scene

@@ -47,7 +47,7 @@ class MidSurface(Formulation):
         InputError: the sheet is not a graph over R, or a load or support is not on a face or an end of the membrane.
     """
 
-    slack_at_rest = True
+    singular_unloaded = True
 
     @property
     def bodies(self) -> list[tuple[Any, list[str]]]:

@@ -99,7 +99,7 @@ class Problem(Stages, Units):
     def examine(self, last: Any, attempt: Any) -> Examination:
         return Examination(self, last, attempt)
 
-    def bring_in(self, number: int, x: np.ndarray, control: float) -> None:
+    def activate(self, number: int, x: np.ndarray, control: float) -> None:
         for contact in self.contacts:
             if contact.contact is self.scene.items[number]:
                 contact.activate(x, control)
@@ -200,7 +200,7 @@ class Problem(Stages, Units):
             contact.add_residual(values, fields, control)
         return values
 
-    def folded(self, x: PETSc.Vec, control: float) -> bool:
+    def has_inverted_element(self, x: PETSc.Vec, control: float) -> bool:
         """Return True if an element of the body is inverted or crosses the axis in a state, see `Admissible.holds`.
 
         Args:

@@ -42,10 +42,10 @@ class Units:
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
     def absurd(self, control: float) -> str | None:
-        return implausible(self.scene, self.drives, self.shown(control)[1])
+        return implausible(self.scene, self.control_kind, self.shown(control)[1])
 
     @property
-    def drives(self) -> str | None:
+    def control_kind(self) -> str | None:
         number, items = self.setting.leading, self.scene.items
         return None if number is None else "time" if number == len(items) else items[number].quantity
 
@@ -67,6 +67,6 @@ class Units:
         return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
 
     @property
-    def slack_at_rest(self) -> bool:
+    def singular_unloaded(self) -> bool:
         """True if the body in the reference configuration has no stiffness in some direction."""
-        return self.forms.slack_at_rest
+        return self.forms.singular_unloaded

@@ -52,27 +52,27 @@ class Curve(StateSolver):
         self.problem.metric_times(self._a, self._b)
         return self._b.array_r.copy()
 
-    def guess_from_rest(self, rest: State, control: float) -> Array:
+    def guess_from_unloaded(self, unloaded: State, control: float) -> Array:
         """Return a guess of the unknowns at a control, from the unloaded state.
 
         The guess has the prescribed displacements of the control, and 0 elsewhere. If the unloaded body has no
         stiffness, such as a flat membrane, the guess lies on the first tangent, where F does no work.
 
         Args:
-            rest: the unloaded state, with the first tangent of the path.
+            unloaded: the unloaded state, with the first tangent of the path.
             control: load parameter (control), dimensionless.
 
         Returns:
             The guess, locally owned entries, shape (n,).
         """
-        if not self.problem.slack_at_rest or control == 0:
+        if not self.problem.singular_unloaded or control == 0:
             return self.problem.motion(control)
         sign, low, high = np.sign(control), 0.0, 1e-6
 
         def work(length: float) -> float:
-            self._x.array_w[:] = sign * length * rest.direction
+            self._x.array_w[:] = sign * length * unloaded.direction
             self.problem.residual(self._x, control, self.newton.F)
-            self._b.array_w[:] = rest.direction
+            self._b.array_w[:] = unloaded.direction
             return float(sign * self.newton.F.dot(self._b))
 
         while work(high) < 0 and high < 1:
@@ -80,7 +80,7 @@ class Curve(StateSolver):
         for _ in range(10):
             middle = (low + high) / 2
             low, high = (middle, high) if work(middle) < 0 else (low, middle)
-        return sign * high * rest.direction
+        return sign * high * unloaded.direction
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
@@ -101,8 +101,8 @@ class Curve(StateSolver):
         Raises:
             Failure: Newton's method fails, or an element is inverted.
         """
-        plane = self._plane(old, *self._ahead(old, length))
-        return self._solve_from(*self._ahead(old, length, earlier, bend), plane, "step", old, predictor)
+        plane = self._plane(old, *self._predicted(old, length))
+        return self._solve_from(*self._predicted(old, length, earlier, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
@@ -123,9 +123,9 @@ class Curve(StateSolver):
         Raises:
             Failure: Newton's method fails, or an element is inverted.
         """
-        return self._solve_from(*self._ahead(old, length, earlier, bend), equation, kind, old, predictor)
+        return self._solve_from(*self._predicted(old, length, earlier, bend), equation, kind, old, predictor)
 
-    def _ahead(self, old: State, length: float, earlier: State | None = None,
+    def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
         """Return the guess (x, control) at an arc length from the state `old`, on its tangent.
 
@@ -149,15 +149,15 @@ class Curve(StateSolver):
         A predictor replaces the guess of x, and tangents of earlier iterations are kept, unless a limit point is near:
         limit points are located by the tangents of their neighbours, which must be new.
         """
-        if predictor is None or not self._runs_along_control(old.slope):
+        if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, constraint, kind, old)
         guess = predictor(control)
         new = self.solve(x if guess is None else guess, control, constraint, kind, old, chords=True)
-        if self._runs_along_control((new.control - old.control) / self.distance(old, new)):
+        if self._is_away_from_limit_point((new.control - old.control) / self.distance(old, new)):
             return new
         return self.solve(new.x, new.control, constraint, kind, old)
 
-    def _runs_along_control(self, slope: float) -> bool:
+    def _is_away_from_limit_point(self, slope: float) -> bool:
         """Return True if no limit point is near: the control contributes more than half of the squared arc length.
 
         slope: derivative of the control by arc length.

@@ -32,8 +32,8 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
     Returns:
         Pairs (state before the branch point, state after it).
     """
-    if _needs_no_sign(curve, states):
-        return _turns(curve, states)
+    if _follow_from_states(curve, states):
+        return _orientation_changes(curve, states)
     solver = DirectSolver(curve.problem.matrix, curve.problem.symmetric, determinant=True)
     found = branches(curve, states, determinant_sign(curve, solver))
     solver.destroy()
@@ -52,12 +52,12 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
     Returns:
         Pairs (state before the branch point, state after it).
     """
-    if _needs_no_sign(curve, states):
-        return _turns(curve, states)
-    return _changes(states[1 if curve.problem.slack_at_rest else 0:], sign)
+    if _follow_from_states(curve, states):
+        return _orientation_changes(curve, states)
+    return _sign_changes(states[1 if curve.problem.singular_unloaded else 0:], sign)
 
 
-def _needs_no_sign(curve: Curve, states: Sequence[State]) -> bool:
+def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
     """Return True if branch points follow from the states alone, without a factorisation.
 
     Their orientations give them; a problem with history variables has none.
@@ -72,11 +72,11 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
         record: record of the run (`Record`).
         step: the state from which the step began, and the states that the step added.
     """
-    for before, after in _turns(record.curve, step):
+    for before, after in _orientation_changes(record.curve, step):
         log.warning(ANOTHER_PATH, record.describe(before), record.describe(after))
 
 
-def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
+def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
     """Return the pairs of neighbouring states with different `State.orientation`: a branch point lies between them.
 
     Limit points are left out, since the sign of the determinant there is round-off. So are pairs across a jump or
@@ -93,7 +93,7 @@ def _turns(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
             sense = -1 if curve.progress(last, state) < 0 else 1
             if sense * last.orientation * state.orientation < 0:
                 found.append((last, state))
-        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.slack_at_rest
+        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.singular_unloaded
         last = state if smooth else None
     return found
 
@@ -117,7 +117,7 @@ def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], in
     return sign
 
 
-def _changes(states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
+def _sign_changes(states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
     """Return the pairs of neighbouring states between which the determinant changes its sign without a limit point.
 
     sign: function that returns the sign of the determinant at a state. Bisection finds at most one pair in each piece

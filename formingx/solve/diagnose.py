@@ -48,7 +48,7 @@ _LIMITS = Limits()
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailedRun:
     """A failed run, the subject of the checks of `formingx.findings.register("failure")`.
 
     Attributes:
@@ -199,8 +199,8 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
     if attempt is not None:
         facts["aimed"] = equations.shown(attempt.control)[1]
     if last:
-        facts |= _tangents(curve, states)
-    found = findings_at("failure", Failure(facts, equations, last, curve.fixed_control, target))
+        facts |= _tangent_facts(curve, states)
+    found = findings_at("failure", FailedRun(facts, equations, last, curve.fixed_control, target))
     if pace and not found:
         found.append(Finding("note", "steps", pace, "more max_steps"))
     return Diagnosis(**facts, findings=tuple(found), examined=examined)
@@ -247,7 +247,7 @@ def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, di
         diagnosis=diagnosis)
 
 
-def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
+def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Return the facts of a `Diagnosis` that follow from the tangents of the states.
 
     These are the condition numbers, the sign changes of the determinant, the limit points, and an extrapolated one. At
@@ -260,7 +260,7 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     sign = determinant_sign(curve, solver)
     limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
-    usable = [s for s in states[1 if problem.slack_at_rest else 0:] if s.kind != "limit point"]
+    usable = [s for s in states[1 if problem.singular_unloaded else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
     if len(usable) > _LIMITS.before and sign(usable[-1 - _LIMITS.before]):
@@ -279,9 +279,9 @@ def _tangents(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
 
 
 @register("failure")
-def _of_material(failure: Failure) -> Iterator[Finding]:
+def _material_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if I1 at a point of the body is near the limit of its material (Gent, Arruda-Boyce)."""
-    facts = failure.facts
+    facts = run.facts
     if (facts.get("I1") or 0) > _LIMITS.material:
         yield Finding("serious", "material",
                       f"a material is stretched nearly to its limit: I1 - 3 is {100 * facts['I1']:.3g} % of the largest"
@@ -291,9 +291,9 @@ def _of_material(failure: Failure) -> Iterator[Finding]:
 
 
 @register("failure")
-def _of_elements(failure: Failure) -> Iterator[Finding]:
+def _element_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if an element of the last good state is about to turn inside out."""
-    facts = failure.facts
+    facts = run.facts
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
@@ -309,10 +309,10 @@ def _of_elements(failure: Failure) -> Iterator[Finding]:
 
 
 @register("failure")
-def _of_compression(failure: Failure) -> Iterator[Finding]:
+def _buckling_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if a sheet in contact is compressed along its section, and so buckles."""
-    if _buckles(failure.facts):
-        stretch, first, last = failure.facts["shortened"]
+    if _buckles(run.facts):
+        stretch, first, last = run.facts["shortened"]
         yield Finding("serious", "wall",
                       f"the wall buckles: between (R, Z) = ({first[0]:.4g}, {first[1]:.4g}) and ({last[0]:.4g},"
                       f" {last[1]:.4g}) it is compressed along its section, to {stretch:.3g} of its length, as supports"
@@ -328,9 +328,9 @@ def _buckles(facts: dict[str, Any]) -> bool:
 
 
 @register("failure")
-def _of_limits(failure: Failure) -> Iterator[Finding]:
+def _limit_point_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield findings on limit points that the control reached, or is about to reach, before its target."""
-    facts, target = failure.facts, failure.target
+    facts, target = run.facts, run.target
     if _buckles(facts):                                      # the limit point is only an effect of buckling
         return
     what, limits = facts["what"], facts.get("limit_points", ())
@@ -346,7 +346,7 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
                       f" and the target {target:.6g} lies {side} it",
                       "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
     ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
-    if ahead is not None and failure.fixed_control:
+    if ahead is not None and run.fixed_control:
         yield Finding("warning", "limit point",
                       f"a limit point lies ahead: extrapolated from the last states, the {what} rises to about"
                       f" {ahead:.6g} and no further" + (f"; {aimed:.6g} was asked for" if aimed is not None else ""),
@@ -354,9 +354,9 @@ def _of_limits(failure: Failure) -> Iterator[Finding]:
 
 
 @register("failure")
-def _of_branches(failure: Failure) -> Iterator[Finding]:
+def _branch_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield findings on a path that branches off, a singular tangent, and contact that does not settle."""
-    facts = failure.facts
+    facts = run.facts
     what = facts["what"]
     for a, b in facts.get("turned", ()):
         yield Finding("serious", "branch point",
@@ -386,9 +386,9 @@ def _singular(facts: dict[str, Any]) -> bool:
 
 
 @register("failure")
-def _of_numbers(failure: Failure) -> Iterator[Finding]:
+def _round_off_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if the condition number of the tangent leaves hardly any correct digits."""
-    facts = failure.facts
+    facts = run.facts
     if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
         yield Finding("warning", "round-off",
                       f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and"

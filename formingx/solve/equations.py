@@ -9,7 +9,7 @@ result. In each step the solver calls these methods, in this order:
     residual                            Compute F. This and the next two lines are called in each iteration.
     linearise                           Compute F and its active set for the linearisation.
     tangent, control_derivative         Compute dF/dx and dF/dcontrol, at the (x, control) of the residual.
-    folded, limit.check, step_error     Check the converged state.
+    has_inverted_element, limit.check, step_error   Check the converged state.
     advance                             Accept the state and update the history variables.
     tangent(ahead=True)                 Compute the tangent of the next step, which differs if F has a kink.
 
@@ -56,7 +56,7 @@ class Measure(Protocol):
         """Return the constraint that the quantity equals `target`, a value in the user's units."""
 
 
-class Standing(Protocol):
+class ProblemState(Protocol):
     """State of a problem, as the problem needs it.
 
     Attributes:
@@ -252,7 +252,7 @@ class Residual(Protocol):
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
         """Compute in `out` the vector for which out . b = inner(a, b) for every b."""
 
-    def folded(self, x: PETSc.Vec, control: float) -> bool:
+    def has_inverted_element(self, x: PETSc.Vec, control: float) -> bool:
         """Return True if an element is inverted at (x, control): the residual may be finite there all the same."""
         return False
 
@@ -260,7 +260,7 @@ class Residual(Protocol):
         """Return the viscous forces for a snap-through; the caller destroys them."""
 
     @property
-    def slack_at_rest(self) -> bool:
+    def singular_unloaded(self) -> bool:
         """True if dF/dx is singular in the reference configuration, x = 0."""
         return False
 
@@ -301,7 +301,7 @@ class ActiveSet(Protocol):
         """Limits that contact sets to a step; None without limits."""
         return None
 
-    def begin(self, old: Standing | None = None) -> None:
+    def begin(self, old: ProblemState | None = None) -> None:
         """Prepare the contacts for Newton's method; `old`: the accepted state before the guess, or None."""
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
@@ -355,7 +355,7 @@ class Histories(Protocol):
         """Return the process time at a value of the control."""
         return self.clock
 
-    def step_error(self, past: Sequence[Standing], share: Array, x: Array,
+    def step_error(self, past: Sequence[ProblemState], share: Array, x: Array,
                    control: float) -> tuple[float, float]:
         """Estimate the time integration error of a step.
 
@@ -385,14 +385,14 @@ class Stages(Protocol):
         `StepData.fading` the unbalanced forces at (x, control) fade to zero.
         """
 
-    def restore(self, state: Standing) -> None:
+    def restore(self, state: ProblemState) -> None:
         """Restore the step data and history variables of an accepted state, to start a step from it."""
 
-    def state_context(self, state: Standing) -> AbstractContextManager[Equations]:
+    def state_context(self, state: ProblemState) -> AbstractContextManager[Equations]:
         """Return a context in which the problem has the unknowns, the step data and the history variables of a
         state."""
 
-    def bring_in(self, number: int, x: Array, control: float) -> None:
+    def activate(self, number: int, x: Array, control: float) -> None:
         """Activate an item without history, at (x, control); `number`: its number in the scene.
 
         Raises:
@@ -414,7 +414,7 @@ class Units(Protocol):
         return 1.0, 1.0
 
     @property
-    def drives(self) -> str | None:
+    def control_kind(self) -> str | None:
         """Kind of the controlled quantity: "pressure", "travel", "time" or, if it is none of them, None."""
         return None
 
@@ -441,7 +441,7 @@ class Units(Protocol):
         """Reason for which the residual last computed is infinite or not a number, as text."""
         return "the equations are not defined there"
 
-    def examine(self, last: Standing | None, attempt: Attempt | None) -> Examined | None:
+    def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
         """Return the examination of the last good state and of a failed attempt; None without a body. Collective."""
         return None
 

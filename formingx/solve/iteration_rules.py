@@ -69,7 +69,7 @@ class ActiveSetChanges:
         self._last: Hashable = None
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
-    def look(self, moved: float) -> None:
+    def compare(self, moved: float) -> None:
         """Compare the present active set with earlier ones; called once after each residual.
 
         Args:

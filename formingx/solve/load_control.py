@@ -135,7 +135,7 @@ class FixedControlCurve(Curve):
             Failure: Newton's method fails, or an element is inverted.
         """
         control = a.control + fraction * (b.control - a.control)
-        if self._at_rest(a):                                 # a slack body has no tangent in its first state
+        if self._is_unloaded(a):                                 # a slack body has no tangent in its first state
             return self._correct(a, (control - a.control) / a.slope, "step")
         return self.solve(self.interpolate(a, b, fraction)[0], control, fixed(control), "step", a)
 
@@ -164,12 +164,12 @@ class FixedControlCurve(Curve):
     def _correct(self, old: State, length: float, kind: str) -> State:
         """Return the state after a step of a length along the tangent of `old`; raise `Failure` if there is none."""
         control = old.control + length * old.slope
-        self._x.array_w[:] = self.guess_from_rest(old, control) if self._at_rest(old) else (
+        self._x.array_w[:] = self.guess_from_unloaded(old, control) if self._is_unloaded(old) else (
             old.x + length * old.direction)
         good = self._fixed.solve(self._x, control)
         history = self._fixed.history
         self._iterations += len(history) - 1
-        if not good or self.problem.folded(self._x, control):
+        if not good or self.problem.has_inverted_element(self._x, control):
             failure = Failure("Newton's method at fixed control did not converge", history)
             failure.attempt = Attempt(self._x.array_r.copy(), control, self._fixed.correction(), 0.0)
             raise failure
@@ -177,6 +177,6 @@ class FixedControlCurve(Curve):
         return self._state(control, history, kind, old)
 
     @staticmethod
-    def _at_rest(state: State) -> bool:
+    def _is_unloaded(state: State) -> bool:
         """Return True if a state is the first one of a path and the body is in the reference configuration, x = 0."""
         return state.kind == "start" and not np.any(state.x)

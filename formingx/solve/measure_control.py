@@ -24,7 +24,7 @@ from .stepping import SAME_TIME, Cutback, StepControl
 
 
 @dataclass(frozen=True)
-class FlowSteps:
+class QuantitySteps:
     """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
@@ -45,10 +45,10 @@ class FlowSteps:
     contact: float = 0.5
 
 
-_STEPS = FlowSteps()
+_STEPS = QuantitySteps()
 
 
-class Flow(Run):
+class QuantityRun(Run):
     """Run whose states follow the prescribed amplitude of an output quantity in time.
 
     Args:
@@ -82,7 +82,7 @@ class Flow(Run):
             dt = min(self.step.length * self._duration, left)
             dt = left if left < _STEPS.stretched * dt else dt
             try:
-                new = self._at(old, event if dt == left else old.time + dt)
+                new = self._solve_at(old, event if dt == left else old.time + dt)
                 error = self._error_in_time(new)
                 self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
@@ -106,7 +106,7 @@ class Flow(Run):
         times = [*self._times, *(t.value for t, _ in self.targets.open if t.name == "process_time")]
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
-    def _at(self, old: State, time: float) -> State:
+    def _solve_at(self, old: State, time: float) -> State:
         """Return the state at a time, one step from the accepted state `old`.
 
         Raises:
@@ -147,7 +147,7 @@ class Flow(Run):
         tried: list[State] = []
 
         def below(time: float) -> float:
-            tried.append(self._at(old, time))
+            tried.append(self._solve_at(old, time))
             return -float(np.sign(before)) * tried[-1].control
         from scipy.optimize import minimize_scalar
         with contextlib.suppress(Failure):                   # then the extremum gets no state
@@ -165,11 +165,11 @@ class Flow(Run):
         """
         past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
-            return self._along(old, value)
+            return self._on_tangent(old, value)
         w = predictor.weights(past, time)
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
-    def _along(self, old: State, value: float) -> tuple[Array, float]:
+    def _on_tangent(self, old: State, value: float) -> tuple[Array, float]:
         """Return the point (x, control) on the tangent of a state at which the prescribed quantity has a value.
 
         If there is no such point nearby, return (x, control) of the state itself.
@@ -198,13 +198,13 @@ class Flow(Run):
                 problem.clock = state.time
                 values.append(self.curve.value(bound, state.x, state.control) - target.value)
             if values[0] * values[1] < 0:
-                found = self._meeting(old, target, bound, old.time, new.time)
+                found = self._state_at_target(old, target, bound, old.time, new.time)
                 best = found if found.time < best.time else best
         if best.met is not None:
             best.kind = "target"
         return best
 
-    def _meeting(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
+    def _state_at_target(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
         """Return the state, one step from `old`, at which an output quantity meets its target.
 
         Args:
@@ -220,7 +220,7 @@ class Flow(Run):
         found: dict[float, State] = {}
 
         def deviation(time: float) -> float:
-            found[time] = self._at(old, time) if time > low else old
+            found[time] = self._solve_at(old, time) if time > low else old
             return self.curve.value(bound, found[time].x, found[time].control) - target.value
         time = _root(deviation, low, high)
         miss, most = deviation(time), _STEPS.met * max(abs(target.value), _STEPS.met)

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from .compliance import BorderedTangent
-from .equations import Array, Attempt, Constraint, Equations, Residual, Standing
+from .equations import Array, Attempt, Constraint, Equations, ProblemState, Residual
 from .iteration_rules import ActiveSetChanges, ModifiedNewton, Newton
 from .linear import DirectSolver
 from .local_contact import LocalSolve, Update, woodbury
@@ -271,7 +271,7 @@ class BorderedNewton:
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
 
-    def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: Standing | None = None,
+    def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: ProblemState | None = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate a guess to a solution of F = 0 and c = 0.
 
@@ -313,7 +313,7 @@ class BorderedNewton:
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
             problem.linearise(x, control, self.F)
-            active.look(moved)
+            active.compare(moved)
             if points:
                 points.look()
             self._check(history, active, moved)

@@ -25,7 +25,7 @@ from .equations import Array, Attempt, Measure
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
-from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separated, snap_through, snaps, was_passed
+from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separate_points, snap_through, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -74,7 +74,7 @@ class Run:
         self.targets = RunTargets(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
         self._ahead = self.settings.snap_through.ahead      # change of the control in a snap-through
-        self._no_rest_at = np.nan                           # control at which a snap-through found no equilibrium
+        self._no_equilibrium_at = np.nan                    # control at which a snap-through found no equilibrium
         self._turned: list[State] = []                      # first state of a run that goes back along the path
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
@@ -98,8 +98,8 @@ class Run:
             if start is None:
                 kept = self._continue(may_turn)
             else:
-                self._accept(self.targets.facing(start, first=not record.states))
-            self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._falls)
+                self._accept(self.targets.directed_to_target(start, first=not record.states))
+            self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._is_released)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
             else:
@@ -115,7 +115,7 @@ class Run:
                     self._accept(state)
                     self._stop_if(self.targets.jumped_past(state))
                     if state.kind == "limit point" and self._limit_rule == "stop":
-                        record.ended = f"the {self._driven} has a limit point at {record.describe(state)}"
+                        record.ended = f"the {self._control_name} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._limit_rule == "snap_through":
                         break                           # the next step starts from this state
                     if not self.targets.is_open() and state.met is self.targets.until:
@@ -133,7 +133,7 @@ class Run:
             self._progress.close()
 
     @property
-    def _driven(self) -> str:
+    def _control_name(self) -> str:
         """Name of the controlled quantity."""
         return self.problem.shown(0.0)[0]
 
@@ -162,7 +162,7 @@ class Run:
         return float(np.sign(self.states[0].slope)) or 1.0
 
     @property
-    def _falls(self) -> bool:
+    def _is_released(self) -> bool:
         """True if the controlled quantity decreases towards 0, as a pressure that is released."""
         return self.targets.of_control and abs(self.targets.until.value) < abs(self.targets.values[0])
 
@@ -183,17 +183,17 @@ class Run:
         pressure = isinstance(bound, Amplitude) and bound.is_load
         if may_turn and last.stepping.get("until") != [*targets.until[:2]] and not pressure:
             with self.problem.state_context(last):
-                facing = targets.facing(replace(last))
-            self._turned = [facing] if facing.slope != last.slope else []
+                turned = targets.directed_to_target(replace(last))
+            self._turned = [turned] if turned.slope != last.slope else []
         self._first -= 1 if self._turned else number
         for state in self.states:
             with self.problem.state_context(state):
-                targets.look(state)
+                targets.add_known(state)
         met = [s.met[:2] for s in self.states if s.met]
         targets.open = [(target, bound) for target, bound in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
-        self._ahead, no_rest_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
-        self._no_rest_at = np.nan if no_rest_at is None else no_rest_at
+        self._ahead, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
+        self._no_equilibrium_at = np.nan if no_equilibrium_at is None else no_equilibrium_at
         return kept
 
     def _elapsed(self) -> float:
@@ -204,9 +204,9 @@ class Run:
     def _complete_step(self) -> None:
         """Complete a step in the record, with the data with which the run continues."""
         self.record.counts.seconds += self._elapsed()
-        no_rest_at = None if np.isnan(self._no_rest_at) else float(self._no_rest_at)
+        no_equilibrium_at = None if np.isnan(self._no_equilibrium_at) else float(self._no_equilibrium_at)
         self.record.complete_step(self.step, self.targets.until, given=self._step and asdict(self._step),
-                                  accuracy=self._accuracy, jumps=(self._ahead, no_rest_at))
+                                  accuracy=self._accuracy, jumps=(self._ahead, no_equilibrium_at))
 
     def _next(self, old: State) -> list[State]:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
@@ -237,11 +237,11 @@ class Run:
             except Failure as failure:
                 self.step.length, end = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
-                good, failed = self.step.failed(), failed + (not isinstance(failure, _OtherState))
+                good, failed = self.step.failed(), failed + (not isinstance(failure, _PassedState))
                 self._failed(failure.reason, self.step.length)
                 self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
-                early = (self._jumps_soon and failed > 1 and length < lengths[0]
-                        and (old.kind != "start" or not self.problem.has_history) and not self._found_no_rest_near(old))
+                early = self._jumps_soon and failed > 1 and length < lengths[0] and not (
+                    old.kind == "start" and self.problem.has_history or self._found_no_equilibrium_near(old))
                 if self._may_jump and (not good or early):
                     lengths.pop(0)
                     for ahead in (reach,) if good else (last, 0.0):
@@ -280,20 +280,20 @@ class Run:
                 new = self.curve.step(old, length, self._predictor, earlier, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
-                raise _OtherState("the target was met on a distant part of the path", [])
+                raise _PassedState("the target was met on a distant part of the path", [])
             new.met = target
         cut = limit and limit.check(old, new, reach, ends=True)
         if cut:
             part = min(max(cut.part, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
-            raise Cutback(cut.why, part) if cut.part else _OtherState(cut.why, [])
+            raise Cutback(cut.why, part) if cut.part else _PassedState(cut.why, [])
         if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
-            raise _OtherState("the iteration fell back to a part of the path that was passed already", [])
+            raise _PassedState("the iteration fell back to a part of the path that was passed already", [])
         error, variables = self._error_in_time(new), self.problem.history_variables
         try:
-            new = separated(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
-            states, self._ahead = self._sorted_into(old, new), self.settings.snap_through.ahead
+            new = separate_points(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
+            states, self._ahead = self._states_within(old, new), self.settings.snap_through.ahead
         except Failure:
             self.problem.history_variables = variables
             raise
@@ -329,23 +329,24 @@ class Run:
 
         The list is empty, and the run ends, if a body with constant loads reaches no equilibrium.
         """
-        onward = self._sense * (self._limit_rule == "continue_volume")
+        work_sign = self._sense * (self._limit_rule == "continue_volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
-                return [self._jump(old, self.settings.snap_through.lengths[-1], onward=onward)]
+                return [self._jump(old, self.settings.snap_through.lengths[-1], work_sign=work_sign)]
         try:
-            return [self._jump(old, 0.0, onward=onward)]
+            return [self._jump(old, 0.0, work_sign=work_sign)]
         except Failure as failure:
             if not self.problem.setting.rests:              # the controlled quantity should have changed further
-                controlled = "enclosed volume" if onward else self._driven
+                controlled = "enclosed volume" if work_sign else self._control_name
                 self._give_up(f"the {controlled} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
             return []
 
-    def _jump(self, old: State, length: float, step: float = 0.0, onward: float = 0.0) -> State:
+    def _jump(self, old: State, length: float, step: float = 0.0, work_sign: float = 0.0) -> State:
         """Return the state after a snap-through from `old`; raise `Failure` if there is none.
 
-        length: arc length of the predictor on the tangent of `old`. step: length of the last successful step. onward:
+        length: arc length of the predictor on the tangent of `old`. step: length of the last successful step.
+            work_sign:
         sign of the work of the controlled load, see `snap_through`. With length 0, contact with history variables may
         settle at one control but fail at the next: several are tried. A fading force is removed at once.
         """
@@ -356,13 +357,14 @@ class Run:
             try:
                 change = self._sense * max(ahead, length * abs(old.slope))
                 change = 1 - old.control if fading else self.targets.short_of_targets(old, change)
-                new = snap_through(self.curve, old, change, length > 0 and not fading, settings, self._solutions(old),
-                                   lambda: self._progress.limited("a jump", self.step.length), onward, self.states)
+                new = snap_through(self.curve, old, change, length > 0 and not fading, settings,
+                                   self._max_solutions(old), lambda: self._progress.limited("a jump", self.step.length),
+                                   work_sign, self.states)
                 break
             except Failure as last:
                 failure = last
                 if isinstance(last, NoEquilibrium):
-                    self._no_rest_at = old.control
+                    self._no_equilibrium_at = old.control
         else:
             raise failure
         self._ahead = min(10 * self._ahead, settings.furthest)
@@ -371,14 +373,14 @@ class Run:
         log.info("a jump: %s", new.jump)
         return new
 
-    def _found_no_rest_near(self, old: State) -> bool:
+    def _found_no_equilibrium_near(self, old: State) -> bool:
         """Return True if an earlier snap-through from about the control of this state reached no equilibrium."""
-        return abs(old.control - self._no_rest_at) < self.settings.snap_through.furthest
+        return abs(old.control - self._no_equilibrium_at) < self.settings.snap_through.furthest
 
-    def _solutions(self, old: State) -> int:
+    def _max_solutions(self, old: State) -> int:
         """Return the largest number of viscous solutions of a snap-through from a state."""
         most = self.settings.snap_through.solutions
-        return most // 5 if self._found_no_rest_near(old) else most
+        return most // 5 if self._found_no_equilibrium_near(old) else most
 
     def _check_progress(self) -> None:
         """Stop if many states came no nearer to the target, or the control is beyond all bounds."""
@@ -386,7 +388,7 @@ class Run:
         absurd = self.problem.absurd(control)
         if absurd is not None:
             value = self.problem.shown(control)[1]
-            self._give_up(f"the {self._driven} has come to {value:.4g}, beyond any process: {absurd}")
+            self._give_up(f"the {self._control_name} has come to {value:.4g}, beyond any process: {absurd}")
         self._stop_if(self.targets.stalled())
 
     def _stop_if(self, why: str) -> None:
@@ -394,7 +396,7 @@ class Run:
         if why:
             self._give_up(why)
 
-    def _sorted_into(self, old: State, new: State) -> list[State]:
+    def _states_within(self, old: State, new: State) -> list[State]:
         """Return the limit point and the targets inside a step, then its end `new`, in order; raise `Failure`."""
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
@@ -444,5 +446,5 @@ class Run:
         raise not_reached(self.record, self.states, self.targets, f"{why}.", found, hint)
 
 
-class _OtherState(Failure):
+class _PassedState(Failure):
     """Failure of a step that found a state on another part of the path; a shorter step can succeed."""

@@ -11,7 +11,7 @@ from .stage import Stage
 from .stepping import SAME_TIME
 
 
-def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
+def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
     """Return step data in which the amplitude of one item is the control.
 
@@ -41,7 +41,7 @@ def driving(amplitudes: list[float], scales: Sequence[float], numbers: list[int]
     return base, rate, control
 
 
-def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
+def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
     """Return step data between two times, between which all tables are straight lines.
 
@@ -71,7 +71,7 @@ def straight(amplitudes: list[float], scales: Sequence[float], tables: list[tupl
     return base, [c / (most or 1.0) for c in change]
 
 
-def end_of(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
+def end_time(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
     """Return the process time at which a stage with tables or with a duration ends.
 
     Args:

@@ -20,10 +20,10 @@ from ..measures.targets import Amplitude, Target, change_completed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose
 from .equations import Array, Measure
-from .measure_control import Flow
+from .measure_control import QuantityRun
 from .newton import Failure, relative
 from .path_following import Run
-from .pieces import driving, end_of, next_knot, straight
+from .pieces import control_step_data, end_time, next_knot, table_step_data
 from .record import Record
 from .stage import Plan
 from .state import State
@@ -48,25 +48,26 @@ class Execution:
     Args:
         record: record of the states.
         plans: plans of the stages.
-        unsure: plans whose tools must be checked again at the start of their stage, since travels are unknown before.
-        look: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
+        unchecked: plans whose tools must be checked again at the start of their stage, since travels are unknown
+            before.
+        check: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
             its value in the user's units.
         step: step control of stages that have none of their own; None: the default.
         balanced: norm of the unbalanced forces, relative to the support forces, below which they are negligible.
         accuracy: tolerance of the relative time integration error.
     """
 
-    def __init__(self, record: Record, plans: list[Plan], unsure: list[Plan],
-                 look: Callable[[Plan, Callable[[int], float]], None], step: StepControl | None, balanced: float,
+    def __init__(self, record: Record, plans: list[Plan], unchecked: list[Plan],
+                 check: Callable[[Plan, Callable[[int], float]], None], step: StepControl | None, balanced: float,
                  accuracy: float = 2e-3):
         problem = record.equations
         self.record, self.curve, self.problem = record, record.curve, problem
-        self.plans, self._unsure, self._look, self._step, self._balanced = plans, unsure, look, step, balanced
+        self.plans, self._unchecked, self._check, self._step, self._balanced = plans, unchecked, check, step, balanced
         self._accuracy = accuracy
-        self._rest, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
-        self._still = StepData(nothing, nothing, [])
+        self._unloaded, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
+        self._constant = StepData(nothing, nothing, [])
         self._targets = [self._bind(plan) for plan in plans]    # compile before the first stage
-        problem.enter(self._still, self._rest, 0.0)
+        problem.enter(self._constant, self._unloaded, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
         """Run the remaining stages of the process.
@@ -87,17 +88,17 @@ class Execution:
             self.record.stage, self._stage, self._inactive, self._k = plan.stage.name, plan.stage, plan.inactive, k
             piece = last["piece"] if k == last["stage"] else -1     # last piece of this stage that has begun
             if piece < 1:
-                self._change(piece == 0)
+                self._change_items(piece == 0)
                 if self.record.ended:
                     break
-                if any(plan is p for p in self._unsure):     # the travels of its tools are known now
-                    self._look(plan, self._present_value)
-            if plan.in_flow:
-                self._flow(plan.numbers, piece > 0)
+                if any(plan is p for p in self._unchecked):     # the travels of its tools are known now
+                    self._check(plan, self._present_value)
+            if plan.prescribes_quantity:
+                self._prescribe(plan.numbers, piece > 0)
             elif plan.by_time:
-                self._follow(plan.tables, max(piece, 0))
+                self._run_tables(plan.tables, max(piece, 0))
             elif plan.numbers:
-                self._drive(plan.numbers, piece > 0)
+                self._run_control(plan.numbers, piece > 0)
             elif not self.record.states or self.record.last.setting["stage"] < k:
                 self._accept_known(self._resumed(self._present()[2]))
             if self.record.ended:
@@ -109,8 +110,8 @@ class Execution:
         Where the stage controls one item, or lets time pass until a target is met, the last pair is the target `until`.
         """
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
-        rate = [float(i in moving) for i in range(len(self._still.rate) - 1)] + [float(stage.timed)]
-        self.problem.enter(replace(self._still, rate=rate, inactive=plan.inactive), self._rest, 0.0)
+        rate = [float(i in moving) for i in range(len(self._constant.rate) - 1)] + [float(stage.timed)]
+        self.problem.enter(replace(self._constant, rate=rate, inactive=plan.inactive), self._unloaded, 0.0)
         found = []
         for target in (*stage.intermediate, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
             try:
@@ -135,7 +136,7 @@ class Execution:
         The unknowns are locally owned entries, shape (n,).
         """
         last = self.record.last if self.record.states else None
-        return self.problem.setting, last.x if last else self._rest, last.control if last else 0.0
+        return self.problem.setting, last.x if last else self._unloaded, last.control if last else 0.0
 
     def _present_value(self, number: int) -> float:
         """Return the present value of an item, in the user's units; `number` is its number in the scene."""
@@ -184,7 +185,7 @@ class Execution:
         run.follow(self._max_steps, self._progress, start)
         return run.targets.open
 
-    def _change(self, begun: bool) -> None:
+    def _change_items(self, begun: bool) -> None:
         """Run piece 0 of the present stage: change the active items while unbalanced forces decrease to 0.
 
         begun: True to continue the piece.
@@ -194,7 +195,7 @@ class Execution:
         if not begun:
             for i in set(before.inactive) - set(self._inactive):
                 try:
-                    self.problem.bring_in(i, x, control)
+                    self.problem.activate(i, x, control)
                 except InputError as error:
                     raise InputError(f"{self._stage.label}: {error}") from None
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.inactive != self._inactive
@@ -213,21 +214,21 @@ class Execution:
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
-    def _drive(self, numbers: list[int], begun: bool) -> None:
+    def _run_control(self, numbers: list[int], begun: bool) -> None:
         """Run piece 1 of a stage in which the amplitude of one item is the control.
 
         numbers: numbers of the controlled item and of the items that move with it. begun: True to continue the piece.
         """
-        control = None if begun else self._enter_driving(numbers)
+        control = None if begun else self._enter_control(numbers)
         self._trace(self._left_to_meet(), control)
 
-    def _enter_driving(self, numbers: list[int], clocked: bool = True) -> float:
+    def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
 
         numbers: numbers of the controlled item and of the items that move with it. clocked: process time passes while
         the control changes.
         """
-        base, rate, control = driving(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
+        base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control
 
@@ -241,18 +242,18 @@ class Execution:
         setting, _, control = self._present()
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
-    def _flow(self, numbers: list[int], begun: bool) -> None:
+    def _prescribe(self, numbers: list[int], begun: bool) -> None:
         """Run piece 1 of a stage in which one item is adjusted so that another quantity follows an amplitude in time.
 
         numbers: numbers of the adjusted item and of the items that move with it. begun: continue the piece.
         """
-        control = None if begun else self._enter_driving(numbers, clocked=False)
-        target, course, times = self._course(self.problem.setting.base[-1])
-        run = Flow(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
+        control = None if begun else self._enter_control(numbers, clocked=False)
+        target, course, times = self._prescribed_amplitude(self.problem.setting.base[-1])
+        run = QuantityRun(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
                    self._stage.step or self._step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
-    def _course(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
+    def _prescribed_amplitude(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
         """Return (target of the prescribed quantity, function of time for its value, times to meet exactly) of a stage.
 
         The stage begins at the process time `now`. The times are its start, the corners and the end of the amplitude.
@@ -264,8 +265,8 @@ class Execution:
         if stage.constant and stage.duration:
             value = stage.constant.value
             return stage.constant, lambda time: value, [now, now + stage.duration]
-        assert stage.flow is not None
-        measure, course = stage.flow
+        assert stage.prescribed is not None
+        measure, course = stage.prescribed
         corners = [] if callable(course) else course[:, 0].tolist()
         if corners and corners[0] > now:
             raise InputError(f"{stage.label}: the table begins at time {corners[0]:g}, but the process time is"
@@ -277,7 +278,7 @@ class Execution:
         at = course if callable(course) else lambda time: np.interp(time, *course.T)
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
-    def _follow(self, tables: list[tuple[int, Array]], piece: int) -> None:
+    def _run_tables(self, tables: list[tuple[int, Array]], piece: int) -> None:
         """Run pieces 1, 2, ... of a stage with tables, each from knot to knot; the control is the process time.
 
         tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue, or 0.
@@ -285,7 +286,7 @@ class Execution:
         before, _, control = self._present()
         stage, through = self._stage, self._left_to_meet()
         now = before.base[-1] if piece else self.problem.time_at(control)
-        end = end_of(stage, tables, now)
+        end = end_time(stage, tables, now)
         if not piece:
             self._check_beginning(tables, now, end)
         begun = piece > 0
@@ -294,7 +295,7 @@ class Execution:
             if not begun:
                 piece += 1
                 self._enter_line(tables, now, then, piece)
-            through = self._line(then, through, begun)
+            through = self._run_piece(then, through, begun)
             now, begun = then, False
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
@@ -302,10 +303,10 @@ class Execution:
 
         The control is proportional to the time. Its scale makes the largest rate of a dimensionless amplitude 1.
         """
-        base, rate = straight(self._amplitudes(), self.problem.scales, tables, now, then)
+        base, rate = table_step_data(self._amplitudes(), self.problem.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
-    def _line(self, then: float, through: _Targets, begun: bool) -> _Targets:
+    def _run_piece(self, then: float, through: _Targets, begun: bool) -> _Targets:
         """Run a piece of the tables to its end at time `then`, and return the targets that are still open.
 
         through: pairs (target, output quantity) to meet in the piece. begun: True to continue the piece.
@@ -369,10 +370,10 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
         return False
     if plan.stage.until is not None:
         return last.met is not None and last.met[:2] == plan.stage.until[:2]
-    if not (plan.by_time or plan.in_flow):
+    if not (plan.by_time or plan.prescribes_quantity):
         return not last.setting["fading"] or last.control == 1.0
     first = next(s for s in record.states if s.setting["stage"] == last.setting["stage"])
-    tables = [plan.stage.flow[1]] if plan.stage.flow else [table for _, table in plan.tables]
+    tables = [plan.stage.prescribed[1]] if plan.stage.prescribed else [table for _, table in plan.tables]
     end = first.time + plan.stage.duration if plan.stage.duration else max(table[-1, 0] for table in tables)
     return bool(last.time >= end - SAME_TIME * abs(end))
 

@@ -64,7 +64,7 @@ class RunTargets:
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
-    def look(self, state: State) -> None:
+    def add_known(self, state: State) -> None:
         """Append the value of the last target's quantity in a state that a continued run already has.
 
         Args:
@@ -112,7 +112,7 @@ class RunTargets:
                 best = (target, bound, -left / rate)
         return best
 
-    def facing(self, start: State, first: bool = False) -> State:
+    def directed_to_target(self, start: State, first: bool = False) -> State:
         """Return the first state of a run, its tangent reversed if the last target lies in the opposite direction.
 
         Args:
@@ -226,7 +226,7 @@ class Progress:
             self._bar.n = min(max(gained, 0.0), 1.0)
             self._bar.set_postfix_str(f"state {states}", refresh=False)
             self._bar.update(0)
-        self._speak()
+        self._log_progress()
 
     def limited(self, reason: str, length: float) -> None:
         """Show a shortened or failed step.
@@ -237,30 +237,30 @@ class Progress:
         """
         self._limits[reason] += 1
         self._length = length
-        self._speak()
+        self._log_progress()
 
     def close(self) -> None:
         """Close the progress bar."""
         self._bar.close()
 
-    def _speak(self) -> None:
+    def _log_progress(self) -> None:
         """Write a line to the log if the last one is more than `silence` ago."""
         now = time.process_time()
         if not self._here or now - self._said < self.silence:
             return
         spent, won = now - self._said, self._gained - self._gained_then
-        left = f"about {_in_words((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer to it since"
+        left = f"about {_duration_text((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer to it since"
         common = self._limits.most_common(2)
         limits = ", ".join(f"{reason} ({n} times)" for reason, n in common) or "their own control only"
         self._bar.clear()
         log.log(self._level, "%s: %.3g %% of the way in %d states and %s of processor time; since the last line steps"
                 " of %.2g, limited by %s; %s", self._words, 100 * self._gained, self._states,
-                _in_words(now - self._began), self._length, limits, left)
+                _duration_text(now - self._began), self._length, limits, left)
         self._said, self._gained_then = now, self._gained
         self._limits.clear()
 
 
-def _in_words(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     """Return a duration in seconds as text with two digits and a suitable unit."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * size:

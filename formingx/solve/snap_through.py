@@ -159,28 +159,28 @@ class _Motion:
         old: the state from which the body moves.
         control: control during the motion.
         settings: criteria and settings.
-        onward: 1 or -1, the sign that the work of the controlled load must have; 0: either.
+        work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
         passed: earlier states of the path, to which the body must not return.
 
     Attributes:
         state: present position of the body, as a state.
-        lost: energy dissipated so far, dimensionless.
+        dissipated: energy dissipated so far, dimensionless.
         solved: number of viscous solutions so far.
-        rest: unbalanced forces, relative to the support forces.
+        unbalanced: unbalanced forces forces, relative to the support forces.
         trial_force: unbalanced forces, relative to the support forces, below which equilibrium is tried.
         settles: True if equilibrium should be tried next.
     """
 
-    def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, onward: float = 0.0,
+    def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, work_sign: float = 0.0,
                  passed: Sequence[State] = ()):
         self.curve, self.problem, self._old, self.control = curve, curve.problem, old, control
-        self._onward, self._passed = onward, passed
+        self._work_sign, self._passed = work_sign, passed
         self._settings, self._drag = settings, ViscousDrag(curve.problem.viscosity())
         self._newton = BorderedNewton(curve.problem, settings.tolerances, curve.norm, drag=self._drag)
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
-        self.state, self.lost, self.solved = old, 0.0, 0
-        self.rest, self.trial_force = np.inf, settings.near_rest
+        self.state, self.dissipated, self.solved = old, 0.0, 0
+        self.unbalanced, self.trial_force = np.inf, settings.near_rest
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
 
@@ -206,22 +206,22 @@ class _Motion:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.state)
         except Failure as failure:
             self.curve.spend(len(failure.history))
-            return self._hold_back()
+            return self._reject()
         self.curve.spend(len(history) - 1)
         x, limit = self._x.array_r.copy(), self.problem.limit
         last, new = self.state, replace(self.state, x=x, control=self.control)
-        if self.problem.folded(self._x, self.control) or limit and limit.passes_through(last, new):
-            return self._hold_back()
+        if self.problem.has_inverted_element(self._x, self.control) or limit and limit.passes_through(last, new):
+            return self._reject()
         if self._goes_back(last, new):                      # to the unstable state where the motion began
-            return self._hold_back()
+            return self._reject()
         pull = self._drag.forces(x)
         most = np.clip(settings.share * self.curve.moved(self._old, last), settings.nearest, settings.farthest)
         far = self.curve.moved(replace(last, x=origin), new) / most
         if not self.solved and far > settings.again:
-            return self._hold_back(far)
-        before, self.rest = self.rest, relative(self.problem, np.sqrt(self._sum(pull * pull)))
-        self.settles = self.rest < min(self.trial_force, before)
-        self._lose(origin, x, pull)                         # from the last or the predicted position
+            return self._reject(far)
+        before, self.unbalanced = self.unbalanced, relative(self.problem, np.sqrt(self._sum(pull * pull)))
+        self.settles = self.unbalanced < min(self.trial_force, before)
+        self._add_dissipation(origin, x, pull)                         # from the last or the predicted position
         self._pull, self.state = pull, new
         self.problem.advance(x, self.control)
         if limit:
@@ -230,7 +230,7 @@ class _Motion:
         stays, self._wait = self._wait or len(history) - 1 > settings.few, False
         return max(1.0 if stays else settings.falls, far)
 
-    def _hold_back(self, grows: float = 0.0) -> float:
+    def _reject(self, grows: float = 0.0) -> float:
         """Return the factor by which the viscosity grows after a rejected solution; it may not fall after the next one.
 
         grows: the factor; 0: the factor of the settings.
@@ -238,7 +238,7 @@ class _Motion:
         self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
 
-    def end(self) -> State | None:
+    def equilibrium(self) -> State | None:
         """Return the equilibrium state near the present position, solved for without viscous forces.
 
         Returns:
@@ -251,26 +251,26 @@ class _Motion:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
                 state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
-            if self.rest > self._settings.at_rest:
-                self.settles, self.trial_force = False, 0.3 * self.rest
+            if self.unbalanced > self._settings.at_rest:
+                self.settles, self.trial_force = False, 0.3 * self.unbalanced
                 return None
             if not self.problem.has_history:                # another branch starts here
                 raise
             state = self.curve.resume(self.state.x, self.control)
-            state.kind, state.history = "jump", [Iteration(self.rest, 0.0, 0.0)]
+            state.kind, state.history = "jump", [Iteration(self.unbalanced, 0.0, 0.0)]
         if self._goes_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
-            self.settles, self.trial_force = False, 0.3 * self.rest
+            self.settles, self.trial_force = False, 0.3 * self.unbalanced
             return None
-        self._lose(self.state.x, state.x, np.zeros(len(state.x)))
+        self._add_dissipation(self.state.x, state.x, np.zeros(len(state.x)))
         energy, length = self.problem.units
-        state.jump = {"dissipated": self.lost * energy, "moved": self.curve.moved(self._old, state) * length}
+        state.jump = {"dissipated": self.dissipated * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """Return True if the work of the controlled load from state a to state b has not the sign `onward`."""
-        return bool(self._onward) and self.curve.work(a, b) * self._onward < 0
+        """Return True if the work of the controlled load from state a to state b has not the sign `work_sign`."""
+        return bool(self._work_sign) and self.curve.work(a, b) * self._work_sign < 0
 
-    def _lose(self, a: Array, x: Array, pull: Array) -> None:
+    def _add_dissipation(self, a: Array, x: Array, pull: Array) -> None:
         """Add the work of the unbalanced forces in a motion to the dissipated energy, by the trapezoidal rule.
 
         Forces halfway are not used, since the straight line between the positions may pass through tools. Negative work
@@ -282,7 +282,7 @@ class _Motion:
             pull: unbalanced forces at its end.
         """
         dx = x - a
-        self.lost += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
+        self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
 
     def _sum(self, values: Array) -> float:
         """Return the sum of locally owned values over all ranks."""
@@ -296,7 +296,7 @@ class _Motion:
 
 
 def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings: SnapThrough,
-                 solutions: int | None = None, listener: Callable[[], None] = lambda: None, onward: float = 0.0,
+                 solutions: int | None = None, listener: Callable[[], None] = lambda: None, work_sign: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
     """Return the equilibrium state that the body reaches from a state when the control changes further.
 
@@ -308,8 +308,8 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
         settings: criteria and settings.
         solutions: largest number of viscous solutions; default `settings.solutions`.
         listener: function that is called before each viscous solution.
-        onward: 1 or -1, the sign that the work of the controlled load must have, as where a volume has its maximum; 0:
-            either.
+        work_sign: 1 or -1, the sign that the work of the controlled load must have, as where a volume has its maximum;
+            0: either.
         passed: earlier states of the path, to which the body must not return.
 
     Returns:
@@ -320,7 +320,7 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
             the history variables of `old` again.
     """
     problem, kept = curve.problem, curve.problem.history_variables
-    motion = _Motion(curve, old, old.control + change, settings, onward, passed)
+    motion = _Motion(curve, old, old.control + change, settings, work_sign, passed)
     origin = old.x + change / old.slope * old.direction if ahead else old.x
     eta, solutions = settings.eta, solutions or settings.solutions
     try:
@@ -329,7 +329,7 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
                 log.info("no jump within %d Newton iterations of this step: shorter steps are tried", curve.iterations)
                 raise Failure(f"a jump took more than {settings.iterations} Newton iterations", [])
             listener()
-            state = motion.end() if motion.settles else None
+            state = motion.equilibrium() if motion.settles else None
             if state is not None:
                 if state.slope * change < 0:
                     state.direction, state.slope = -state.direction, -state.slope
@@ -362,9 +362,9 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
     Returns:
         Name of the rule.
     """
-    if problem.drives == "time":
+    if problem.control_kind == "time":
         return "snap_through"
-    by_pressure = problem.drives == "pressure"
+    by_pressure = problem.control_kind == "pressure"
     if not (problem.has_history or problem.has_kinks and by_pressure):
         return "continue"
     return "continue_volume" if by_pressure and not falls else "snap_through"
@@ -416,7 +416,7 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
     return False
 
 
-def separated(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
+def separate_points(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
     """Separate the contact points in tension from tools in three dimensions, and solve again at the same control.
 
     Args:

@@ -79,16 +79,16 @@ class Stage:
         self.duration = None if duration is None else positive(f"{caller}: duration", duration)
         self.constant = instance(f"{caller}: constant", constant, Target | None,
                                  "a target, such as force(2.0), or None")
-        self.flow: tuple[Any, Any] | None = None
+        self.prescribed: tuple[Any, Any] | None = None
         if control is not None and amplitudes is not None:
-            self.flow = self._flow(amplitudes)
-        self.tables = [] if amplitudes is None or self.flow else self._tables(amplitudes)
+            self.prescribed = self._prescribed(amplitudes)
+        self.tables = [] if amplitudes is None or self.prescribed else self._tables(amplitudes)
         self._check(amplitudes)
 
     @property
     def timed(self) -> bool:
         """True if process time passes during the stage."""
-        return bool(self.tables or self.flow or self.speed or self.duration)
+        return bool(self.tables or self.prescribed or self.speed or self.duration)
 
     @property
     def waits(self) -> bool:
@@ -99,9 +99,9 @@ class Stage:
     def highest(self) -> Target | None:
         """Target with the largest value in the table that the controlled quantity follows; None if there is no such
         table."""
-        if self.flow is None or callable(self.flow[1]):
+        if self.prescribed is None or callable(self.prescribed[1]):
             return None
-        return self.flow[0](float(np.max(self.flow[1][:, 1])))
+        return self.prescribed[0](float(np.max(self.prescribed[1][:, 1])))
 
     def _check(self, amplitudes: Any) -> None:
         """Check that the arguments of the stage go together.
@@ -122,7 +122,7 @@ class Stage:
         if self.speed and (self.control is None or self.duration):
             raise InputError(f"{caller}: speed = {self.speed:g}: of what? give it control=... and until=..., no"
                              f" duration")
-        if self.control is not None and until is None and self.constant is None and self.flow is None:
+        if self.control is not None and until is None and self.constant is None and self.prescribed is None:
             raise InputError(f"{caller}: drives {self.control!r} without a target: give it until=..., such as"
                              f" travel(3)")
         if self.control is not None and self.duration and until and until.name.split("_")[-1] not in _OF_CONTROL:
@@ -137,7 +137,7 @@ class Stage:
         if amplitudes is not None and until is not None and until.name != "process_time":
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
-    def _flow(self, amplitudes: Any) -> tuple[Any, Any]:
+    def _prescribed(self, amplitudes: Any) -> tuple[Any, Any]:
         """Return the quantity that the control makes follow an amplitude, and this amplitude.
 
         Args:
@@ -217,9 +217,9 @@ class Plan(NamedTuple):
     names: list[str]
 
     @property
-    def in_flow(self) -> bool:
+    def prescribes_quantity(self) -> bool:
         """True if the control is adjusted so that another quantity follows an amplitude in time, or stays constant."""
-        return bool(self.stage.flow or self.stage.constant)
+        return bool(self.stage.prescribed or self.stage.constant)
 
     @property
     def by_time(self) -> bool:

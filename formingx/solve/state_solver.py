@@ -168,7 +168,7 @@ class StateSolver:
             failure.attempt = self._attempt()
             raise
         self._iterations += len(history) - 1
-        if self.problem.folded(self._x, control):               # forces of 1/J do not show the sign of J
+        if self.problem.has_inverted_element(self._x, control):               # forces of 1/J do not show the sign of J
             raise Failure("an element turned inside out", history)
         self._found = self._state(control, history, kind, before)
         return self._found

@@ -25,7 +25,7 @@ from ...forms.schedule import StepData
 from ...measures.targets import Target
 from ...results.path import Path
 from ...solve.newton import Failure, fixed
-from ...solve.pieces import driving, end_of, next_knot, straight
+from ...solve.pieces import control_step_data, end_time, next_knot, table_step_data
 from ...solve.stage import Plan, plan
 from ...solve.state import State
 from .perturbed_runs import PerturbedRun, solve_perturbed
@@ -87,7 +87,7 @@ class _PerturbedPaths:
             jump = next(state for state in states if state.kind == "jump")
             raise Failure(f"the body snaps at {self.path.describe(jump)}, where the result does not depend smoothly on"
                           " parameters", [])
-        if history and any(p.in_flow for p in self._plans):
+        if history and any(p.prescribes_quantity for p in self._plans):
             raise Failure("there is none yet for a stage that follows or holds a measure (amplitudes={measure: ...},"
                           " constant=...) in a scene with friction, relaxation or heat", [])
         before: State | None = None
@@ -136,16 +136,17 @@ class _PerturbedPaths:
             x = run.x if started else np.zeros(problem.x.getLocalSize())
             if started:
                 for number in set(current.inactive) - set(setting.inactive):
-                    problem.bring_in(number, x, run.control)
+                    problem.activate(number, x, run.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
                 time = current.base[-1] + current.rate[-1] * run.control if started else 0.0
-                piece_end = next_knot(p.tables, time, end_of(p.stage, p.tables, time))
-                base, rate = straight(amplitudes, problem.scales, p.tables, time, piece_end)
+                piece_end = next_knot(p.tables, time, end_time(p.stage, p.tables, time))
+                base, rate = table_step_data(amplitudes, problem.scales, p.tables, time, piece_end)
                 run.piece_end, control = piece_end, 0.0
             else:
-                base, rate, control = driving(amplitudes, problem.scales, p.numbers, p.stage, clocked=not p.in_flow)
+                base, rate, control = control_step_data(amplitudes, problem.scales, p.numbers, p.stage,
+                                                        clocked=not p.prescribes_quantity)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
             run.control = control
 
@@ -268,7 +269,7 @@ class _PerturbedPaths:
         if p is not None and p.by_time and not p.stage.waits:
             return fixed(state.control), [fixed((run.piece_end - run.problem.setting.base[-1])
                                                 / run.problem.setting.rate[-1]) for run in self.runs]
-        if p is not None and p.in_flow:
+        if p is not None and p.prescribes_quantity:
             raise Failure("there is none yet for a stage that follows or holds a measure", [])
         if key not in self._targets:
             targets = [(self.problem, self._end if p is None else p.stage.until),

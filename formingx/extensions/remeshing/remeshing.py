@@ -356,7 +356,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
     problem.x.array_w[:] = x
     try:
         curve.newton.correct(problem.x, control, fixed(control))
-        if not problem.folded(problem.x, control):
+        if not problem.has_inverted_element(problem.x, control):
             return problem.x.array_r.copy()
         reason = "an element turned inside out"
     except Failure as failure:

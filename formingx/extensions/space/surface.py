@@ -47,7 +47,7 @@ class Surface(Formulation):
         thicknesses: {layer: reference thickness as a `Function`, length}.
     """
 
-    slack_at_rest = True
+    singular_unloaded = True
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
