@@ -191,7 +191,7 @@ def test_no_parabola_goes_through_a_jump():
 def test_a_jump_does_not_pass_its_target():
     """How far the control goes on in it ends where something that is driven has its target value."""
     class Driven(Amplitude):
-        moves = True
+        is_controlled = True
 
         def __init__(self):
             pass
