@@ -121,7 +121,8 @@ def tube(ratio: float, n: int) -> tuple[float, float]:
 def inflated_tube(ratio: float, kB: float, n: int) -> float:
     """Return the first inner stretch at which an inflated tube bulges or bends in one half wave along its axis.
 
-    The tube is neo-Hookean. Its ends are frictionless and its length is constant.
+    The tube is neo-Hookean. Its ends are frictionless and its length is constant. The radial displacement of the mode
+    varies as cos(n theta) cos(pi z/length).
 
     Args:
         ratio: inner over outer reference radius.
@@ -193,10 +194,13 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    """Return the determinant that vanishes where a tube under pressure bifurcates, at an axial stretch of 1.
+    r"""Return the determinant that vanishes where a tube under pressure bifurcates, at an axial stretch of 1.
 
-    Three motions satisfy the boundary conditions on the inner face. The columns of the determinant are their errors in
-    the three boundary conditions on the outer face.
+    .. math:: v_r = U \cos n\theta \cos k z, \; v_\theta = V \sin n\theta \cos k z, \; v_z = W \cos n\theta \sin k z
+
+    Three motions v with amplitudes U, V, W, functions of r, satisfy incremental equilibrium. They also satisfy
+    the boundary conditions on the inner face. The columns of the determinant are their errors in the three boundary
+    conditions on the outer face.
 
     Args:
         ratio: inner over outer reference radius.

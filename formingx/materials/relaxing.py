@@ -144,7 +144,12 @@ class RelaxingMaterial(Relaxing):
         return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
 
     def stored_energy(self, F: Any, internal: dict[str, Any], **constants: Any) -> Any:
-        """Return the recoverable energy per reference volume in a state, of the equilibrium and of all branches.
+        r"""Return the recoverable energy per reference volume in a state, of the equilibrium and of all branches.
+
+        .. math:: W_{eq}(F) + \sum_k \frac{\mu_k}{2} \psi_k
+
+        For `Viscoelastic` :math:`\psi_k = \mathrm{tr}(\bar C C_{v,k}^{-1}) - 3`, for `TransientNetwork`
+        :math:`\psi_k = \mathrm{tr}(\bar C A_k) - 3 - \ln \det A_k`, with the isochoric tensor :math:`\bar C`.
 
         Args:
             F: deformation gradient in the state (UFL, shape (3, 3)).
@@ -223,7 +228,11 @@ class RelaxingMaterial(Relaxing):
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
-        """Return the nominal stress, force over reference area, in a homogeneous test.
+        r"""Return the nominal stress, force over reference area, in a homogeneous test.
+
+        With the stress P_eq of the equilibrium and the elastic logarithmic strains w of the branches
+
+        .. math:: P(t) = P_{eq}(l) + \sum_k \mu_k \frac{e^{2 w_{k1}} - e^{2 w_{k3}}}{l}
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial"; without times also "biaxial", see `Material.stress`.

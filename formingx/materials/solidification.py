@@ -67,7 +67,13 @@ class Solidification(Material):
         return base
 
     def fraction(self, temperature: Any) -> Any:
-        """Return the solidified fraction phi(T) at given temperatures.
+        r"""Return the solidified fraction phi(T) at given temperatures.
+
+        With `between` = (T_1, T_2) it is
+
+        .. math:: \varphi = \frac{T_2 - T}{T_2 - T_1} \qquad (T_1 \le T \le T_2)
+
+        and 1 below, 0 above these temperatures. Otherwise it is given by the table `fraction`.
 
         Args:
             temperature: temperatures T, any shape.
