@@ -55,7 +55,7 @@ def test_wrong_calls(path, call, words):
         call(path)
 
 
-def test_a_fault_of_its_own_is_not_hidden():
+def test_errors_inside_functions_are_not_hidden():
     """What is raised though all arguments are of the right kind, as by a script's function, goes through."""
     def radius(energy):
         return energy.no_such_thing
@@ -78,7 +78,7 @@ def test_calls_inside_a_run_are_not_explained():
                for method in vars(base).values())
 
 
-def test_calls_stay_what_they_are():
+def test_calls_are_unchanged():
     assert list(inspect.signature(fx.mesh.disc).parameters)[:2] == ["radius", "thickness"]
     assert "Treloar" in fx.treloar1944.__doc__ and fx.mesh.disc.__name__ == "disc"
     assert pickle.loads(pickle.dumps(fx.mesh.disc)) is fx.mesh.disc

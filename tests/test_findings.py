@@ -109,7 +109,7 @@ def test_status_of_a_stage_with_a_named_pressure(tmp_path):
     assert not any("no nearer" in text for text in said.values()) and "to the end of the stage" in said[blown[-2]]
 
 
-def test_status_of_a_body_that_goes_on_while_its_pressure_falls(tmp_path):
+def test_status_while_the_pressure_falls(tmp_path):
     """Past the maximum of the pressure, towards a larger one, which a sheet of this material never comes to."""
     with pytest.raises(fx.ConvergenceError):
         fx.trace(sheet(contacts=[]), until=fx.pressure(0.2), max_steps=14, progress=False, checkpoint=tmp_path / "run")
@@ -142,7 +142,7 @@ def test_a_ring_is_no_mould():
     assert moulds(sheet(contacts=[ring])) == [] and len(moulds(sheet())) == 1
 
 
-def test_a_tool_that_meets_nothing():
+def test_tool_without_contact():
     """A plug that is driven the wrong way; one that arrives is not spoken of, nor is a mould that is reached."""
     scene = sheet(contacts=[ball()])
     away = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(-3.0))], progress=False)

@@ -26,7 +26,7 @@ def travel(path):
 
 
 @pytest.mark.parametrize("radius, force", [(15.0, 5.0), (24.0, 0.7)])
-def test_a_ball_comes_to_a_force_where_its_travel_has_it(radius, force):
+def test_target_force_of_a_ball(radius, force):
     scene = pushed(radius)
     path = fx.trace(scene, until=fx.force(force), intermediate=[fx.force(force / 3)], progress=False)
     assert path["tool_force"][-1] == pytest.approx(force, rel=1e-7) and travel(path) > 0 and len(path) < 15
@@ -36,7 +36,7 @@ def test_a_ball_comes_to_a_force_where_its_travel_has_it(radius, force):
 
 
 @pytest.mark.parametrize("friction", ["none", 0.3])
-def test_a_run_goes_back_down_to_a_smaller_force(friction):
+def test_run_back_to_a_smaller_force(friction):
     scene = pushed(friction=friction)
     path = fx.trace(scene, until=fx.force(30.0), progress=False)
     for force in (25.0, 4.0):

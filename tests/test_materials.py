@@ -75,7 +75,7 @@ def test_stress_is_the_closed_form(material, exact, mode):
 
 @pytest.mark.quick
 @MATERIAL
-def test_modulus_and_stress_at_rest(material, exact):
+def test_modulus_and_rest_stress(material, exact):
     h = 1e-5
     slope = (exact["uniaxial"](1 + h) - exact["uniaxial"](1 - h)) / (2 * h)
     assert material.shear_modulus == pytest.approx(slope / 3, rel=1e-8)

@@ -12,7 +12,7 @@ from formingx.forms.solid import Solid
 pytestmark = pytest.mark.quick
 
 
-def test_disc_is_named_and_whole():
+def test_disc_layers_and_boundaries():
     mesh = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.3}, elements=(5, (1, 2)))
     assert set(mesh.layers) == {"a", "b"} and set(mesh.boundaries) == {"axis", "rim", "bottom", "top"}
     assert [len(mesh.cells.find(mesh.layers[n])) for n in "ab"] == [10, 20]
@@ -270,7 +270,7 @@ def test_parison_of_programmed_wall():
     np.testing.assert_array_equal(mesh.line_of("neck")[[0, -1]], [[1.0, 2.0], [1.2, 2.0]])
 
 
-def test_meshes_and_scenes_say_what_is_there():
+def test_text_of_meshes_and_scenes():
     mesh = fx.mesh.disc(radius=2.0, thickness={"a": 0.1, "b": 0.2}, elements=(6, 1))
     assert str(mesh) == """24 six-node triangles, R from 0 to 2, Z from 0 to 0.3
 layers: a, b

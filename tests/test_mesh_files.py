@@ -53,7 +53,7 @@ def hostile(marker):
 
 @pytest.mark.parametrize("kind", hostile(""))
 @pytest.mark.parametrize("name", ["mesh.msh", "mesh.txt", "mesh.geo", "mesh"])
-def test_no_file_runs_anything(tmp_path, kind, name):
+def test_files_are_not_executed(tmp_path, kind, name):
     marker = tmp_path / "it ran"
     with pytest.raises(fx.InputError, match="mesh file"):
         read(tmp_path, hostile(str(marker).replace(" ", r"\ "))[kind], name)
@@ -340,7 +340,7 @@ def test_crossing_edges_are_found(grid):
     assert number > 500
 
 
-def test_a_long_row_of_elements_takes_no_long_look(monkeypatch):
+def test_long_rows_of_elements_are_checked_fast(monkeypatch):
     """Ten times as many elements, some ten times as many pairs of edges to look at (it were a hundred)."""
     looked = []
     monkeypatch.setattr(check, "overlapping", lambda *boxes: (looked.append(len(i)) or (i, j)
@@ -353,7 +353,7 @@ def test_a_long_row_of_elements_takes_no_long_look(monkeypatch):
     assert 0 < numbers[1] < 15 * numbers[0]
 
 
-def test_bodies_that_only_bend_pass():
+def test_bent_bodies_are_accepted():
     """A strip rolled up to a ring that does not quite close, and every mesh that is made here."""
     def roll(x, angle):
         a, r = angle * x[:, 0], 0.5 - x[:, 1]

@@ -110,7 +110,7 @@ def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
 WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)
 
 
-def test_a_membrane_that_slides_over_a_small_edge_is_that_of_the_sharp_one():
+def test_small_fillet_equals_sharp_edge():
     """Two integrations of their own, of a thin sheet; the difference falls with the edge's radius."""
     away, thin = [], {**WILLIAMS, "thickness": 1e-6}
     for fillet in (0.02, 0.005):
@@ -120,7 +120,7 @@ def test_a_membrane_that_slides_over_a_small_edge_is_that_of_the_sharp_one():
     assert away[1] < 0.3 * away[0] < 1e-3
 
 
-def test_friction_makes_the_tension_grow_as_on_a_capstan():
+def test_tension_grows_by_friction_as_on_a_capstan():
     """Far drawn, the force without friction is 4 pi rp c10 h0; with it the edge alone makes it about exp(mu pi/2)."""
     limit = 4 * np.pi * (1.905 + 0.6985 / 20**2 / 2) * 0.448 * 0.6985        # at the middle surface
     smooth, rough = (membrane_sliding_over_plug(20.0, fillet=0.05, mu=mu, **WILLIAMS) for mu in (0.0, 0.1))

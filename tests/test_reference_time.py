@@ -30,7 +30,7 @@ def test_block_under_a_dead_force():
 
 
 @pytest.mark.parametrize("kind", ["tube", "sphere"])
-def test_wall_driven_fast_and_slowly(kind):
+def test_wall_deformed_fast_and_slowly(kind):
     """At once it is the elastic wall of all moduli, slowly that of the equilibrium; 20 Gauss points are enough."""
     n = {"tube": 2, "sphere": 3}[kind]
     size = {"inner_radius": 1.0, "outer_radius": 2.0}

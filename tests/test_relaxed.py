@@ -32,7 +32,7 @@ def run(scene, *stages, **options):
 
 
 @pytest.mark.parametrize("law", [fx.Viscoelastic, fx.TransientNetwork])
-def test_stress_at_the_pole_relaxes_to_that_in_equilibrium(law, tmp_path):
+def test_stress_at_the_pole_relaxes_to_equilibrium(law, tmp_path):
     material = law(RUBBER, BRANCHES)
     path = run(block(material), AT_ONCE, Stage("hold", duration=1.0), Stage("later", duration=1e9), accuracy=1e-4)
     found = path["pole_stress_ratio"]
@@ -50,7 +50,7 @@ def test_stress_at_the_pole_relaxes_to_that_in_equilibrium(law, tmp_path):
     assert "pole stress ratio" in (tmp_path / "run.html").read_text()
 
 
-def test_no_ratio_where_nothing_is_left_in_equilibrium():
+def test_no_stress_ratio_without_equilibrium_stress():
     once = Stage("at once", control="pull", until=fx.travel(0.1))
     assert "pole_stress_ratio" not in run(block(RUBBER), once).columns
     assert "pole_stress_ratio" not in run(block(fx.Viscoelastic(None, BRANCHES)), once).columns

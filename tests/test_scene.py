@@ -41,7 +41,7 @@ def test_a_run_leaves_its_scene_as_it_was():
     assert np.all(scene.temperature.T.x.array == 150.0)
 
 
-def test_two_runs_of_a_scene_at_once_do_not_meet():
+def test_two_simultaneous_runs_of_a_scene():
     """The temperature is the problem's: a second run of the same scene begins with that of the scene."""
     scene = pressed()
     push = [fx.Stage("push", control="plug", until=fx.travel(0.06), duration=0.1)]

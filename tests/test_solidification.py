@@ -37,7 +37,7 @@ def balance(G, drawn_to, mu=2.0, phi=1.0):
     return brentq(lambda l: mu * (l**2 - l**-4) + phi * G * ((l / drawn_to)**2 - (l / drawn_to)**-4), 1, drawn_to)
 
 
-def test_set_block(tmp_path):
+def test_solidified_block(tmp_path):
     """Within 1e-8 of the balance of rubber and glass; few steps."""
     run("demos/set_block.py", "--out", tmp_path, "--quick")
     found = json.loads((tmp_path / "summary.json").read_text())
@@ -49,7 +49,7 @@ def test_set_block(tmp_path):
     assert drawn(tmp_path / "set_block.png")
 
 
-def test_a_base_that_relaxes_sets_too():
+def test_relaxing_base_solidifies():
     """The branch holds its stress as it is frozen: it pulls with the elastic strain that it had when it was let go."""
     tau, mu, G = 4.0, 1.5, 300.0
     material = fx.Solidification(fx.TransientNetwork(BASE, [(mu, tau)]), G, fraction=fx.table({70: 1, 75: 0.5, 85: 0}))
@@ -66,7 +66,7 @@ def test_a_base_that_relaxes_sets_too():
 
 
 @pytest.mark.parametrize("hot, left", [(82.5, 0.25), (120.0, 0.0)])
-def test_what_melts_again_bears_no_more(hot, left):
+def test_melted_material_carries_no_stress(hot, left):
     """Set at rest, drawn cold, warmed in its grip: the stress is that of the base and of the glass that is left."""
     G, l = 50.0, 1.1
     scene = block(fx.Solidification(BASE, G, between=(75, 85)), air(hot), temperature=20.0)
@@ -93,7 +93,7 @@ def test_steps_in_time_keep_the_accuracy():
     assert found[1e-2] == pytest.approx(found[1e-3], rel=5e-4)
 
 
-def test_without_cold_it_is_its_base():
+def test_hot_material_equals_its_base():
     """At a temperature above: to round-off; below, at rest: the glass is there, free of stress in the first shape."""
     hot, plain = (fx.Process(block(material, [], heat=False)).run([draw(0.5)], progress=False)
                   for material in (fx.Solidification(BASE, 300.0, between=(75, 85)), BASE))

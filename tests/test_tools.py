@@ -135,7 +135,7 @@ def hostile(marker):
 
 
 @pytest.mark.parametrize("kind", hostile(""))
-def test_no_file_runs_anything(tmp_path, kind):
+def test_files_are_not_executed(tmp_path, kind):
     marker, file = tmp_path / "it ran", tmp_path / f"tool.{kind.split()[0]}"
     (tmp_path / "other.geo").write_text(hostile(marker)["geo"])
     file.write_text(hostile(str(marker).replace(" ", r"\ "))[kind])
