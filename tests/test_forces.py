@@ -15,7 +15,7 @@ def pushed(radius=15.0, friction="none"):
 
 
 def pulled():
-    """A disc that is pulled at its rim: the same stretch everywhere."""
+    """Scene of a disc that is pulled at its rim, with a uniform stretch."""
     return fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=1.0, elements=(8, 1)), materials=fx.NeoHookean(c10=0.5),
                     supports=[fx.Symmetry("axis"), fx.PrescribedDisplacement("rim", "r"),
                               fx.Symmetry("bottom", normal="z", guide=True)])
@@ -52,7 +52,7 @@ def test_run_back_to_a_smaller_force(friction):
 
 @pytest.mark.parametrize("force", [-50.0, -7.0, 12.0])
 def test_a_disc_pulled_at_its_rim(force):
-    """2 pi R h 2 c10 (l - l^-5), towards the axis if it is stretched."""
+    """The force is 2 pi R h 2 c10 (l - l^-5), towards the axis if the disc is stretched."""
     path = fx.trace(pulled(), until=fx.force(force), progress=False)
     stretch = brentq(lambda s: 2 * np.pi * 10.0 * (s - s**-5) + force, 0.5, 3.0)
     assert path["pole_stretch"][-1] == pytest.approx(stretch, rel=1e-6)

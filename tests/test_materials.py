@@ -132,7 +132,7 @@ def _powers():
 
 
 def _exact_powers(mp, F, alpha):
-    """The same by differences in 90 digits."""
+    """Derivatives by finite differences in arithmetic of 90 digits."""
     x, h = [mp.mpf(float(v)) for v in F], mp.mpf(10) ** -20 * max(abs(v) for v in F)
 
     def f(shift):
@@ -169,7 +169,7 @@ def test_sum_of_powers_in_high_precision(alpha):
 
 @pytest.mark.parametrize("alpha", [-2.0, 1.3, 2.0, 5.0])
 def test_powers_for_every_perturbation(alpha):
-    """Of all nine entries of F, those across the blocks too, where two, all or no stretches are equal."""
+    """Derivatives by all nine entries of F, where two, three or no stretches are equal."""
     mp = pytest.importorskip("mpmath")
     mp.mp.dps = 60
     mesh = ufl.Mesh(basix.ufl.element("Lagrange", "triangle", 1, shape=(2,)))
@@ -213,7 +213,7 @@ def test_second_derivatives_of_powers_do_not_jump(alpha):
 @pytest.mark.parametrize("material", [fx.Gent(mu=1.0, Jm=20.0), fx.ArrudaBoyce(mu=1.0, N=8.0)],
                          ids=lambda m: type(m).__name__)
 def test_limit(material):
-    """Stress grows without bound up to the limit; beyond it there is none, and the error says where it is."""
+    """The stress grows without bound up to the limit; beyond it an error states the limit."""
     for mode in MODES:
         limit = material.largest_stretch(mode)
         assert material.stress(mode, limit * (1 - 1e-6)) > 1e3 * material.stress(mode, 0.9 * limit)
@@ -289,7 +289,7 @@ def test_isotropy_holds_for_every_material():
 
 
 def test_published_constants():
-    """Each has a source with a year, and the modulus that the source gives, in MPa."""
+    """Each set has a source with a year, and the modulus of the source in MPa."""
     found = fx.published()
     assert all(re.search(r"(19|20)\d\d", p.source) and p.unit == "MPa" for p in found.values() if p.unit == "MPa")
     c10 = {name: p.material.parameters["c10"] for name, p in found.items() if p.unit == "MPa"}
@@ -309,7 +309,7 @@ def test_published_constants():
                                       fx.KBKZ([(0.3, 1.0)], fx.PSM(10.0, 0.05), equilibrium=fx.NeoHookean(c10=0.1))],
                          ids=lambda m: type(m).__name__)
 def test_any_two_stretches_and_true_stress(material):
-    """The three tests are biaxial ones; P1 = P2 by turns; true stress is force over the area as it is."""
+    """The three tests agree with the biaxial test; swapped stretches swap the stresses; true stress is P l."""
     l = np.array([1.2, 2.0])
     for mode, other in (("uniaxial", l**-0.5), ("pure_shear", np.ones(2)), ("equibiaxial", l)):
         P = material.stress(stretches=(l, other))
@@ -327,7 +327,7 @@ def test_any_two_stretches_and_true_stress(material):
      {"temperatures": [100.0, 120.0]},
      ["stretch at which it ruptures when stretched suddenly, equibiaxial", "1.795", "at 120"])])
 def test_a_card(tmp_path, material, options, words):
-    """One page, with its picture inside; a temperature that is missing is said."""
+    """The card is one page with an embedded picture; an error names a missing temperature."""
     page = material.report(tmp_path / "card.html", **options).read_text()
     assert all(word in page for word in (*words, "data:image/png;base64,", "crystallisation")), page[:500]
     if options:

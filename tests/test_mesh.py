@@ -23,7 +23,7 @@ def test_disc_layers_and_boundaries():
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("backwards", [False, True])
 def test_from_lines(swapped, backwards):
-    """A cone's frustum on a disc: volume, names and nodes, whichever line comes first and however they run."""
+    """The frustum of a cone: volume, names and nodes, for both orders and both directions of the lines."""
     lines = [np.array([(0, 0), (20, 0), (30, 40)]), np.array([(0, -2), (21, -2), (32, 40)])]
     given = [line[::-1] if backwards else line for line in (lines[::-1] if swapped else lines)]
     counts = [16, 8] if backwards else [8, 16]
@@ -43,7 +43,7 @@ def test_from_lines(swapped, backwards):
 
 
 def test_wall_of_a_tube_that_is_thinner_at_its_top():
-    """The two faces run the same way, though their ends of smaller R are at different heights."""
+    """The lines of both faces have the same direction, although their ends of smaller R lie at different heights."""
     Z = np.linspace(0, 100, 6)
     tube = fx.mesh.from_lines([(20, z) for z in Z], [(22 - 0.01 * z, z) for z in Z], elements=(1, 1))
     scene = fx.Scene(mesh=tube, materials=fx.NeoHookean(c10=0.4), supports=[fx.Clamped("start"), fx.Clamped("end")],
@@ -61,7 +61,7 @@ def test_grading():
 @pytest.mark.parametrize("sizes, along", [
     ({0.3: 0.05}, 24), ({0.3: 0.1, 1.0: 0.02}, 40), ({0.0: 0.5}, 9), ({0.4: 1}, 2)])
 def test_concentrate(sizes, along):
-    """Smallest at the radii, which are nodes; sizes grow linearly from them, in the ratio asked for."""
+    """Elements are smallest at the given radii, where nodes lie; sizes grow linearly in the requested ratio."""
     mesh = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(along, 2), concentrate=sizes)
     R = mesh.nodes_of("top")[:, 0]
     joints, middles, length = R[::2], R[1::2], np.diff(R[::2])
@@ -83,7 +83,7 @@ def test_concentrate(sizes, along):
     ({"a": 0.3, "b": 0.1, "c": 0.1}, [1, 1, 2], [0, 0.3, 0.4, 0.45, 0.5]),
     ({"a": 0.6, "b": 0.4}, ([2.0, 1.0], 2), [0, 0.4, 0.6, 0.8, 1.0])])
 def test_grading_through_the_thickness(layers, through, ends):
-    """Relative sizes of the elements of a layer from its bottom up; rows of counts are what they were."""
+    """Elements of a layer have the given relative sizes from the bottom up; numbers give equal sizes."""
     mesh = fx.mesh.disc(radius=1.0, thickness=layers, elements=(3, through))
     assert mesh.nodes_of("axis")[::2, 1] == pytest.approx(ends, abs=1e-15)
     assert mesh.nodes_of("axis")[1::2, 1] == pytest.approx(np.add(ends[1:], ends[:-1]) / 2, abs=1e-15)
@@ -91,7 +91,7 @@ def test_grading_through_the_thickness(layers, through, ends):
 
 
 def test_sphere_is_curved_to_second_order():
-    """Every node, mid-edge nodes too, on its circle; the volume converges with the fourth power of the size."""
+    """All nodes, mid-edge nodes too, lie on circles; the volume error is of order 4 in the element size."""
     errors = []
     for n in (4, 8):
         mesh = fx.mesh.sphere(inner_radius=2.0, thickness={"x": 0.5, "y": 1.0}, elements=(n, (1, 2)))
@@ -108,7 +108,7 @@ def test_sphere_is_curved_to_second_order():
 
 
 def test_file_and_back(tmp_path):
-    """A mesh written and read gives the same path; so does the coarse grid that is shipped."""
+    """A mesh that is written and read gives the same path, and so does the grid in the repository."""
     scene = treloar((10, 1))
     fx.mesh.write(scene.mesh, tmp_path / "sheet.msh")
     pressures = []
@@ -133,7 +133,7 @@ def test_file_without_names(tmp_path):
 
 
 def test_first_order_mesh_gives_the_same_numbers(tmp_path):
-    """The unknowns are six-node triangles whatever the order of the file."""
+    """The displacement is quadratic for files of first and of second order."""
     import gmsh
     fx.mesh.write(treloar((10, 1)).mesh, tmp_path / "second.msh")
     gmsh.initialize(interruptible=False)
@@ -153,7 +153,7 @@ def test_first_order_mesh_gives_the_same_numbers(tmp_path):
 
 
 def test_parison_is_a_tube_with_a_round_bottom():
-    """Every node of the bottom on its circle, of the tube on its line; the volume converges with the fourth power."""
+    """All nodes lie on circles or on straight lines; the volume error is of order 4 in the element size."""
     errors = []
     for n in (8, 16):
         mesh = fx.mesh.parison(inner_radius=1.0, thickness={"x": 0.2, "y": 0.3}, length=3.0, elements=(n, 1))
@@ -177,7 +177,7 @@ def test_line_of_a_boundary():
 
 
 def test_parts_of_a_boundary():
-    """A part has the facets between its ends, the whole keeps them, and parts may overlap."""
+    """A part has the facets between its ends, which the whole boundary keeps; parts may overlap."""
     mesh = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(10, 2), concentrate={0.5: 0.2, 1.2: 0.5})
     whole = mesh.facets_of("top")
     mesh = mesh.with_part("plug", "top", (0, 0.5)).with_part("ring", "top", (0.5, 1.2)).with_part("in", "top", (0, 1.2))
@@ -215,7 +215,7 @@ def test_a_part_is_written_and_read(tmp_path, suffix):
 
 
 def test_opposite_points_of_a_wall():
-    """Of concentric circles the normals meet at the same angle; the thickness of a wall at rest is exact."""
+    """Opposite points of concentric circles lie at the same angle; the undeformed thickness is exact."""
     mesh = fx.mesh.parison(inner_radius=1.0, thickness=0.3, length=4.0, elements=(30, 1), grading=2.0)
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
@@ -247,7 +247,7 @@ def test_numbers_of_numpy_are_numbers():
 @pytest.mark.parametrize("thickness", [
     lambda R: 0.2 - 0.1 * R, {0: 0.2, 0.5: 0.15, 1.0: 0.1}, {"a": lambda R: 0.1 - 0.05 * R, "b": {0: 0.1, 1: 0.05}}])
 def test_disc_of_varying_thickness(thickness):
-    """All nodes of the top lie on the profile, those on edges too; layers vary each for itself."""
+    """All nodes of the top, mid-edge nodes too, lie on the profile; each layer may vary."""
     mesh = fx.mesh.disc(radius=1.0, thickness=thickness, elements=(5, 2))
     mesh.check()
     R, Z = mesh.nodes_of("top").T

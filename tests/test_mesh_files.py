@@ -39,7 +39,7 @@ def read(tmp_path, text, name="mesh.msh"):
 
 
 def hostile(marker):
-    """gmsh scripts that would leave a file behind, in every place where a file may hold them."""
+    """gmsh scripts that would create a file, at each position in a mesh file."""
     order = f'SystemCall "touch {marker}";\n'
     return {"script": order, "after comments": "// a mesh\n" + order, "before a mesh": order + SQUARE,
             "after a mesh": SQUARE + order, "between sections": SQUARE.replace("$Nodes", order + "$Nodes"),
@@ -64,7 +64,7 @@ def test_files_are_not_executed(tmp_path, kind, name):
 @pytest.mark.parametrize("binary", [0, 1])
 @pytest.mark.parametrize("order", [1, 2])
 def test_formats_of_gmsh(tmp_path, version, binary, order):
-    """Two layers and a curved edge, as gmsh itself writes them."""
+    """Two layers and a curved edge in a file that gmsh wrote."""
     import gmsh
     gmsh.initialize(interruptible=False)
     try:
@@ -98,7 +98,7 @@ def test_formats_of_gmsh(tmp_path, version, binary, order):
 
 
 def _area(triangles, x):
-    """Corners, and what curved edges add: two thirds of chord times sagitta."""
+    """Area of the corner triangles, and of the curved edges: two thirds of chord times sagitta."""
     a, b, c = (x[triangles[:, k]] for k in range(3))
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() / 2
     for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5)) if triangles.shape[1] == 6 else ():
@@ -119,7 +119,7 @@ def changed(*pairs):
 @pytest.mark.parametrize("version", [2.2, 4.1])
 @pytest.mark.parametrize("binary", [0, 1])
 def test_partitions_are_of_their_groups(tmp_path, version, binary):
-    """A mesh that gmsh cut for several processes is the mesh."""
+    """A mesh that gmsh partitioned is read like the mesh without partitions."""
     import gmsh
     gmsh.initialize(interruptible=False)
     try:
@@ -213,7 +213,7 @@ elements 2 sheet
     ("4 0 1\n", "4 0 1_0\n", "must be number R Z"), ("nodes 9", "nodes 8", "line 12"),
     ("nodes 9", "numbering around\nnodes 9", "each once"), ("3 1 1\n", "3 \u0661 1\n", "must be number R Z")])
 def test_text_files(tmp_path, old, new, words):
-    """Each edge has one middle, each number is one; what is no number is refused."""
+    """Each edge has one mid-edge node and each node number is unique; other words than numbers are refused."""
     assert old in CURVED
     if not words:
         assert read(tmp_path, CURVED.replace(old, new, 1), "mesh.txt").check() is None
@@ -223,7 +223,7 @@ def test_text_files(tmp_path, old, new, words):
 
 
 def test_text_files_that_lost_their_end(tmp_path):
-    """Whole blocks, or digits of the last number; version 1, which has no last line, is read as before."""
+    """Missing blocks and missing last digits are found; version 1, which has no last line, is read."""
     file = tmp_path / "mesh.txt"
     fx.mesh.write(fx.mesh.disc(radius=1.0, thickness={"a": 0.1, "b": 0.05}, elements=(2, 1)), file)
     text = file.read_text()
@@ -298,7 +298,7 @@ def test_tangled_meshes_are_refused(change, words):
 @pytest.mark.parametrize("largest", [0, boxes._MAX_DIRECT], ids=["tree", "direct"])
 @pytest.mark.parametrize("shape", ["scattered", "a row", "a column", "all over each other"])
 def test_overlapping_boxes_are_found(shape, largest, monkeypatch):
-    """Each pair once, the same as by looking at all of them."""
+    """Each overlapping pair is found once, as by comparison of all pairs."""
     monkeypatch.setattr(boxes, "_MAX_DIRECT", largest)
     random = np.random.default_rng(3)
     for n in (1, 2, 3, 64, 65, 200):
@@ -311,7 +311,7 @@ def test_overlapping_boxes_are_found(shape, largest, monkeypatch):
 
 @pytest.mark.parametrize("grid", [4, 1000], ids=["many touch", "few touch"])
 def test_crossing_edges_are_found(grid):
-    """Random polygons with corners on a grid: the same pairs of edges as in integers, without round-off.
+    """Random polygons with corners on a grid: the same pairs of edges as in exact integer arithmetic.
 
     Two edges meet if they cross, or if an end of one, which is no node of the other, lies on the other.
     """
@@ -341,7 +341,7 @@ def test_crossing_edges_are_found(grid):
 
 
 def test_long_rows_of_elements_are_checked_fast(monkeypatch):
-    """Ten times as many elements, some ten times as many pairs of edges to look at (it were a hundred)."""
+    """Ten times as many elements need about ten times as many compared pairs of edges, not a hundred times."""
     looked = []
     monkeypatch.setattr(check, "overlapping", lambda *boxes: (looked.append(len(i)) or (i, j)
                                                               for i, j in overlapping(*boxes)))
@@ -354,7 +354,7 @@ def test_long_rows_of_elements_are_checked_fast(monkeypatch):
 
 
 def test_bent_bodies_are_accepted():
-    """A strip rolled up to a ring that does not quite close, and every mesh that is made here."""
+    """A strip that is bent to an open ring is accepted, and so is each mesh of `formingx.mesh`."""
     def roll(x, angle):
         a, r = angle * x[:, 0], 0.5 - x[:, 1]
         x[:, 0], x[:, 1] = 2 + r * np.sin(a), r * np.cos(a)

@@ -20,7 +20,7 @@ SHEET = {"radius": 7.62, "plug_radius": 1.05, "thickness": 0.0254, "c10": 0.1213
 
 
 def energy(state, plug_radius, thickness, c10, c01, **_):
-    """Of the membrane under a plug: the Mooney energy, integrated."""
+    """Strain energy of the Mooney membrane under a plug."""
     def density(l1, l2):
         l3 = 1 / (l1 * l2)
         return c10 * (l1**2 + l2**2 + l3**2 - 3) + c01 * (l1**-2 + l2**-2 + l3**-2 - 3)
@@ -40,7 +40,7 @@ def test_work_on_a_membrane_is_its_energy(friction):
 
 
 def test_membrane_limits():
-    """Moduli scale the force; at the edge a sliding wall pulls as the face does: 2 pi rp T sin(slope)."""
+    """The force is proportional to the moduli; for a sliding membrane it is 2 pi rp T sin(slope) at the edge."""
     twice = membrane_under_plug(3.0, **{**SHEET, "c10": 0.2426, "c01": 0.06654})
     assert twice.force == pytest.approx(2 * membrane_under_plug(3.0, **SHEET).force, rel=1e-8)
     slides = membrane_under_plug(4.0, **{**SHEET, "c01": 0.0}, friction="none")
@@ -90,7 +90,7 @@ def test_a_path_never_comes_back_to_itself():
 
 
 def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
-    """Before, at and after the pressure's maximum; where the volume would shrink a sheet with friction snaps."""
+    """Before, at and after the pressure maximum; a path snaps where the volume would decrease."""
     path = fx.trace(treloar(support=fx.Clamped("rim")), until=fx.pole_stretch(4.0), progress=False)
     curve, forms, h = path.record.curve, path.problem.forms, 1e-5
     volume = fx.enclosed_volume(1.0).bind(path.problem)
@@ -111,7 +111,7 @@ WILLIAMS = dict(radius=8.89, plug_radius=1.905, thickness=0.6985, c10=0.448)
 
 
 def test_small_fillet_equals_sharp_edge():
-    """Two integrations of their own, of a thin sheet; the difference falls with the edge's radius."""
+    """The forces of two independent integrations approach each other as the fillet radius decreases."""
     away, thin = [], {**WILLIAMS, "thickness": 1e-6}
     for fillet in (0.02, 0.005):
         slides = membrane_sliding_over_plug(1.5, fillet=fillet, mu=0.0, **thin)
@@ -121,7 +121,7 @@ def test_small_fillet_equals_sharp_edge():
 
 
 def test_tension_grows_by_friction_as_on_a_capstan():
-    """Far drawn, the force without friction is 4 pi rp c10 h0; with it the edge alone makes it about exp(mu pi/2)."""
+    """At a large stretch the force is 4 pi rp c10 h0 without friction; friction on the edge adds exp(mu pi/2)."""
     limit = 4 * np.pi * (1.905 + 0.6985 / 20**2 / 2) * 0.448 * 0.6985        # at the middle surface
     smooth, rough = (membrane_sliding_over_plug(20.0, fillet=0.05, mu=mu, **WILLIAMS) for mu in (0.0, 0.1))
     assert smooth.force == pytest.approx(limit, rel=1e-5)
@@ -132,7 +132,7 @@ def test_tension_grows_by_friction_as_on_a_capstan():
 
 
 def test_a_thick_sheet_on_a_capstan():
-    """Friction acts below the middle surface: what is left of mu on an edge of radius f is mu f/(f + h/2)."""
+    """Friction acts below the middle surface: on a fillet of radius f mu has the effect of mu f/(f + h/2)."""
     def tension(thickness, mu):
         sheet = {**WILLIAMS, "thickness": thickness}
         return membrane_sliding_over_plug(1.5, fillet=0.35, mu=mu, **sheet).force / thickness

@@ -15,7 +15,7 @@ MATERIAL = fx.Viscoelastic(fx.NeoHookean(c10=C10), P1)
 
 
 def test_block_under_a_dead_force():
-    """The stress of the stretches that creep is the force; let go, none."""
+    """The stress of the creep stretches equals the dead load, and is zero after unloading."""
     body = reference_time.block("uniaxial", c10=C10, branches=P1)
     body.jump_to_load(0.2, (0, 2))
     first, t = body.s, np.linspace(0, 5, 201)[1:]
@@ -31,7 +31,7 @@ def test_block_under_a_dead_force():
 
 @pytest.mark.parametrize("kind", ["tube", "sphere"])
 def test_wall_deformed_fast_and_slowly(kind):
-    """At once it is the elastic wall of all moduli, slowly that of the equilibrium; 20 Gauss points are enough."""
+    """The load equals the elastic wall: with all moduli at once, with the equilibrium in the end; 20 points suffice."""
     n = {"tube": 2, "sphere": 3}[kind]
     size = {"inner_radius": 1.0, "outer_radius": 2.0}
     body = reference_time.wall(kind, **size, c10=C10, branches=P1, points=20)
@@ -48,7 +48,7 @@ def test_wall_deformed_fast_and_slowly(kind):
 
 
 def test_wall_without_pressure_has_none():
-    """What was let go is free of load while it goes back, and comes back to where it was."""
+    """An unloaded wall stays free of load while it recovers, and recovers completely."""
     body = reference_time.wall("tube", inner_radius=1, outer_radius=2, c10=C10, branches=P1)
     body.deform(lambda t: ((1 + t) ** 2 - 1, 2 * (1 + t)), [1.0])
     body.jump_to_load(0.0, (-0.5, body.s))
@@ -69,7 +69,7 @@ def test_balloon_is_a_biaxial_test():
 
 
 def test_balloon_is_a_thin_sphere():
-    """The thick sphere of R0/H0 = 100, its middle at R0: 1e-3 off and less."""
+    """The balloon agrees with a thick sphere of R0/H0 = 100 to 1e-3 or better."""
     thin = reference_time.balloon(c10=C10, branches=P1)
     thick = reference_time.wall("sphere", inner_radius=99.5, outer_radius=100.5, c10=C10, branches=P1)
     q, t = 26.0, np.array([0.05, 0.2, 0.5, 1.0])
@@ -78,7 +78,7 @@ def test_balloon_is_a_thin_sphere():
 
 
 def test_snap_is_the_end_of_creep():
-    """Creep in time comes to the same stretches at the same times, and not beyond the snap."""
+    """Creep integrated in time reaches the same stretches at the same times, up to the limit point."""
     targets = np.log([1.2, 1.3])
     body = reference_time.balloon(c10=C10, branches=P1)
     body.jump_to_load(0.8, (0, math.log(1.38)))
@@ -122,7 +122,7 @@ def test_numbers(numbers, key, value):
 
 
 def test_keys():
-    """As many as the studies ask for, all finite."""
+    """As many numbers as the studies need, all finite."""
     for numbers, count in ((relaxation, 2 * 5 * 7 + 2 * 3 * 6 + 5 + 8),
                            (viscoelastic_tube, 6 * 18), (balloon, 3 * 12 + 12 + 3)):
         found = expected(numbers)

@@ -57,7 +57,7 @@ def test_no_stress_ratio_without_equilibrium_stress():
 
 
 def test_ratio_of_a_membrane_with_layers():
-    """Layers count by their thickness: at stretch 2, at once, each has its own moduli."""
+    """Layers have weights by thickness; at a sudden stretch of 2 each has its own moduli."""
     mesh = fx.mesh.disc(radius=1.0, thickness={"stiff": 0.01, "soft": 0.03}, elements=(4, 1))
     other = fx.NeoHookean(c10=0.1)
     scene = fx.Scene(mesh=mesh, materials={"stiff": POLYMER, "soft": other}, model=fx.Membrane(),
@@ -70,7 +70,7 @@ def test_ratio_of_a_membrane_with_layers():
 
 @pytest.mark.parametrize("law", [fx.Viscoelastic, fx.TransientNetwork])
 def test_elastic_stretch_of_branches(law):
-    """That of the body before anything flows, 1 in the end; the branch with the shorter time relaxes first."""
+    """It is the stretch of the body at first and 1 in the end; the branch with the shorter time relaxes first."""
     path = run(block(law(RUBBER, BRANCHES)), AT_ONCE, Stage("hold", duration=1.0), Stage("later", duration=1e9),
                accuracy=1e-4)
     fields, at_once = Fields(path), next(s for s in path.states if s.stage == "hold")
@@ -91,7 +91,7 @@ def test_a_layer_without_branches_has_no_elastic_stretch():
 
 
 def test_a_cubic_in_time_is_predicted_exactly():
-    """From states far enough apart, and none from before a jump."""
+    """The prediction uses states that are far enough apart, and no state before a jump."""
     def state(time, **kind):
         return State(np.array([time**3 - time, 2.0]), 0.0, np.zeros(2), 1.0, time=time, **kind)
     states = [state(t) for t in (0.0, 0.3, 0.7, 1.2, 1.2 + 1e-9)]
@@ -103,7 +103,7 @@ def test_a_cubic_in_time_is_predicted_exactly():
 
 
 def test_tangents_that_are_kept_change_no_result():
-    """A sheet that is blown and held: fewer tangents than states, and what tighter tolerances give."""
+    """A sheet inflated to a constant volume: fewer tangents than states, and the results of tighter tolerances."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=POLYMER,
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
                      loads=[fx.Pressure("bottom", name="air")])
@@ -133,13 +133,13 @@ print(path["pole_stress_ratio"][0])
 
 
 def test_nothing_is_compiled_for_other_constants():
-    """Each in a process of its own: UFL sorts terminals by their numbers as text, so 9 and 10 make another form."""
+    """Each runs in its own process: UFL sorts terminals by numbers as text, so 9 and 10 would make another form."""
     run_python("-c", CONSTANTS, 0.05, 0.3, 0.5, 0)
     assert float(run_python("-c", CONSTANTS, 0.2, 1.0, 2.0, 1).split()[-1]) == pytest.approx(11.0, rel=1e-9)
 
 
 def test_an_expression_is_compiled_once():
-    """For all problems of a process, however many variables UFL has counted before."""
+    """Once for all problems of a process, independently of the number of UFL variables before."""
     domain = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)).domain
     x = ufl.SpatialCoordinate(domain)[0]
     places = np.array([[0.5, 0.25]])

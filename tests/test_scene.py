@@ -12,7 +12,7 @@ from formingx.problem.problem import Problem
 
 
 def contents(thing, seen=None):
-    """All that a thing of the package holds, as plain data that can be compared; what others made, as it is."""
+    """Attributes of an object of the package as plain data; objects of other packages are returned unchanged."""
     seen = {} if seen is None else seen
     if id(thing) in seen:
         return f"seen {seen[id(thing)]}"
@@ -31,7 +31,7 @@ def contents(thing, seen=None):
 
 
 def test_a_run_leaves_its_scene_as_it_was():
-    """Friction by temperature, heat, relaxation, expansion, a process of two stages and a mesh: all as before."""
+    """A process with friction by temperature, heat, relaxation and expansion leaves its scene unchanged."""
     scene = pressed()
     before, X = contents(scene), scene.mesh.domain.geometry.x.copy()
     path = fx.Process(scene).run([fx.Stage("push", control="plug", until=fx.travel(0.1), duration=0.2),
@@ -42,7 +42,7 @@ def test_a_run_leaves_its_scene_as_it_was():
 
 
 def test_two_simultaneous_runs_of_a_scene():
-    """The temperature is the problem's: a second run of the same scene begins with that of the scene."""
+    """The temperature of a run belongs to its problem: a second run begins with the temperature of the scene."""
     scene = pressed()
     push = [fx.Stage("push", control="plug", until=fx.travel(0.06), duration=0.1)]
     first = fx.Process(scene).run(push, progress=False, accuracy="draft")
@@ -53,7 +53,7 @@ def test_two_simultaneous_runs_of_a_scene():
 
 
 def test_a_constant_of_the_mesh_keeps_the_mesh():
-    """A scene chooses columns for its tools, but a UFL constant of the user's mesh belongs to that mesh."""
+    """A scene divides a sheet anew for its tools, unless a material constant is a UFL expression of the mesh."""
     disc = fx.mesh.disc(radius=10.0, thickness=0.5)
     R = ufl.SpatialCoordinate(disc.domain)[0]
     rest = {"supports": [fx.Symmetry("axis"), fx.Clamped("rim")], "loads": [fx.Pressure("bottom")],

@@ -14,7 +14,7 @@ BASE = fx.NeoHookean(c10=1.0)
 
 
 def block(material, boundaries, temperature=150.0, heat=True, **more):
-    """A block that is drawn equally in its plane."""
+    """Scene of a block that is stretched equibiaxially in its plane."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1e-3, thickness=1e-3, elements=(2, 1)), materials=material,
                     temperature=temperature, heat=fx.Cooling(HEAT, boundaries, unit="C", tolerance=1.0) if heat
                     else None, supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
@@ -38,7 +38,7 @@ def balance(G, drawn_to, mu=2.0, phi=1.0):
 
 
 def test_solidified_block(tmp_path):
-    """Within 1e-8 of the balance of rubber and glass; few steps."""
+    """The stretch agrees to 1e-8 with the balance of rubber and glass, in fewer than 25 steps."""
     run("demos/set_block.py", "--out", tmp_path, "--quick")
     found = json.loads((tmp_path / "summary.json").read_text())
     for mode, close in (("uniaxial", (1.492217, 1.499210)), ("equibiaxial", (1.494939, 1.499488))):
@@ -50,7 +50,7 @@ def test_solidified_block(tmp_path):
 
 
 def test_relaxing_base_solidifies():
-    """The branch holds its stress as it is frozen: it pulls with the elastic strain that it had when it was let go."""
+    """A released block balances rubber, glass and the branch with its elastic strain at the release."""
     tau, mu, G = 4.0, 1.5, 300.0
     material = fx.Solidification(fx.TransientNetwork(BASE, [(mu, tau)]), G, fraction=fx.table({70: 1, 75: 0.5, 85: 0}))
     path = fx.Process(block(material, air(20.0))).run(
@@ -67,7 +67,7 @@ def test_relaxing_base_solidifies():
 
 @pytest.mark.parametrize("hot, left", [(82.5, 0.25), (120.0, 0.0)])
 def test_melted_material_carries_no_stress(hot, left):
-    """Set at rest, drawn cold, warmed in its grip: the stress is that of the base and of the glass that is left."""
+    """Solidified, stretched, then warmed at constant stretch: the base and the remaining glass carry the stress."""
     G, l = 50.0, 1.1
     scene = block(fx.Solidification(BASE, G, between=(75, 85)), air(hot), temperature=20.0)
     path = fx.Process(scene).run([draw(l - 1), fx.Stage("warm", duration=60.0)], progress=False, accuracy="draft")
@@ -77,7 +77,7 @@ def test_melted_material_carries_no_stress(hot, left):
 
 
 def test_steps_in_time_keep_the_accuracy():
-    """The base stiffens as it cools and pulls a loaded block back, which the glass that is born stops on the way."""
+    """A loaded block, whose base stiffens and contracts on cooling, until glass stops it."""
     stiffens = fx.NeoHookean(c10=fx.table({20: 4.0, 80: 1.5, 150: 1.0}))
     found = {}
     for accuracy in (5e-2, 1e-2, 1e-3):
@@ -94,7 +94,7 @@ def test_steps_in_time_keep_the_accuracy():
 
 
 def test_hot_material_equals_its_base():
-    """At a temperature above: to round-off; below, at rest: the glass is there, free of stress in the first shape."""
+    """A hot material deforms like its base, to round-off; a cold one has the moduli of base and glass."""
     hot, plain = (fx.Process(block(material, [], heat=False)).run([draw(0.5)], progress=False)
                   for material in (fx.Solidification(BASE, 300.0, between=(75, 85)), BASE))
     assert hot.last.x == pytest.approx(plain.last.x, abs=1e-12)
@@ -113,6 +113,6 @@ def test_hot_material_equals_its_base():
     (lambda: fx.Solidification(fx.Solidification(BASE, 1.0, between=(1, 2)), 1.0, between=(1, 2)), "fies already"),
     (lambda: block(fx.Solidification(BASE, 1.0, between=(1, 2)), [], temperature=None, heat=False), "temperature"),
 ])
-def test_what_is_refused(make, words):
+def test_refused_arguments(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()

@@ -88,7 +88,7 @@ class Evaluated:
 
 
 def shear_history(t):
-    """Extension with shear, fast at first; det F is not 1."""
+    """Deformation gradient of an extension with shear, fast at first, with det F other than 1."""
     s = 1 - np.exp(-2 * t)
     return np.eye(3) + s * (SHEAR - np.eye(3))
 
@@ -96,7 +96,7 @@ def shear_history(t):
 @LAWS
 @pytest.mark.parametrize("dt", [0.0, 1e-9, 0.3, 7.0, 1e4])
 def test_stress_is_the_derivative_of_the_energy(law, dt):
-    """Central differences, from a state that has already flowed; the slopes of the stress are symmetric."""
+    """Central differences from a state after some flow; the tangent is symmetric."""
     material = Evaluated(law(RUBBER, P1))
     state = material.run(shear_history, np.linspace(0, 0.6, 7))
     h, places = 1e-3, [(0, 0), (0, 1), (1, 0), (1, 1), (2, 2)]
@@ -115,7 +115,7 @@ def test_stress_is_the_derivative_of_the_energy(law, dt):
 @LAWS
 @pytest.mark.parametrize("dt", [0.0, 0.3, 7.0, 1e3])
 def test_stress_belongs_to_the_end_of_the_step(law, dt):
-    """The derivative of the step's energy is that of the stored energy with the updated tensors held."""
+    """The derivative of the step potential equals that of the stored energy at constant updated tensors."""
     material = Evaluated(law(None, P1))
     state = material.run(shear_history, np.linspace(0, 0.6, 4))
     after, C = material("updated", SHEAR, state, dt), isochoric(SHEAR)
@@ -196,7 +196,7 @@ def exact_tensor(law, tau, history, end):
     ids=["second", "first", "network"])
 @pytest.mark.parametrize("jump", [False, True])
 def test_order_in_time(law, name, order, jump):
-    """Against the integrated law, also when the deformation is put on at once and then goes on."""
+    """Order of the error against the integrated law, also after a sudden deformation."""
     def history(t):
         return shear_history(t + 0.5 * jump)
     material = Evaluated(law(None, P0))
@@ -213,7 +213,7 @@ def test_order_in_time(law, name, order, jump):
 
 
 def test_order_in_time_of_steps_far_longer_than_tau():
-    """What is left of the strain is tau times its rate: that at the end of a step is of second order."""
+    """The elastic strain is tau times the strain rate at the end of a step, with an error of second order."""
     tau, end = 1e-5, 1.5
     material = Evaluated(TransientNetwork(None, [(1 / tau, tau)]))
     (start, last), h = [np.linalg.inv(isochoric(shear_history(end + d))) for d in (-1e-5, 1e-5)], 1e-5
@@ -288,7 +288,7 @@ def test_relaxation_by_quadrature(mode):
 @pytest.mark.parametrize("law", [Viscoelastic, TransientNetwork])
 @pytest.mark.parametrize("mode", MODES)
 def test_stress_of_a_history_against_the_steps(law, mode):
-    """Pulled, held, let back at once, held: steps of second order come to the integrated law."""
+    """Pulled, held, released suddenly, held: steps of second order converge to the integrated law."""
     material = law(RUBBER, P1)
     times, stretches = np.array([0, 1.0, 1.5, 1.5, 2.5]), np.array([1.2, 2.5, 2.5, 1.6, 1.6])
     found = material.stress(mode, stretches, times=times)
@@ -325,7 +325,7 @@ def test_transient_network_at_a_constant_rate():
 
 
 def test_viscosity_in_steady_extension():
-    """The stress of a branch comes to 3 mu tau rate (uniaxial), 6 mu tau rate (equibiaxial), at any rate."""
+    """The stress of a branch converges to 3 mu tau rate (uniaxial) and 6 mu tau rate (equibiaxial), at any rate."""
     for rate in (0.1, 5.0):
         l = np.array([math.exp(9 * max(rate, 1) + 2)])
         for mode, factor in (("uniaxial", 3), ("equibiaxial", 6)):
@@ -345,7 +345,7 @@ def test_unit_of_time(law):
 
 
 def test_a_stretch_between_times():
-    """`between` is what grows at a constant rate; close times make no difference of it."""
+    """`between` names the quantity with a constant rate; with many times both choices agree."""
     material = Viscoelastic(RUBBER, P1)
     t, l = np.linspace(0, 1, 5), np.linspace(1, 3, 5)
     straight = material.stress("uniaxial", l, times=t)
@@ -359,7 +359,7 @@ def test_a_stretch_between_times():
 
 
 def test_as_a_material():
-    """Without times it is the instantaneous response; relaxed, the equilibrium; constants by name."""
+    """Without times the response is instantaneous; the relaxed material is the equilibrium; names of the constants."""
     material = Viscoelastic(fx.Gent(mu=0.1, Jm=80.0), P1)
     assert list(material.parameters) == ["mu", "Jm", "mu_1", "tau_1", "mu_2", "tau_2"]
     assert material.shear_modulus == pytest.approx(0.8) and material.rest_stress == pytest.approx(0.1)
