@@ -19,8 +19,8 @@ from .state_solver import StateSolver
 log = logging.getLogger("formingx")
 
 Predictor: TypeAlias = Callable[[float], Array | None]
-"""Function from a control to a guess of x, locally owned entries, or to None where the tangent gives the better
-guess."""
+"""Function that returns a guess of x, locally owned entries, at a control; None where the tangent is the better guess.
+"""
 
 Bend: TypeAlias = tuple[Array, float]
 """Correction of a guess on the tangent: (change of x, locally owned entries; change of the control)."""
@@ -34,13 +34,14 @@ class Curve(StateSolver):
         tolerances: convergence criteria of a state.
 
     Attributes:
-        sweeps: largest number of solutions of one step in three dimensions, each with more points put into contact.
+        sweeps: largest number of solutions of one step with tools in three dimensions. After each solution, points that
+            penetrate are put into contact, or points in tension separate.
     """
 
     sweeps = 30
 
     def plane_normal(self, state: State) -> Array:
-        """Return the gradient of the constraint plane in which a step from a state ends.
+        """Return the normal of the plane in which a step from a state ends, as the gradient of its constraint.
 
         Args:
             state: accepted state at the start of the step.
@@ -55,8 +56,8 @@ class Curve(StateSolver):
     def guess_from_unloaded(self, unloaded: State, control: float) -> Array:
         """Return a guess of the unknowns at a control, from the unloaded state.
 
-        The guess has the prescribed displacements of the control, and 0 elsewhere. If the unloaded body has no
-        stiffness, such as a flat membrane, the guess lies on the first tangent, where F does no work.
+        The guess has the prescribed displacements at this control, and 0 elsewhere. If the unloaded body has no
+        stiffness, such as a flat membrane, the guess is a multiple of the first tangent t instead, with F . t = 0.
 
         Args:
             unloaded: the unloaded state, with the first tangent of the path.
@@ -86,14 +87,16 @@ class Curve(StateSolver):
              bend: Bend | None = None) -> State:
         """Return the state after a step of a given arc length (Song 1993, eqs. 4.14 to 4.31).
 
-        The guess lies on the tangent. Newton's method corrects it in the plane normal to the tangent at this length.
+        The guess lies on the tangent of `old`, at the given length. Newton's method corrects the guess in the plane
+        through it that is normal to the tangent.
 
         Args:
             old: accepted state at the start of the step.
             length: arc length of the step, dimensionless.
-            predictor: function from the control to a guess of x, in a step in time, or None.
-            earlier: a state before `old` on the same smooth path, or None. The guess lies on the parabola through both.
-            bend: correction of the guess in the plane, or None.
+            predictor: function that replaces the guess of x, for a step in time (`Predictor`); None: no such function.
+            earlier: a state before `old` on the same smooth path. The guess then lies on the parabola through both that
+                touches the tangent of `old`. None: the guess lies on the tangent.
+            bend: correction that is added to the guess (`Bend`), or None.
 
         Returns:
             The state, of kind "step".
@@ -106,7 +109,7 @@ class Curve(StateSolver):
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state near the end of a step at which a constraint holds, in place of a given arc length.
+        """Return the state after a step that ends where a constraint holds, in place of the plane of `step`.
 
         Args:
             old: accepted state at the start of the step.
@@ -114,7 +117,7 @@ class Curve(StateSolver):
             equation: the constraint, such as "quantity = target".
             predictor: as in `step`.
             earlier: as in `step`.
-            bend: correction of the guess, or None.
+            bend: as in `step`.
             kind: kind of the new state (`State.kind`).
 
         Returns:
@@ -127,10 +130,7 @@ class Curve(StateSolver):
 
     def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
-        """Return the guess (x, control) at an arc length from the state `old`, on its tangent.
-
-        With a state `earlier` before `old` it lies on the parabola through both; the correction `bend` is added.
-        """
+        """Return the guess (x, control) of a step from `old`; arguments as in `step`. x: locally owned entries."""
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if earlier is not None:
             h = self.distance(earlier, old)
@@ -146,8 +146,8 @@ class Curve(StateSolver):
                     predictor: Predictor | None) -> State:
         """Return the state of a given kind at which a constraint holds, from the guess (x, control).
 
-        A predictor replaces the guess of x, and tangents of earlier iterations are kept, unless a limit point is near:
-        limit points are located by the tangents of their neighbours, which must be new.
+        Away from limit points, the predictor replaces the guess of x, and tangents of earlier iterations are kept. Near
+        a limit point tangents must be new, since limit points are located by the tangents of neighbouring states.
         """
         if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, constraint, kind, old)
@@ -158,14 +158,14 @@ class Curve(StateSolver):
         return self.solve(new.x, new.control, constraint, kind, old)
 
     def _is_away_from_limit_point(self, slope: float) -> bool:
-        """Return True if no limit point is near: the control contributes more than half of the squared arc length.
+        """Return True if the control contributes more than half of the squared arc length, so no limit point is near.
 
-        slope: derivative of the control by arc length.
+        slope: derivative of the control with respect to arc length.
         """
         return slope**2 * self.control_weight > 0.5
 
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[Array, float]:
-        """Return a point on the cubic through two states and their tangents.
+        """Return a point on the cubic (Hermite) through two states with their tangents.
 
         Args:
             a: first state.
@@ -173,7 +173,7 @@ class Curve(StateSolver):
             fraction: position between them, 0 at a, 1 at b.
 
         Returns:
-            (x, locally owned entries, shape (n,); control).
+            Unknowns x, locally owned entries, shape (n,); control.
         """
         s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
@@ -187,8 +187,8 @@ class Curve(StateSolver):
         Args:
             a: first state.
             b: second state.
-            bound: the output quantity; the value lies between its values at a and b.
-            target: the value, in the user's units.
+            bound: the output quantity.
+            target: the value, in the user's units, between the values of the quantity at a and b.
 
         Returns:
             The state, of kind "target".
@@ -207,12 +207,12 @@ class Curve(StateSolver):
         return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """Return the state between two states in a plane normal to the tangent of the first.
+        """Return the state between two states in a plane that is normal to the tangent of the first.
 
         Args:
             a: first state.
             b: second state.
-            fraction: position of the plane between them, 0 at a, 1 at b.
+            fraction: position of the plane on the cubic between them, 0 at a, 1 at b.
 
         Returns:
             The state, of kind "step".
@@ -224,7 +224,7 @@ class Curve(StateSolver):
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
-        """Return the state between two states that meets a target.
+        """Return the state between two states that meets a target, for the user.
 
         Args:
             a: first state.
@@ -252,7 +252,7 @@ class Curve(StateSolver):
 
         Args:
             a: state before the limit point.
-            b: state behind it.
+            b: state after the limit point.
 
         Returns:
             The state, of kind "limit point".
@@ -272,20 +272,20 @@ class Curve(StateSolver):
 
     def close_penetrated(self, old: State, states: list[State],
                          targets: Sequence[tuple[Target, Measure]]) -> list[State]:
-        """Put penetrating points of tools in three dimensions into contact, and solve again for the end of a step.
+        """Put points that penetrate tools in three dimensions into contact, and solve again for the end of a step.
 
-        A point is in contact at the position where it met the tool. If the state meets a target, the points of all
-        tools count, and the target is met again with renewed contact pressures (`StepLimit.renew_pressure`). Without
-        friction the state then does not depend on the steps before it. If this solution fails, the last one stays. Away
-        from targets the control stays constant, and only tools with friction count.
+        A point closes at the position where it met the tool. At a target the points of all tools are considered, and
+        the state meets the target again, with renewed contact pressures (`StepLimit.renew_pressure`). Without friction
+        the state then does not depend on the steps before it. If this solution fails, the solution before it is
+        returned. Other states are solved for again at the same control, and only for points of tools with friction.
 
         Args:
             old: accepted state at the start of the step.
             states: states found by the step, in order; only the first one is solved for again.
-            targets: open targets with their output quantities.
+            targets: pairs (open target, its output quantity).
 
         Returns:
-            All states of the step, the first one without penetrating points.
+            All states of the step, in order. In the first one no point penetrates a tool.
 
         Raises:
             Failure: no such state was found.
@@ -312,7 +312,7 @@ class Curve(StateSolver):
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
         """Return the constraint of the plane through (x0, control0) that is normal to the tangent of the state `old`.
 
-        The normal is taken in the inner product of arc length. x0: locally owned entries, shape (n,).
+        Normality refers to the inner product of arc length. x0: locally owned entries, shape (n,).
         """
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
             self._a.array_w[:] = old.direction
@@ -326,7 +326,7 @@ class Curve(StateSolver):
 def _stationary(a: State, b: State, chord: float) -> float:
     """Return the position between two states, 0 at a, 1 at b, at which the cubic of the control is stationary.
 
-    chord: arc length of the straight line between them. The cubic has the controls and slopes of both states.
+    The cubic has the controls and slopes of both states. chord: arc length of the straight line between the states.
     """
     jump = (b.control - a.control) / chord
     c2, c1, c0 = 3 * (a.slope + b.slope - 2 * jump), 6 * jump - 4 * a.slope - 2 * b.slope, a.slope

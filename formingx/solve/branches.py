@@ -18,12 +18,12 @@ ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which another path branches off.
+    """Return the pairs of neighbouring states between which another path branches off; collective.
 
     Between such states the determinant of the tangent changes its sign, and the control has no limit point. The sign at
-    a state is known from `State.orientation`. States solved for at fixed control have no orientation: two
-    factorisations for each piece between limit points then show whether the sign changed. They miss an even number of
-    changes. For a problem with history variables the list is empty. Collective.
+    a state follows from `State.orientation`. States solved for at fixed control have no orientation. Then the signs at
+    both ends of each piece between limit points are computed, so an even number of sign changes is missed. For a
+    problem with history variables the list is empty.
 
     Args:
         curve: solver of the path.
@@ -41,13 +41,13 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
 
 
 def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which another path branches off.
+    """Return the pairs of neighbouring states between which another path branches off, see `branch_points`.
 
     Args:
         curve: solver of the path.
         states: the states of the path, in order.
-        sign: function that returns the sign of the determinant of the tangent at a state, such as `determinant_sign`
-            makes. It is called only if no state has an orientation.
+        sign: function that returns the sign of the determinant of the tangent at a state, from `determinant_sign`. It
+            is called only if no state has an orientation.
 
     Returns:
         Pairs (state before the branch point, state after it).
@@ -58,9 +58,8 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
-    """Return True if branch points follow from the states alone, without a factorisation.
-
-    Their orientations give them; a problem with history variables has none.
+    """Return True if branch points are found without a factorisation: states have an orientation, or there is a
+    history.
     """
     return curve.problem.has_history or any(state.orientation for state in states)
 
@@ -79,9 +78,8 @@ def warn_of_branches(record: Any, step: Sequence[State]) -> None:
 def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
     """Return the pairs of neighbouring states with different `State.orientation`: a branch point lies between them.
 
-    Limit points are left out, since the sign of the determinant there is round-off. So are pairs across a jump or
-    across the start of a stage. Where a run reversed its direction along the path, the orientation changes its sign
-    without a branch point.
+    Left out are limit points, where the sign of the determinant is round-off, and pairs across a jump or the start of a
+    stage. The sign of the orientation is reversed where a run reverses its direction along the path.
     """
     found = []
     last: State | None = None
@@ -106,7 +104,7 @@ def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], in
         solver: solver that factorises the tangent of the problem and computes its determinant.
 
     Returns:
-        Function of a `State` with the value 1 or -1; 0 if the tangent could not be factorised.
+        Function of a `State` that returns 1 or -1, or 0 if the tangent could not be factorised.
     """
     problem = curve.problem
 
@@ -118,10 +116,10 @@ def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], in
 
 
 def _sign_changes(states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which the determinant changes its sign without a limit point.
+    """Return pairs of neighbouring states between which the determinant changes its sign without a limit point.
 
-    sign: function that returns the sign of the determinant at a state. Bisection finds at most one pair in each piece
-    between limit points.
+    Bisection finds at most one pair in each piece between limit points. sign: function that returns the sign of the
+    determinant of the tangent at a state.
     """
     pieces: list[list[State]] = [[]]
     for state in states:

@@ -22,14 +22,18 @@ Moved: TypeAlias = Callable[[Array, float], Array]
 
 @dataclass(frozen=True)
 class BorderedTangent:
-    r"""Border of the system of F and a constraint c; maps solutions with the tangent K to this system (`Border`).
+    r"""Border of the linear system of F = 0 with a constraint c = 0, as a function (`Border`).
 
-    .. math:: \Delta\lambda = -\nabla c \cdot V / slope, \quad V + b \, \Delta\lambda
+    It maps a solution V = K^-1 E with the tangent K to the solution (V', dlambda) of the bordered system:
+
+    .. math:: \Delta\lambda = -\frac{\nabla c \cdot V}{s}, \qquad V' = V + b \, \Delta\lambda
+
+    Here s is the slope, the derivative of c with respect to the control along the path.
 
     Attributes:
         gradient: vector dc/dx.
         b: vector dx/dcontrol along the path.
-        slope: derivative of c by the control along the path.
+        slope: total derivative dc/dcontrol along the path.
     """
 
     gradient: PETSc.Vec
@@ -37,10 +41,10 @@ class BorderedTangent:
     slope: float
 
     def __call__(self, V: Array) -> Array:
-        """Map solutions V = K^-1 E, in place.
+        """Map solutions with K to the bordered system, in place.
 
         Args:
-            V: the solutions, locally owned rows, shape (n, m).
+            V: the solutions K^-1 E, locally owned rows, shape (n, m).
 
         Returns:
             Changes of the control, shape (m,).
@@ -51,15 +55,15 @@ class BorderedTangent:
 
 
 class Columns:
-    """Solutions of the bordered system for right-hand sides E.
+    """Solutions of the bordered system for m right-hand sides, such as unit forces at contact points.
 
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, locally owned rows, shape (n, m).
-        border: function that maps solutions with K to the bordered system.
+        border: function that maps solutions with K to the bordered system (`Border`).
 
     Attributes:
-        steps: changes of the control, shape (m,).
+        steps: change of the control for each right-hand side, shape (m,).
     """
 
     def __init__(self, solver: DirectSolver, E: Array, border: Border):
@@ -67,42 +71,46 @@ class Columns:
         self.steps = border(self._values)
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions by the right-hand sides, shape (k, m).
+        """Return the motions of contact points for each right-hand side, shape (k, m), length.
 
         Args:
-            moved: function that returns k motions.
+            moved: function that returns k motions for an update of unknowns and control (`Moved`).
         """
         return np.array([moved(column, step) for column, step in zip(self._values.T, self.steps)]).T
 
     def update(self, forces: Array) -> tuple[Array, float]:
-        """Return the updates of the unknowns, shape (n,), and of the control.
+        """Return the updates of unknowns and control for a linear combination of the right-hand sides.
 
         Args:
             forces: factors of the right-hand sides, shape (m,).
+
+        Returns:
+            Update of the unknowns, locally owned entries, shape (n,); update of the control.
         """
         return self._values @ forces, float(self.steps @ forces)
 
     def updates(self, forces: Array) -> Array:
-        """Return updates of the unknowns, shape (n, k).
+        """Return the updates of the unknowns for k linear combinations of the right-hand sides, shape (n, k).
 
         Args:
-            forces: factors of the right-hand sides, shape (m, k).
+            forces: factors of the right-hand sides, a column for each combination, shape (m, k).
         """
         return self._values @ forces
 
 
 class CondensedColumns:
-    """The same solutions, of which only the rows are known at first in which right-hand sides are not zero.
+    """Solutions as `Columns`, computed from a few entries of K^-1 for right-hand sides that are zero in most rows.
 
-    These rows are entries of K^-1. The changes of the control cost a solution with the transposed K, and each update
-    costs one with K. The motions must follow from these rows and the control alone.
+    At first only the rows in which a right-hand side is not zero are computed. The changes of the control take one
+    solution with the transposed K. Each update takes one solution with K. Motions must depend on these rows and on the
+    control alone.
 
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, shape (n, m).
         border: border of the system.
-        inverse: the entries of K^-1 in these rows and columns, shape (k, k).
-        rows: numbers of the rows, shape (k,).
+        inverse: entries of K^-1 in `rows` and in the columns of the same numbers, shape (k, k).
+        rows: numbers of the rows in which a right-hand side is not zero, shape (k,).
 
     Attributes:
         steps: changes of the control, shape (m,).
@@ -117,7 +125,7 @@ class CondensedColumns:
         adjoint.destroy()
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions by the right-hand sides, as `Columns.motions`."""
+        """Return the motions of contact points for each right-hand side, as `Columns.motions`."""
         x, found = np.zeros(self._border.b.getLocalSize()), []
         for column in self._found.T:
             x[self._rows] = column
@@ -125,7 +133,7 @@ class CondensedColumns:
         return np.array(found).T + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
 
     def update(self, forces: Array) -> tuple[Array, float]:
-        """Return the updates of the unknowns and of the control, as `Columns.update`."""
+        """Return the updates of unknowns and control for a linear combination, as `Columns.update`."""
         rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ forces)
         rhs.array_w[:] = 0.0
         rhs.array_w[self._rows] = self._E @ forces
@@ -136,12 +144,12 @@ class CondensedColumns:
         return dx, step
 
     def updates(self, forces: Array) -> Array:
-        """Return updates of the unknowns, as `Columns.updates`."""
+        """Return the updates of the unknowns for several linear combinations, as `Columns.updates`."""
         return np.array([self.update(column)[0] for column in forces.T]).T
 
 
 def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | CondensedColumns:
-    """Return the solutions for right-hand sides that are zero in most rows, condensed if this costs less.
+    """Return the solutions of the bordered system for m right-hand sides, condensed if this costs less.
 
     Args:
         solver: solver with the factors of the tangent K.

@@ -20,17 +20,16 @@ from .state import State
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits above or below which a number of the last good state counts as a cause of the failure.
+    """Limits of numbers of the last good state, beyond which they indicate a cause of the failure.
 
     Attributes:
-        before: number of states between the last good state and an earlier one. The condition numbers of both are
+        before: number of states between the last good state and the earlier state with which its condition number is
             compared.
-        singular: ratio of these condition numbers that indicates a singular tangent.
-        round_off: condition number that leaves hardly any of 16 digits.
-        slowing: slope of the control over its largest value on the path. Below it a limit point is extrapolated from
-            the last slopes.
+        singular: ratio of both condition numbers above which the tangent counts as singular.
+        round_off: condition number above which hardly any of 16 digits is correct.
+        slowing: slope of the control over its largest value on the path, below which a limit point is extrapolated.
         material: ratio of I1 - 3 to its limit in the material, above which the material counts as a cause.
-        volume: J below which an element is about to turn inside out.
+        volume: volume ratio J below which an element is about to turn inside out.
         shape: shape quality of a deformed element, over its value in the reference configuration, below which the
             element is about to turn inside out.
     """
@@ -49,10 +48,10 @@ _LIMITS = Limits()
 
 @dataclass(frozen=True)
 class FailedRun:
-    """A failed run, the subject of the checks of `formingx.findings.register("failure")`.
+    """Failed run, as the checks registered by `formingx.findings.register("failure")` examine it.
 
     Attributes:
-        facts: {field of a `Diagnosis`: its value}.
+        facts: {field of `Diagnosis`: value}, without `findings`.
         problem: the equations.
         last: the last good state, or None.
         fixed_control: True if the solver of the run cannot pass a limit point.
@@ -72,9 +71,9 @@ class Diagnosis:
 
     Attributes:
         reason: how the last attempt ended, as text.
-        step: number of the state that could not be reached (1: the first after the start).
+        step: number of the state that was not reached; the start is 0.
         control: value of the controlled quantity in the last good state: pressure (stress), travel (length) or time.
-        aimed: value of the controlled quantity at the end of the failed attempt.
+        aimed: value of the controlled quantity, in the user's units, at the end of the failed attempt.
         residual: {"displacement", "pressure", "multipliers": norm of this part of the residual over the norm of the
             support forces} in the failed attempt; inf where it was not finite.
         worst: place of the largest out-of-balance force in the failed attempt.
@@ -96,7 +95,7 @@ class Diagnosis:
         flipped: number of nodes whose contact status (open, sticking, sliding) changed in the last iteration.
         touching: number of nodes in contact in the last good state.
         condition: estimate of the 1-norm condition number of the tangent of the last good state.
-        condition_before: the same estimate some states earlier.
+        condition_before: the same estimate for the state 10 states earlier.
         findings: causes that the numbers prove ("serious") or make likely ("warning"), with advice.
         what: name of the controlled quantity.
         examined: examination of the body, which `picture` draws; None without a body.
@@ -167,7 +166,7 @@ class Diagnosis:
             file: name of the image file; rank 0 writes it.
 
         Raises:
-            InputError: a membrane has no elements to draw, nor has a run without a good state.
+            InputError: the body is a membrane, or the run has no good state.
         """
         if self.examined is None:
             raise InputError("Diagnosis.picture: there is no body to draw")
@@ -176,13 +175,13 @@ class Diagnosis:
 
 def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attempt | None = None, pace: str = "",
              target: float | None = None) -> Diagnosis:
-    """Return the diagnosis of a failed run, from its last good state and its failed attempt. Collective.
+    """Return the diagnosis of a failed run, from its last good state and its failed attempt; collective.
 
     Args:
         curve: solver of the path.
         states: the accepted states; may be empty.
-        reason: how the last attempt ended.
-        attempt: end of the failed iteration; None: no iteration failed.
+        reason: how the last attempt ended, as text.
+        attempt: unknowns and corrections at the end of the failed iteration; None if no iteration failed.
         pace: progress of a run that used up its steps, as text; "" for other failures.
         target: target of the controlled quantity, in the user's units, or None.
 
@@ -248,12 +247,10 @@ def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, di
 
 
 def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
-    """Return the facts of a `Diagnosis` that follow from the tangents of the states.
+    """Return {field of `Diagnosis`: value} for the fields that follow from the tangents of the states.
 
-    These are the condition numbers, the sign changes of the determinant, the limit points, and an extrapolated one. At
-    a limit point the determinant of dF/dx changes its sign and the control is stationary. Where only the determinant
-    changes its sign, another path branches off. The signs at two states show whether the number of changes between them
-    is odd; bisection then finds one.
+    These fields are the condition numbers, the sign changes of the determinant of dF/dx, and the limit points. A limit
+    point ahead is extrapolated from the squared slopes of the last two states, which are linear in the control.
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -310,7 +307,7 @@ def _element_findings(run: FailedRun) -> Iterator[Finding]:
 
 @register("failure")
 def _buckling_findings(run: FailedRun) -> Iterator[Finding]:
-    """Yield a finding if a sheet in contact is compressed along its section, and so buckles."""
+    """Yield a finding if a sheet in contact is compressed along its section, which makes it buckle."""
     if _buckles(run.facts):
         stretch, first, last = run.facts["shortened"]
         yield Finding("serious", "wall",
@@ -323,13 +320,13 @@ def _buckling_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _buckles(facts: dict[str, Any]) -> bool:
-    """Return True if, by the facts of a failed run, a piece of a sheet in contact is compressed along its section."""
+    """Return True if the last good state has a sheet in contact that is compressed along its section."""
     return bool(facts.get("shortened") and facts["touching"])
 
 
 @register("failure")
 def _limit_point_findings(run: FailedRun) -> Iterator[Finding]:
-    """Yield findings on limit points that the control reached, or is about to reach, before its target."""
+    """Yield findings if the control passed a limit point before its target, or is about to reach one."""
     facts, target = run.facts, run.target
     if _buckles(facts):                                      # the limit point is only an effect of buckling
         return
@@ -355,7 +352,7 @@ def _limit_point_findings(run: FailedRun) -> Iterator[Finding]:
 
 @register("failure")
 def _branch_findings(run: FailedRun) -> Iterator[Finding]:
-    """Yield findings on a path that branches off, a singular tangent, and contact that does not settle."""
+    """Yield findings if another path branches off, the tangent is singular, or the active set does not converge."""
     facts = run.facts
     what = facts["what"]
     for a, b in facts.get("turned", ()):
@@ -379,8 +376,9 @@ def _branch_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """Return True if the condition number of the tangent has grown over the last states so much that it counts as
-    singular."""
+    """Return True if the condition number of the tangent has grown by the factor `Limits.singular` over the last
+    states.
+    """
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
 

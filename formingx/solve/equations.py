@@ -41,10 +41,10 @@ Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 
 
 class Measure(Protocol):
-    """Output quantity: a number of every state, such as a pole height.
+    """Output quantity: a number that every state has, such as a pole height.
 
     Attributes:
-        size: scale of the quantity, in the user's units: differences below 1e-12 of it are round-off.
+        size: size of the quantity, in the user's units; differences below 1e-12 `size` are round-off.
     """
 
     size: float
@@ -53,11 +53,11 @@ class Measure(Protocol):
         """Return the value of the quantity at (x, control), in the user's units."""
 
     def equation(self, target: float) -> Constraint:
-        """Return the constraint that the quantity equals `target`, a value in the user's units."""
+        """Return the constraint "quantity = target"; `target` is in the user's units."""
 
 
 class ProblemState(Protocol):
-    """State of a problem, as the problem needs it.
+    """Unknowns, control, time, history variables and step data of a state (the part of `State` that a problem needs).
 
     Attributes:
         x: the unknowns, locally owned entries, shape (n,), dimensionless.
@@ -79,7 +79,7 @@ class Tractions(Protocol):
 
     Attributes:
         force: tractions, shape (n, c), stress.
-        sense: direction of sliding, 1 or -1, 0 for sticking points, shape (n,).
+        sense: direction of sliding along the tangent of the tool, 1 or -1; 0 for other points; shape (n,).
         stiffness: derivative of `force` with respect to the position of its point, shape (n, c, c), stress/length.
         status: `ContactStatus` of each point, shape (n,).
     """
@@ -95,42 +95,42 @@ class Tractions(Protocol):
 
 
 class Increment(Protocol):
-    """Contact law at n locally owned points of a face, from the start of Newton's method to its last linearised
-    iteration."""
+    """Contact law at n locally owned points of a face with c components, linearised in each Newton iteration."""
 
     @property
     def ramp(self) -> float:
-        """Half-width of the range of gaps in which the contact stiffness grows from zero, length."""
+        """Half-width of the ramp, the range of gaps in which the contact stiffness grows from zero, length."""
 
     @property
     def status(self) -> Array:
-        """Contact status of each point in the last linearisation, shape (n,), hashable as bytes."""
+        """`ContactStatus` of each point in the last linearisation, shape (n,)."""
 
     @property
     def newly_closed(self) -> Array:
-        """Mask of points that touch now but did not touch at the start of Newton's method, shape (n,)."""
+        """Mask of points that are closed now but were open at the start of Newton's method, shape (n,)."""
 
     def taken(self, points: Array) -> tuple[Array, Array]:
-        """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c), (m, c, c)."""
+        """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c) and (m, c, c).
+
+        points: numbers of the points. Tractions are stresses, stiffnesses stress/length.
+        """
 
     def predicted(self, motion: Array) -> Tractions:
-        """Return the tractions at all points after a `motion` of the points relative to their tool, shape (n, c),
-        length."""
+        """Return the tractions at all points after a motion relative to their tool, shape (n, c), length."""
 
     def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
-        """Return a function from a motion of `points` relative to their tool, shape (m, c), length, to their
-        tractions."""
+        """Return a function that maps motions of m points relative to their tool, shape (m, c), length, to tractions.
+        """
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
         """Return a function that maps motions of m points, shape (m, c), length, to (depth, path) in the ramp.
 
-        The depth is relative to the width of the ramp, shape (m,). The path is the vector through the ramp, shape (m,
+        The depth is divided by the width of the ramp, shape (m,). The path is the vector through the ramp, shape (m,
         c), length; 0 for points that slide, adhere or have no friction.
         """
 
     def expect(self, points: Array, sense: Array) -> None:
-        """Set the direction of sliding in the next iteration: `sense`, shape (n,), at the points of a mask, shape
-        (n,)."""
+        """Set the direction of sliding, `sense`, shape (n,), that the next iteration assumes at a mask of points."""
 
 
 class ContactFace(Protocol):
@@ -144,23 +144,22 @@ class ContactFace(Protocol):
 
     @property
     def increment(self) -> Increment:
-        """Contact law in the present run of Newton's method; `begin` of the equations starts a new one."""
+        """Contact law in the present run of Newton's method, which `ActiveSet.begin` creates."""
 
     @property
     def scale(self) -> Array:
-        """Factors of the tractions in the forces of F, shape (n,)."""
+        """Factor from the traction of each point to its forces in F, shape (n,), 1/stress."""
 
     def add(self, values: Array, forces: Array) -> None:
         """Add forces at the points, shape (n, c), to `values`, the locally owned entries of F."""
 
     def keep_open(self, points: Array) -> None:
-        """Keep points open until the next increment begins; `points`: a mask, shape (n,)."""
+        """Keep the points of a mask, shape (n,), open until the next `ActiveSet.begin`."""
 
     def moved(self, dx: Array, step: float) -> Array:
-        """Return the motion of the points relative to their tool in an update of x and of the control.
+        """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
 
-        dx: locally owned entries, shape (n,). step: update of the control. The motion has the shape (points, c),
-        length.
+        dx: update of the unknowns, locally owned entries. step: update of the control, which moves the tool.
         """
 
 
@@ -178,12 +177,12 @@ class Viscosity(Protocol):
 
 
 class Attempt(NamedTuple):
-    """End of a failed run of Newton's method.
+    """Last iterate of a failed run of Newton's method.
 
     Attributes:
         x: the unknowns, locally owned entries, shape (n,).
         control: load parameter (control), dimensionless.
-        dx: last correction of x.
+        dx: last correction of x, locally owned entries, shape (n,).
         dcontrol: last correction of the control.
     """
 
@@ -197,7 +196,7 @@ class Examined(Protocol):
     """Examination of a body in its last good state and in a failed attempt.
 
     Attributes:
-        facts: {field of a `Diagnosis`: its value}.
+        facts: {field of `Diagnosis`: value}.
     """
 
     facts: dict[str, Any]
@@ -246,18 +245,20 @@ class Residual(Protocol):
         """Compute dF/dcontrol at (x, control) in `out`; `ahead`: as in `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the inner product of two changes of x, such as the mean over the body of u_a . u_b; it measures arc
-        length."""
+        """Return the inner product of two changes of x, from which arc length is computed; dimensionless.
+
+        An example is the mean over the body of u_a . u_b with displacements u over the size of the body.
+        """
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Compute in `out` the vector for which out . b = inner(a, b) for every b."""
+        """Compute in `out` the product of the metric with a: out . b = inner(a, b) for every b."""
 
     def has_inverted_element(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if an element is inverted at (x, control): the residual may be finite there all the same."""
+        """Return True if an element is inverted at (x, control); the residual may be finite nevertheless."""
         return False
 
     def viscosity(self) -> Viscosity:
-        """Return the viscous forces for a snap-through; the caller destroys them."""
+        """Return the viscosity of the body for a snap-through; the caller calls its `destroy`."""
 
     @property
     def singular_unloaded(self) -> bool:
@@ -265,20 +266,19 @@ class Residual(Protocol):
         return False
 
     def stiff_state(self, out: PETSc.Vec) -> None:
-        """Compute in `out` a state near x = 0 with a regular dF/dx, which gives the first direction of a path."""
+        """Compute in `out` unknowns near x = 0 with a regular dF/dx, from which the first tangent of a path follows."""
 
     def motion(self, control: float) -> Array:
-        """Return the unloaded state with the prescribed displacements of a control, a first guess; locally owned,
-        shape (n,)."""
+        """Return a first guess of x: the prescribed displacements at a control, else 0; locally owned, shape (n,)."""
         return np.zeros(self.x.getLocalSize())
 
 
 class ActiveSet(Protocol):
-    """Active set of contact: kinks of F where points touch, separate, stick or slide."""
+    """Contact of the body: F has a kink where points close, open, stick or slide (a change of the active set)."""
 
     @property
     def has_kinks(self) -> bool:
-        """True if F may have kinks: one-sided derivatives of F at a state may differ."""
+        """True if F may have kinks, at which its one-sided derivatives differ."""
         return False
 
     @property
@@ -302,17 +302,17 @@ class ActiveSet(Protocol):
         return None
 
     def begin(self, old: ProblemState | None = None) -> None:
-        """Prepare the contacts for Newton's method; `old`: the accepted state before the guess, or None."""
+        """Start the increments of all contacts for a run of Newton's method; `old`: the last accepted state, or None.
+        """
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Linearise the contact law for an iteration, and change the residual F at (x, control) accordingly, in
-        place."""
+        """Linearise the contact law for an iteration, and change F, the residual at (x, control), to it in place."""
 
     def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the change of the stiffness per area of its points from the last tangent to the tangent
-        `ahead`.
+        """Return for each face the change of contact stiffness per area at an accepted state (x, control).
 
-        Shape (n, c, c) each, stress/length. (x, control) is an accepted state.
+        It is the stiffness in the tangent `ahead` less the stiffness in the last tangent, shape (n, c, c),
+        stress/length.
         """
         return []
 
@@ -345,7 +345,7 @@ class Histories(Protocol):
 
     @property
     def relaxes(self) -> bool:
-        """True if F depends on process time."""
+        """True if F depends on process time, not only on the control."""
         return False
 
     def advance(self, x: Array, control: float) -> None:
@@ -361,12 +361,12 @@ class Histories(Protocol):
 
         Args:
             past: k accepted states; the step begins at the last of them.
-            share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
-            x: unknowns at the end of the step.
+            share: weights of `past` and of x whose sum is the displacement halfway in time, shape (k + 1,).
+            x: unknowns at the end of the step, locally owned entries.
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Relative error at the end of the step, and the part that persists after another step of this length.
+            Relative error at the end of the step; part of it that persists after another step of this length.
         """
         return 0.0, 0.0
 
@@ -381,19 +381,18 @@ class Stages(Protocol):
     def enter(self, setting: StepData, x: Array, control: float) -> None:
         """Set new step data, for a path that begins at (x, control); x: locally owned entries, shape (n,).
 
-        Constrained unknowns keep their values in x. Prescribed displacements have these values at this control. With
-        `StepData.fading` the unbalanced forces at (x, control) fade to zero.
+        Constrained unknowns have their values in x at this control. With `StepData.fading` the unbalanced forces at (x,
+        control) decrease to 0 along the path.
         """
 
     def restore(self, state: ProblemState) -> None:
         """Restore the step data and history variables of an accepted state, to start a step from it."""
 
     def state_context(self, state: ProblemState) -> AbstractContextManager[Equations]:
-        """Return a context in which the problem has the unknowns, the step data and the history variables of a
-        state."""
+        """Return a context in which the problem has the unknowns, step data and history variables of a state."""
 
     def activate(self, number: int, x: Array, control: float) -> None:
-        """Activate an item without history, at (x, control); `number`: its number in the scene.
+        """Activate the item with a number in the scene at (x, control), with new history variables.
 
         Raises:
             InputError: a tool would be activated inside the body.
@@ -401,12 +400,11 @@ class Stages(Protocol):
 
 
 class Units(Protocol):
-    """Meaning of the dimensionless numbers of a problem."""
+    """Units and names of the dimensionless numbers of a problem, in messages and results."""
 
     @property
     def scales(self) -> Sequence[float]:
-        """For each item of the step data, its value in the user's units over its amplitude; last, 1.0 for process
-        time."""
+        """Value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time."""
 
     @property
     def units(self) -> tuple[float, float]:
@@ -425,7 +423,7 @@ class Units(Protocol):
 
     @property
     def main_columns(self) -> Sequence[str]:
-        """Names of the output quantities that describe a state in one line."""
+        """Names of the output quantities that `Record.describe` states."""
         return []
 
     def shown(self, control: float) -> tuple[str, float]:
@@ -433,12 +431,12 @@ class Units(Protocol):
         return "control", control
 
     def absurd(self, control: float) -> str | None:
-        """Return the reason for which no process reaches a value of the control, as text, or None."""
+        """Return the reason, as text, for which no process reaches this value of the control; None if it may."""
         return None
 
     @property
     def why_not_finite(self) -> str:
-        """Reason for which the residual last computed is infinite or not a number, as text."""
+        """Reason, as text, for which the residual last computed is infinite or not a number."""
         return "the equations are not defined there"
 
     def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
@@ -447,4 +445,4 @@ class Units(Protocol):
 
 
 class Equations(Residual, ActiveSet, Histories, Stages, Units, Protocol):
-    """Interface of a problem F(x, control) = 0: everything that the solver uses."""
+    """Interface of a problem F(x, control) = 0 for the solver."""

@@ -18,23 +18,23 @@ class Newton:
         at_rest: lower bound of the displacements (dimensionless) in the relative correction. On a tool whose force
             grows as the square of the penetration, corrections near the reference configuration are as large as
             displacements.
-        hurried: iterations allowed while the active set of a contact with history variables changes, if a cheaper
-            attempt follows a failure, such as half the step.
-        small: corrections (dimensionless displacement) that may grow without a sign of divergence while the active set
-            changes.
-        exempt: number of iterations with a small correction and a new active set that do not count against
-            `newton.Tolerances.settling`. On a flat plug a hundred points of a slack sheet separate one or two at a
-            time. With history variables, a shorter step is better.
+        hurried: largest number of iterations in which the active set of a contact with history variables may change, if
+            a shorter step follows a failure.
+        small: size of a correction (dimensionless displacement) below which growing corrections are no sign of
+            divergence while the active set changes.
+        exempt: number of iterations with a small correction and a new active set that do not count in
+            `newton.Tolerances.settling`. For example, a hundred points of a slack sheet separate one by one from a flat
+            plug. With history variables no iteration is exempt.
         cycles: number of returns to an earlier active set at which the iteration counts as cycling. Converged
             iterations took up to 4.
         diverged: relative correction above which three corrections in a row mean divergence, with contact or without.
             In converged iterations they stayed below 0.1.
-        left_alone: number, counted from 0, of the iteration without a local solve of contact, since this iteration
-            often corrects the errors of the first one.
-        chords: number of chord iterations that together cost less than one iteration with a new tangent. Each takes
-            a residual and a solve, about a sixth of the time.
-        slow: factor of the residual in an iteration above which a tangent is not kept, since round-off would look like
-            convergence.
+        left_alone: number, counted from 0, of an iteration without a local solve of contact. This iteration often
+            corrects the errors of the iteration before it.
+        chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
+            iteration takes a residual and a solve, about a sixth of the time.
+        slow: ratio of the residuals after and before an iteration, above which a tangent is not kept. With slower
+            convergence, round-off would be mistaken for it.
     """
 
     unloaded: float = 1e-5
@@ -54,12 +54,13 @@ class ActiveSetChanges:
 
     Args:
         problem: the equations.
-        small: size of a correction below which it counts as small (`Newton.small`).
+        small: size below which a correction counts as small (`Newton.small`).
 
     Attributes:
         changed: number of the iteration in which the active set changed last, counted from 0.
-        share: factor of a correction, halved when an earlier active set returns: full corrections would cycle.
-        found: number of small corrections that led to a new active set (`Newton.small`).
+        share: factor of the next correction, halved (to 1/4 at least) when an earlier active set returns, as full
+            corrections would cycle.
+        found: number of small corrections that led to a new active set, for `Newton.exempt`.
         returns: number of returns to an earlier active set.
     """
 
@@ -93,9 +94,10 @@ class ActiveSetChanges:
 class ModifiedNewton:
     """Rule of the modified Newton method: a tangent is kept while chord iterations cost less than a new one.
 
-    Source: Ortega and Rheinboldt 1970, section 7.1. The first iteration of a step uses the tangent of an earlier state.
-    The expected fall of the residual is its fall in the last step that began with an old tangent. It is halved for
-    every step since, so that an old tangent is tried again.
+    Source: Ortega and Rheinboldt 1970, section 7.1. The fall of an iteration is the residual after it over the residual
+    before it. The first iteration of a step may use the tangent of an earlier state. Its expected fall is the fall in
+    the last step that began with an earlier tangent, halved for every step since. Earlier tangents are thus tried
+    again.
 
     Args:
         settings: settings of Newton's method.
@@ -107,10 +109,10 @@ class ModifiedNewton:
         self._before, self._fall = 0.0, 1.0
 
     def note_tangent(self, setting: StepData | None) -> None:
-        """Note that a tangent was factorised.
+        """Note that a tangent was factorised, which later iterations may keep.
 
         Args:
-            setting: step data of the tangent; None if it is singular.
+            setting: step data of the tangent; None if the tangent is singular.
         """
         self._setting = setting
 
@@ -118,8 +120,8 @@ class ModifiedNewton:
         """Begin a run of Newton's method.
 
         Args:
-            setting: present step data. A tangent of other step data is not kept.
-            allowed: True if tangents may be kept in this step.
+            setting: present step data. A tangent with other step data is not kept.
+            allowed: True if earlier tangents may be used in this step.
         """
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0

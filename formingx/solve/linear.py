@@ -99,8 +99,8 @@ class DirectSolver:
 
     @property
     def scaling(self) -> int:
-        """Scaling by MUMPS in the last factorisation: its ICNTL(8), -1 if the scaling of the factorisation before
-        was kept."""
+        """Parameter ICNTL(8) of MUMPS in the last factorisation, a scaling strategy; -1 if an earlier scaling was kept.
+        """
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(33))
 
     def solve(self, rhs: PETSc.Vec, out: PETSc.Vec) -> None:

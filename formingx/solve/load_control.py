@@ -17,8 +17,9 @@ _prefixes = itertools.count()
 
 
 class FixedControl:
-    """Solver of F(x, control) = 0 at a given control by full Newton steps, as a backtracking line search stalls for
-    thin sheets.
+    """Solver of F(x, control) = 0 at a given control, by Newton's method without a line search.
+
+    A backtracking line search would stall for thin sheets.
 
     Args:
         problem: the equations.
@@ -76,9 +77,9 @@ class FixedControl:
         self._problem.tangent(x, self._control)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
-        """Append the iteration to `history`; return the reason for which SNES stops, or continues.
+        """Append the iteration to `history`; return the reason (`PETSc.SNES.ConvergedReason`) to stop or to iterate.
 
-        norms: the norms of x, of its last correction and of the residual.
+        norms: norms of x, of its last correction and of the residual.
         """
         size, step, residual = norms
         left = relative(self._problem, residual)
@@ -96,7 +97,7 @@ class FixedControl:
 class FixedControlCurve(Curve):
     """Solver for states at given values of the control, by PETSc SNES, for paths without limit points.
 
-    Arc length is replaced by the change of the control, in the lengths of steps and of tangents.
+    Lengths of steps and of tangents are changes of the control in place of arc lengths.
     """
 
     fixed_control = True
@@ -107,9 +108,9 @@ class FixedControlCurve(Curve):
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
-        """Return the state after a step of a length from `old`, at the control old.control + length old.slope.
+        """Return the state at the control old.control + length old.slope, one step after `old`.
 
-        The other arguments of `Curve.step` have no influence.
+        The other arguments of `Curve.step` are not used.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -118,10 +119,9 @@ class FixedControlCurve(Curve):
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state at which the control meets a target, from the state `old`, at the given length of the step.
+        """Return the state at the control old.control + length old.slope, which must be the target of the control.
 
-        The target must be a value of the control: then it is met at old.control + length old.slope. `equation` and the
-        other arguments of `Curve.step_to` have no influence, except `kind`, the kind of the new state.
+        kind: kind of the new state. `equation` and the other arguments of `Curve.step_to` are not used.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -129,7 +129,7 @@ class FixedControlCurve(Curve):
         return self._correct(old, length, kind)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
-        """Return the state between two states at a fraction, from 0 to 1, of the change of the control from `a` to `b`.
+        """Return the state at the control a.control + fraction (b.control - a.control), with a fraction from 0 to 1.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -154,15 +154,19 @@ class FixedControlCurve(Curve):
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
-        """Return 1, the length of a tangent dx/dcontrol per unit of the control: the control measures length."""
+        """Return 1, the length along a tangent per unit of the control, since length is the change of the control."""
         return 1.0
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
-        """Return the inner product of two changes (x, control) and (y, other) in the metric of the control alone."""
+        """Return the product of the changes of the control in two changes (x, control) and (y, other)."""
         return control * other
 
     def _correct(self, old: State, length: float, kind: str) -> State:
-        """Return the state after a step of a length along the tangent of `old`; raise `Failure` if there is none."""
+        """Return the state of a given kind at the control old.control + length old.slope.
+
+        Raises:
+            Failure: Newton's method fails, or an element is inverted.
+        """
         control = old.control + length * old.slope
         self._x.array_w[:] = self.guess_from_unloaded(old, control) if self._is_unloaded(old) else (
             old.x + length * old.direction)

@@ -28,13 +28,13 @@ class QuantitySteps:
     """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
-        stretched: a step ends at the next prescribed time within this number of step lengths. The last step is then
-            never much shorter than the others.
-        cut: largest factor of the length of a step that is repeated because it was too long.
-        still: relative change of the control in a step below which the control counts as constant, up to round-off.
-        located: tolerance of the time of a limit point, over the duration of the step.
-        met: relative tolerance of a target whose state is solved for inside a step.
-        contact: smallest admissible ratio of the step length that new contact allows to the length of the step.
+        stretched: number of step lengths within which a step ends at the next time to be met, so that the last step is
+            not much shorter than the others.
+        cut: largest factor by which the length of a step is reduced when the step is repeated.
+        still: relative change of the control in a step below which the control counts as constant.
+        located: tolerance of the time of a limit point, over the duration of its step.
+        met: relative tolerance of a target that is met inside a step.
+        contact: length that gap closure allows to a step, over the length of the step, below which the step fails.
     """
 
     stretched: float = 1.5
@@ -49,15 +49,15 @@ _STEPS = QuantitySteps()
 
 
 class QuantityRun(Run):
-    """Run whose states follow the prescribed amplitude of an output quantity in time.
+    """Run in which an output quantity follows a prescribed amplitude in time, and the control is an unknown.
 
     Args:
         record: record of the states.
         measure: the prescribed output quantity (`Quantity`).
-        course: function of time that gives its prescribed value, in the user's units.
+        course: function of time that returns the prescribed value of the quantity, in the user's units.
         times: times that are met exactly: the start, the corners and the end of the amplitude.
-        targets: pairs (target, output quantity) to meet in between.
-        step: step control whose lengths are parts of the duration.
+        targets: pairs (target, output quantity) to meet on the way.
+        step: step control, whose lengths are fractions of the duration of the run; None: the default of `Run`.
         accuracy: tolerance of the relative time integration error.
         label: text before the target beside a progress bar.
     """
@@ -101,13 +101,12 @@ class QuantityRun(Run):
                                   f" {failure.reason}", failure.attempt)
 
     def _next_event(self, time: float) -> float:
-        """Return the first time after `time` that must be met exactly: a corner or the end of the amplitude, or a
-        target."""
+        """Return the first time after `time` to be met exactly: a corner or the end of the amplitude, or a target."""
         times = [*self._times, *(t.value for t, _ in self.targets.open if t.name == "process_time")]
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _solve_at(self, old: State, time: float) -> State:
-        """Return the state at a time, one step from the accepted state `old`.
+        """Return the state at a process time, one step after the accepted state `old`.
 
         Raises:
             Failure: no such state was found.
@@ -129,7 +128,7 @@ class QuantityRun(Run):
     def _limit_before(self, old: State, new: State) -> State:
         """Return the state between two states in time at which the control has an extremum, or `new` if there is none.
 
-        A corner of the amplitude is no extremum, nor is round-off of a constant control.
+        Corners of the amplitude, and round-off of a constant control, do not count as extrema.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
@@ -160,8 +159,8 @@ class QuantityRun(Run):
     def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
         """Return a guess (x, control) of the state at a time, for a step from `old`.
 
-        It lies on the polynomial through the last states. If there is only one, it lies on its tangent where the
-        quantity has the prescribed value.
+        The guess lies on the polynomial through the last states. If there is only one, the guess lies on its tangent,
+        where the quantity has the prescribed `value` (user's units).
         """
         past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
@@ -170,9 +169,9 @@ class QuantityRun(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _on_tangent(self, old: State, value: float) -> tuple[Array, float]:
-        """Return the point (x, control) on the tangent of a state at which the prescribed quantity has a value.
+        """Return the point (x, control) on the tangent of `old` at which the prescribed quantity has a value.
 
-        If there is no such point nearby, return (x, control) of the state itself.
+        value: the value, in the user's units. Without such a point nearby, (x, control) of `old` is returned.
         """
         def deviation(s: float) -> float:
             return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
@@ -187,7 +186,8 @@ class QuantityRun(Run):
         return old.x, old.control
 
     def _met_before(self, old: State, new: State) -> State:
-        """Return the first state in time between two states that meets an open target, or `new` if there is none."""
+        """Return the first state in time, after `old` and up to `new`, that meets an open target; `new` if none does.
+        """
         problem, best = self.problem, new
         for target, bound in self.targets.open:
             if target.name == "process_time":
@@ -205,14 +205,14 @@ class QuantityRun(Run):
         return best
 
     def _state_at_target(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
-        """Return the state, one step from `old`, at which an output quantity meets its target.
+        """Return the state, one step after `old`, at which an output quantity meets its target.
 
         Args:
             old: the accepted state.
             target: the target.
             bound: its output quantity.
-            low: time of `old`.
-            high: time at which the quantity has passed the target.
+            low: process time of `old`.
+            high: process time at which the quantity has passed the target.
 
         Raises:
             Failure: no such state was found.

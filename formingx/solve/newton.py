@@ -19,26 +19,28 @@ from .local_contact import LocalSolve, Update, woodbury
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
-    """Return the norm of unbalanced forces relative to the support forces at the residual last computed.
+    """Return the relative norm of unbalanced forces, |F| / (|support forces| + floor).
 
     Args:
-        equations: the equations, which store the norm of the support forces.
-        forces: norm of the unbalanced forces, dimensionless.
-        floor: lower bound of the support forces, dimensionless.
+        equations: the equations, which store the norm of the support forces at the residual last computed.
+        forces: norm |F| of the unbalanced forces, dimensionless.
+        floor: number that is added to the norm of the support forces, dimensionless.
 
     Returns:
-        The ratio.
+        The ratio, dimensionless.
     """
     return float(forces / (equations.force_scale + floor))
 
 
 class Iteration(NamedTuple):
-    """Sizes of one Newton iteration. The last entry of a list of iterations belongs to the converged state.
+    """Residual and correction of one Newton iteration.
+
+    The last entry of a list of iterations has the residual of the converged state, and no correction.
 
     Attributes:
-        residual: |F| before the iteration, over the norm of the support forces.
+        residual: |F| before the iteration, relative to the support forces (`relative`).
         correction: |dx|/(|x| + `Newton.at_rest`), criterion (3.5.1) of Song (1993).
-        work: |F . dx| over its first value, criterion (3.5.2).
+        work: |F . dx| over its value in the first iteration, criterion (3.5.2) of Song (1993).
         chord: True if the tangent of an earlier iteration was used.
     """
 
@@ -68,7 +70,9 @@ class Failure(Exception):
         history: the Newton iterations.
 
     Attributes:
-        attempt: unknowns and last corrections at the end of the iteration, or None if they are not known.
+        reason: the reason, as text.
+        history: the Newton iterations.
+        attempt: unknowns and last corrections at the end of the iteration; None if no iteration failed.
     """
 
     def __init__(self, reason: str, history: list[Iteration]):
@@ -82,11 +86,11 @@ class Tolerances:
     """Convergence criteria of a state, all of which must be met.
 
     Attributes:
-        correction: tolerance of the next correction, as quadratic convergence predicts it, over the norm of x (and
-            `Newton.at_rest`).
-        residual: tolerance of the norm of F over the norm of the support forces.
-        iterations: largest number of iterations with one active set of contact.
-        settling: largest number of iterations while the active set changes (but `Newton.exempt`).
+        correction: tolerance of the relative correction |dx|/(|x| + `Newton.at_rest`) that quadratic convergence
+            predicts for the next iteration.
+        residual: tolerance of the norm of F relative to the support forces (`relative`).
+        iterations: largest number of iterations with the same active set of contact.
+        settling: largest number of iterations while the active set changes, without exempt ones (`Newton.exempt`).
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -106,19 +110,20 @@ class Tolerances:
         count("Tolerances: settling", self.settling)
 
     def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
-        """Return True if an iteration has converged.
+        """Return True if an iteration has converged, to its tolerances or to round-off.
 
-        Corrections below 1e-7 that no longer shrink, and all below 1e-11, are round-off (a flat thin sheet: near 1e-8).
-        The residual may then be round-off, too. With corrections below the tolerance, a residual that no longer shrinks
-        is round-off, of any size. A stiff penalty (8 mu/eps) times the round-off of the displacements can exceed the
-        support forces of a thin sheet. (r0/h0 = 1e6: corrections vary from 1e-10 to 4e-9, the residual is constant.)
+        Corrections are round-off below 1e-11, or below 1e-7 if they no longer decrease. The residual may then exceed
+        its tolerance by a factor of 1000. With corrections below the tolerance, a residual of any size that no longer
+        decreases is round-off. In a thin sheet (radius over thickness 1e6) a stiff penalty times the round-off of the
+        displacements can exceed the support forces.
 
         Args:
             corrections: relative corrections of all iterations so far.
             residuals: relative residuals before each iteration and after the last one.
-            chord: True if the last iteration was a chord iteration, which converges linearly. The next correction is
-                then predicted from the fall of residuals and corrections, and doubled.
-            smooth: True if F has no kinks, between which an iteration could oscillate.
+            chord: True if the last iteration was a chord iteration. Its convergence is linear: the next correction is
+                predicted from the last ratio of residuals or corrections, and doubled.
+            smooth: True if F has no kinks, between which an iteration could oscillate. Residuals that differ by less
+                than a factor of 3 in five iterations, with corrections below 1e-8, are then round-off.
 
         Returns:
             True if no further iteration is needed.
@@ -170,9 +175,9 @@ class BorderedNewton:
     Args:
         problem: the equations.
         tolerances: convergence criteria.
-        norm: function (change of x, change of the control) that returns the size of a correction.
+        norm: function (change of x, change of the control) that returns the size of a correction, dimensionless.
         settings: settings of Newton's method.
-        drag: forces that are added to F, or None. With them the control must stay constant (`fixed`).
+        drag: forces that are added to F, or None. With added forces the constraint must be `fixed`.
 
     Attributes:
         solver: direct solver with the factors of the last tangent dF/dx.
@@ -181,7 +186,7 @@ class BorderedNewton:
         gradient: vector dc/dx.
         a: vector of the last correction of x.
         b: vector dx/dcontrol along the path.
-        reached: control at the end of the last iteration, and its last correction.
+        reached: (control at the end of the last iteration, last correction of the control).
     """
 
     def __init__(self, problem: Equations, tolerances: Tolerances, norm: Callable[[PETSc.Vec, float], float],
@@ -198,7 +203,8 @@ class BorderedNewton:
 
     @contextlib.contextmanager
     def in_a_hurry(self, hurried: bool) -> Iterator[None]:
-        """Return a context with fewer iterations for the active set of contacts with history variables to converge.
+        """Return a context in which the active set of contacts with history variables may change in few iterations
+        only.
 
         Args:
             hurried: True to allow `Newton.hurried` iterations only; False to change nothing.
@@ -210,7 +216,7 @@ class BorderedNewton:
             self._hurried = False
 
     def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
-        """Compute the tangent of the path, the vector `b` = dx/dcontrol, at a solution of F = 0.
+        """Compute the tangent of the path at a solution of F = 0: the vector `b` = dx/dcontrol, with new factors.
 
         Args:
             x: unknowns of the solution.
@@ -241,9 +247,10 @@ class BorderedNewton:
         return good
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Update the vector `b` at a converged solution to the tangent ahead, without a new factorisation.
+        """Update the vector `b` = dx/dcontrol at a converged solution to the tangent ahead, without a factorisation.
 
-        Woodbury's formula adds the change of stiffness at a few contact points to the factorised tangent.
+        The tangent ahead differs from the factorised one in the stiffness of a few contact points, which Woodbury's
+        formula takes into account.
 
         Args:
             x: unknowns of the solution.
@@ -275,19 +282,18 @@ class BorderedNewton:
                 chords: bool = False) -> tuple[float, list[Iteration]]:
         """Iterate a guess to a solution of F = 0 and c = 0.
 
-        Afterwards the vector `b` is dx/dcontrol at the solution, to the accuracy of the last correction or of the kept
-        tangent.
+        Afterwards the vector `b` is dx/dcontrol of the last tangent, which belongs to the last iteration or, with chord
+        iterations, to an earlier one.
 
         Args:
             x: guess of the unknowns; changed in place to the solution.
             control: guess of the load parameter (control), dimensionless.
             constraint: the constraint c.
             old: accepted state before the guess, or None.
-            chords: True to allow tangents of earlier iterations where they cost less and F has no kinks (modified
-                Newton method).
+            chords: True to allow tangents of earlier iterations (`ModifiedNewton`), if F has no kinks.
 
         Returns:
-            (control of the solution, iterations).
+            Control of the solution; list of the iterations.
 
         Raises:
             Failure: no convergence; x is then meaningless.
@@ -372,8 +378,8 @@ class BorderedNewton:
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
         """Compute the correction `a` = -K^-1 F with the tangent K at (x, control); return False if K is singular.
 
-        The vector `b` is computed too, except in a chord iteration (`chord`), which uses the factors of an earlier
-        tangent, and with added forces. rescale: as in `_factorise`.
+        The vector `b` = dx/dcontrol is computed, too, except with added forces and in a chord iteration. chord: True to
+        use the factors of an earlier tangent. rescale: as in `_factorise`.
         """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False
@@ -386,9 +392,10 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
-        """Return the correction of the control from the linearised constraint, and add its part to the correction `a`.
+        """Return the correction of the control by the linearised constraint, and add it times `b` to the correction
+        `a`.
 
-        history: iterations so far, for the message of a failure.
+        history: iterations so far, which a failure stores.
 
         Raises:
             Failure: the constraint does not change along the path.
@@ -409,10 +416,10 @@ class BorderedNewton:
 
 
 def fixed(target: float) -> Constraint:
-    """Return the constraint "control = target".
+    """Return the constraint c = control - target.
 
     Args:
-        target: value of the control.
+        target: value of the control, dimensionless.
 
     Returns:
         The constraint (`Constraint`).

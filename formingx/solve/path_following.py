@@ -53,9 +53,9 @@ class Run:
 
     Args:
         record: record of the states, with the solver of the path.
-        targets: pairs (target, output quantity): the last one ends the run, the others are met in between.
-        step: step control; default: the one of the last state in the record, or `StepControl()`.
-        at_limit_point: rule at limit points of the control, "continue", "snap_through" or "stop"; None:
+        targets: pairs (target, output quantity). The last target ends the run; the others are met on the way.
+        step: step control; None: the step control stored with the last state of the record, or `StepControl()`.
+        at_limit_point: rule at limit points of the control, "continue", "snap_through" or "stop"; None: the default of
             `at_limit_points`.
         accuracy: tolerance of the relative time integration error.
         label: text before the target beside a progress bar.
@@ -81,11 +81,11 @@ class Run:
         """Follow the path from a state, or from the last recorded one, until the last target is met.
 
         Args:
-            max_steps: number of states after which the run gives up; None: when many states came no nearer to the
-                target.
+            max_steps: largest number of steps; None: no limit. In any case the run gives up if many states came no
+                nearer to the target (`RunTargets.patience`).
             progress: True to show a progress bar.
             start: first state of the run; None: continue from the last recorded state.
-            may_turn: True if a continued run with a new target may go back along the path to it.
+            may_turn: True if a continued run may go back along the path to a new target.
 
         Raises:
             ConvergenceError: the target cannot be reached. The error has no `path` yet; the record holds the states.
@@ -139,26 +139,26 @@ class Run:
 
     @property
     def _target_is_control(self) -> bool:
-        """True if the last target is a value of the control, not a process time under another control."""
+        """False if the last target is a process time, but the control of the run does not change with time."""
         return self.targets.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
     def _may_jump(self) -> bool:
-        """True if the body may snap through: at limit points, or else where contact or friction ends the path."""
+        """True if the body may snap through: by the rule at limit points, or where a kink of F may end the path."""
         may_end = self.problem.has_history or self.problem.has_kinks
         return self._limit_rule in ("snap_through", "continue_volume") or self._limit_rule == "continue" and may_end
 
     @property
     def _jumps_soon(self) -> bool:
-        """True if the body snaps through after some failed steps; False: only after the smallest step has failed.
+        """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
 
-        False for a pressure on a body with history variables, since slip during the motion matters.
+        False for a pressure on a body with history variables, since slip in the viscous motion changes the final state.
         """
         return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
 
     @property
     def _sense(self) -> float:
-        """Direction of the control at the first state of the run, 1 or -1."""
+        """Sign, 1 or -1, of the change of the control at the first state of the run."""
         return float(np.sign(self.states[0].slope)) or 1.0
 
     @property
@@ -172,10 +172,10 @@ class Run:
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _continue(self, may_turn: bool) -> dict[str, Any]:
-        """Take the states with the step data of the last one from the record, to continue their run.
+        """Continue the run of the last states of the record with the same step data; return its `State.stepping`.
 
-        Return the data with which it continues (`State.stepping`); empty if no state has any. With `may_turn` the run
-        may go back along the path, except to a pressure, which may be reached further along the path, too.
+        The result is empty if no state has such data. With `may_turn` the run may go back along the path, except to a
+        pressure, which may be reached further along the path, too.
         """
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
@@ -197,7 +197,7 @@ class Run:
         return kept
 
     def _elapsed(self) -> float:
-        """Return the seconds since the last call."""
+        """Return the time since the last call, s."""
         before, self._began = self._began, time.perf_counter()
         return self._began - before
 
@@ -211,8 +211,8 @@ class Run:
     def _next(self, old: State) -> list[State]:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
-        A failure halves the step. If short steps fail, or the path leads back, the body snaps through. It does so only
-        after the smallest step near a snap-through without equilibrium, and at a first state with history variables.
+        A failure halves the step. If short steps fail, or the path leads back, a snap-through is tried. Only the
+        smallest step triggers it at a first state with history variables, and near a snap-through that failed.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -263,9 +263,9 @@ class Run:
 
     def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
               reach: float, end: float | None = None) -> list[State]:
-        """Return the states of one step from `old`, of a given arc length, or to a target within reach.
+        """Return the states of one step from `old`, of a given arc length, or to a target at the arc length `reach`.
 
-        bound: output quantity of the target. reach: arc length to it. end: control at the end of the step, or None.
+        bound: output quantity of the target. end: control at the end of the step, in place of its length, or None.
         A step that fails raises `Failure`, and a step that is too long raises `Cutback`.
         """
         limit = self.problem.limit
@@ -303,7 +303,7 @@ class Run:
 
     @property
     def _predictor(self) -> Predictor | None:
-        """Function from the control to a guess of x in a step of a body that relaxes; None: the tangent is better."""
+        """Function from the control to a guess of x, extrapolated in time; None without relaxation or with kinks."""
         if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
@@ -345,10 +345,9 @@ class Run:
     def _jump(self, old: State, length: float, step: float = 0.0, work_sign: float = 0.0) -> State:
         """Return the state after a snap-through from `old`; raise `Failure` if there is none.
 
-        length: arc length of the predictor on the tangent of `old`. step: length of the last successful step.
-            work_sign:
-        sign of the work of the controlled load, see `snap_through`. With length 0, contact with history variables may
-        settle at one control but fail at the next: several are tried. A fading force is removed at once.
+        length: arc length of the predictor on the tangent of `old`. step: length of the first attempt of the step.
+        work_sign: as in `snap_through`. With length 0 and history variables several changes of the control are tried,
+        since contact may converge at one only. A fading force is removed at once.
         """
         fading, settings = self.problem.setting.fading, self.settings.snap_through
         others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
@@ -374,7 +373,7 @@ class Run:
         return new
 
     def _found_no_equilibrium_near(self, old: State) -> bool:
-        """Return True if an earlier snap-through from about the control of this state reached no equilibrium."""
+        """Return True if an earlier snap-through, from nearly the control of this state, reached no equilibrium."""
         return abs(old.control - self._no_equilibrium_at) < self.settings.snap_through.furthest
 
     def _max_solutions(self, old: State) -> int:
@@ -383,7 +382,7 @@ class Run:
         return most // 5 if self._found_no_equilibrium_near(old) else most
 
     def _check_progress(self) -> None:
-        """Stop if many states came no nearer to the target, or the control is beyond all bounds."""
+        """Give up if many states came no nearer to the target, or no process reaches such a value of the control."""
         control = self.record.last.control
         absurd = self.problem.absurd(control)
         if absurd is not None:
@@ -397,7 +396,7 @@ class Run:
             self._give_up(why)
 
     def _states_within(self, old: State, new: State) -> list[State]:
-        """Return the limit point and the targets inside a step, then its end `new`, in order; raise `Failure`."""
+        """Return the states at limit point and targets inside a step, in order, then its end; may raise `Failure`."""
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:

@@ -13,14 +13,14 @@ from .stepping import SAME_TIME
 
 def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """Return step data in which the amplitude of one item is the control.
+    """Return the amplitudes of a piece of a stage in which the amplitude of one item is the control.
 
     Args:
         amplitudes: present amplitudes of all items, then the process time.
         scales: for each item, its value in the user's units over its amplitude.
-        numbers: numbers of the controlled item and of the items that move with it.
+        numbers: numbers of the controlled item, then of the items that move with it.
         stage: the stage, whose speed or duration relates the process time to the control.
-        clocked: True if process time passes while the control changes.
+        clocked: True if process time may pass while the control changes.
 
     Returns:
         (`StepData.base`, `StepData.rate`, present value of the control).
@@ -43,9 +43,10 @@ def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers:
 
 def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
-    """Return step data between two times, between which all tables are straight lines.
+    """Return the amplitudes of a piece of a stage between two times, between which all tables are linear.
 
-    The control is proportional to the time from 0 on. Its scale makes the largest rate of an amplitude 1.
+    The control is proportional to the time since the start of the piece. At its end the control is the largest change
+    of an amplitude, or 1 if no amplitude changes.
 
     Args:
         amplitudes: present amplitudes of all items, then the process time.
@@ -77,17 +78,17 @@ def end_time(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float
     Args:
         stage: the stage.
         tables: [(number of the item, knots (time, value), shape (n, 2))].
-        now: process time at its start.
+        now: process time at the start of the stage.
 
     Returns:
-        Process time.
+        Process time of the end: of the duration, of the target `until`, or of the longest table.
     """
     return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
         table[-1, 0] for _, table in tables)
 
 
 def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
-    """Return the time of the next knot in any table.
+    """Return the process time of the next knot in any of several tables.
 
     Args:
         tables: [(number of the item, knots (time, value), shape (n, 2))].

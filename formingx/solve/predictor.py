@@ -19,7 +19,8 @@ def recent_states(states: Sequence[State], time: float, most: int, close: float 
         states: the accepted states, in order.
         time: the later time.
         most: largest number of states to return.
-        close: states closer in time than this part of the step to `time` are left out, since they would magnify errors.
+        close: smallest distance in time of two states, over the length of the step to `time`. Closer states are left
+            out, since they would magnify errors.
 
     Returns:
         At most `most` states, none of them before the last jump.
@@ -36,7 +37,8 @@ def recent_states(states: Sequence[State], time: float, most: int, close: float 
 def parabola_state(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
     """Return an earlier state that gives, with the last state and its tangent, a parabola as predictor of a step.
 
-    It is one of the last few states, at least half the step away from the last one, and no jump lies between them.
+    It is one of the four states before the last one, at least half the step away from the last one, and no jump lies
+    between them.
 
     Args:
         states: the accepted states, in order.

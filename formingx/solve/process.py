@@ -42,7 +42,7 @@ _Targets: TypeAlias = list[tuple[Target, Measure]]
 class Execution:
     """One run of a process, stage by stage, from its last state to the end of the last stage.
 
-    A stage consists of pieces, each with one `StepData`. Piece 0 changes the active items. In each later piece a
+    A stage consists of pieces, each with its own `StepData`. Piece 0 changes the active items. In each later piece a
     control varies.
 
     Args:
@@ -52,7 +52,7 @@ class Execution:
             before.
         check: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
             its value in the user's units.
-        step: step control of stages that have none of their own; None: the default.
+        step: step control of stages without their own; None: the default.
         balanced: norm of the unbalanced forces, relative to the support forces, below which they are negligible.
         accuracy: tolerance of the relative time integration error.
     """
@@ -73,8 +73,8 @@ class Execution:
         """Run the remaining stages of the process.
 
         Args:
-            max_steps: largest number of steps of a piece, or None.
-            progress: show a progress bar.
+            max_steps: largest number of steps of a piece; None: no limit.
+            progress: True to show a progress bar.
 
         Raises:
             ConvergenceError: a stage does not reach its target.
@@ -105,9 +105,9 @@ class Execution:
                 break
 
     def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
-        """Return the targets of a stage with their output quantities, as pairs.
+        """Return pairs (target, output quantity) of a stage: the intermediate targets, then the target `until`.
 
-        Where the stage controls one item, or lets time pass until a target is met, the last pair is the target `until`.
+        The target `until` is left out if process time is the control and does not end early.
         """
         stage, moving = plan.stage, {*plan.numbers, *(i for i, _ in plan.tables)}
         rate = [float(i in moving) for i in range(len(self._constant.rate) - 1)] + [float(stage.timed)]
@@ -124,14 +124,16 @@ class Execution:
         return found
 
     def _left_to_meet(self) -> _Targets:
-        """Return the targets of the present stage, without intermediate ones that were met on earlier meshes."""
+        """Return pairs (target, output quantity) of the present stage, without targets met on meshes before a
+        remeshing.
+        """
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
         return [(target, bound) for target, bound in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
     def _present(self) -> tuple[StepData, Array, float]:
-        """Return (step data, unknowns, control) of the last accepted state, or else of the unloaded body.
+        """Return (step data, unknowns, control) of the last accepted state; without one, of the unloaded body.
 
         The unknowns are locally owned entries, shape (n,).
         """
@@ -139,7 +141,7 @@ class Execution:
         return self.problem.setting, last.x if last else self._unloaded, last.control if last else 0.0
 
     def _present_value(self, number: int) -> float:
-        """Return the present value of an item, in the user's units; `number` is its number in the scene."""
+        """Return the present value of the item with a number in the scene, in the user's units."""
         setting, _, control = self._present()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
@@ -147,7 +149,7 @@ class Execution:
         """Set new step data in the problem for a piece of the present stage.
 
         base, rate: amplitudes as functions of the control, see `StepData`. piece: number of the piece. control: value
-        of the control at the present state. fading: unbalanced forces decrease to 0 as the control goes to 1.
+        of the control at the present state. fading: True if unbalanced forces decrease to 0 at the control 1.
         """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
@@ -157,6 +159,9 @@ class Execution:
         """Return the present state of the process as the first state of a piece.
 
         control: value of the control at this state under the new step data.
+
+        Raises:
+            ConvergenceError: the tangent is singular, or no first equilibrium was found.
         """
         if not self.record.states:
             return begin(self.curve)
@@ -166,15 +171,15 @@ class Execution:
             raise ConvergenceError(f"{self._stage.label} cannot begin: {failure.reason}") from None
 
     def _accept_known(self, state: State) -> None:
-        """Accept a state that needs no iteration, and complete its step in the record."""
+        """Accept a state without an iteration, since nothing changes, and complete its step in the record."""
         self.record.accept(state)
         self.record.complete_step(StepControl(), change_completed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
         """Follow the path until the last target is met, and return the targets that are still open.
 
-        targets: pairs (target, output quantity). control: value of the control at the present state, where the piece
-        starts; None: continue a piece. requested: another target that ends the piece, or None.
+        targets, result: pairs (target, output quantity). control: value of the control at the present state, where the
+        piece starts; None: continue a piece. requested: another target that ends the piece, or None.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -186,9 +191,12 @@ class Execution:
         return run.targets.open
 
     def _change_items(self, begun: bool) -> None:
-        """Run piece 0 of the present stage: change the active items while unbalanced forces decrease to 0.
+        """Run piece 0 of the present stage: change the active items, and let the unbalanced forces decrease to 0.
 
         begun: True to continue the piece.
+
+        Raises:
+            InputError: an item cannot become active.
         """
         before, x, control = self._present()
         start: float | None = None
@@ -217,7 +225,7 @@ class Execution:
     def _run_control(self, numbers: list[int], begun: bool) -> None:
         """Run piece 1 of a stage in which the amplitude of one item is the control.
 
-        numbers: numbers of the controlled item and of the items that move with it. begun: True to continue the piece.
+        numbers: numbers of the controlled item, then of the items that move with it. begun: True to continue the piece.
         """
         control = None if begun else self._enter_control(numbers)
         self._trace(self._left_to_meet(), control)
@@ -225,8 +233,8 @@ class Execution:
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
 
-        numbers: numbers of the controlled item and of the items that move with it. clocked: process time passes while
-        the control changes.
+        numbers: numbers of the controlled item, then of the items that move with it. clocked: True if process time may
+        pass while the control changes.
         """
         base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
@@ -245,7 +253,7 @@ class Execution:
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
         """Run piece 1 of a stage in which one item is adjusted so that another quantity follows an amplitude in time.
 
-        numbers: numbers of the adjusted item and of the items that move with it. begun: continue the piece.
+        numbers: numbers of the adjusted item, then of the items that move with it. begun: True to continue the piece.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
         target, course, times = self._prescribed_amplitude(self.problem.setting.base[-1])
@@ -254,9 +262,10 @@ class Execution:
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _prescribed_amplitude(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
-        """Return (target of the prescribed quantity, function of time for its value, times to meet exactly) of a stage.
+        """Return the prescribed amplitude of an output quantity in the present stage, which begins at the time `now`.
 
-        The stage begins at the process time `now`. The times are its start, the corners and the end of the amplitude.
+        The result is (target of the quantity, function of time that returns its value in the user's units, times to be
+        met exactly). The times are the start of the stage, the corners and the end of the amplitude.
 
         Raises:
             InputError: the amplitude begins later than the stage, or ends before it.
@@ -279,9 +288,10 @@ class Execution:
         return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _run_tables(self, tables: list[tuple[int, Array]], piece: int) -> None:
-        """Run pieces 1, 2, ... of a stage with tables, each from knot to knot; the control is the process time.
+        """Run pieces 1, 2, ... of a stage with tables, each from knot to knot, with process time as the control.
 
-        tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue, or 0.
+        tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue; 0 to
+        begin.
         """
         before, _, control = self._present()
         stage, through = self._stage, self._left_to_meet()
@@ -299,10 +309,7 @@ class Execution:
             now, begun = then, False
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
-        """Set the step data of a piece between the times `now` and `then`, in which all tables are straight lines.
-
-        The control is proportional to the time. Its scale makes the largest rate of a dimensionless amplitude 1.
-        """
+        """Set the step data of a piece between the times `now` and `then`, in which all tables are linear."""
         base, rate = table_step_data(self._amplitudes(), self.problem.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
@@ -331,13 +338,13 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
-        """Check tables against the present process time and the present values of their items.
+        """Check that tables fit the present process time and the present values of their items.
 
         tables: [(number of the item, knots (time, value), shape (n, 2))]. now: process time. end: process time at the
         end of the stage.
 
         Raises:
-            InputError: a table contradicts them, or the stage ends in the past.
+            InputError: a table begins in the past or with another value, or the stage ends in the past.
         """
         caller = self._stage.label
         if end <= now:
@@ -363,7 +370,7 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
         plans: the plans of all stages.
 
     Returns:
-        True if the last state is the end.
+        True if the last state is the end of the last stage.
     """
     last, plan = record.last, plans[-1]
     if last.setting["stage"] < len(plans) - 1:
@@ -379,9 +386,9 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
 
 
 def begin(curve: Curve) -> State:
-    """Return the first state of a path: the body at control 0, in equilibrium with all other loads.
+    """Return the first state of a path: equilibrium with all other loads at the control 0.
 
-    Newton's method starts from the unloaded state. If it fails, the constant loads are increased gradually.
+    Newton's method starts from the unloaded state. If it fails, the constant loads are increased in steps.
 
     Args:
         curve: solver of the path.
@@ -412,7 +419,7 @@ def begin(curve: Curve) -> State:
 
 
 def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
-    """Return the error for a body without a first state; `failure` is the end of Newton's method."""
+    """Return the error of a run without a first state; `failure`: the failure of Newton's method."""
     loads = curve.problem.fixed_loads
     words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
         "", "a tool touches the body at rest: give its Contact a smaller ramp")

@@ -19,20 +19,20 @@ log = logging.getLogger("formingx")
 
 
 class RunTargets:
-    """Targets of a run: which are still open, and how near the run is to the last one, which ends it.
+    """Open targets of a run, and the progress of the run to its last target.
 
     Args:
         curve: solver of the path.
-        targets: pairs (target, output quantity).
+        targets: pairs (target, output quantity). The last target ends the run.
         requested: another target that ends the run, or None.
 
     Attributes:
-        open: pairs (target, output quantity) that are still to be met.
+        open: pairs (target, output quantity) of the targets that are still to be met.
         until: the last target.
-        measure: its output quantity.
-        values: values of this quantity in the states so far, in the user's units.
-        patience: number of states after which a run gives up, if they gained less than a thousandth of the distance
-            from the first value to the target.
+        measure: output quantity of the last target.
+        values: values of this quantity in the states of the run so far, in the user's units.
+        patience: number of states after which a run gives up, if they changed its progress (`gained`) by less than
+            1e-3.
     """
 
     patience = 500
@@ -45,27 +45,27 @@ class RunTargets:
 
     @property
     def of_control(self) -> bool:
-        """True if the last target is a value of the control, or of an amplitude that follows the control."""
+        """True if the last target is a value of the control, or of an amplitude that depends on the control."""
         return isinstance(self.measure, Amplitude)
 
     def is_open(self) -> bool:
-        """Return True until the last target, or the requested one, is met."""
+        """Return True until the last target or the requested target is met."""
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
-        """Return the progress of the run: 0 at the first value of the quantity of the last target, 1 at the target.
+        """Return the progress of the run to its last target, (value - first value)/(target - first value).
 
         Args:
-            value: value of the quantity, in the user's units; default: its value in the last state.
+            value: value of the quantity of the last target, in the user's units; None: its value in the last state.
 
         Returns:
-            The progress, dimensionless; above 1 beyond the target.
+            The progress, dimensionless: 0 at the start, 1 at the target, above 1 beyond the target.
         """
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def add_known(self, state: State) -> None:
-        """Append the value of the last target's quantity in a state that a continued run already has.
+        """Append the value of the last target's quantity in an earlier state of a run that is continued.
 
         Args:
             state: the state.
@@ -95,11 +95,11 @@ class RunTargets:
             self.open = [(t, b) for t, b in self.open if t is not target]
 
     def within_reach(self, old: State, length: float) -> tuple[Target | None, Measure | None, float]:
-        """Return the first open target that a step along the tangent of a state meets.
+        """Return the first open target within a step along the tangent of a state, by linear extrapolation.
 
         Args:
-            old: the state.
-            length: arc length of the step.
+            old: the state at the start of the step.
+            length: arc length of the step, dimensionless.
 
         Returns:
             (target, its output quantity, arc length to the target); (None, None, length) if no target is within this
@@ -113,12 +113,12 @@ class RunTargets:
         return best
 
     def directed_to_target(self, start: State, first: bool = False) -> State:
-        """Return the first state of a run, its tangent reversed if the last target lies in the opposite direction.
+        """Direct the tangent of the first state of a run towards the last target, and return the state.
 
         Args:
-            start: the state; it is changed in place.
-            first: True for the unloaded state. It keeps its tangent for a quantity that does not change its sign with
-                the control: such a target may be reached in both directions.
+            start: the state, changed in place.
+            first: True for the unloaded state. Its tangent is kept if the target has no sign (`Target.signed`), since
+                such a target may be reached in both directions.
         """
         if self.until.signed or not first:
             left, rate = self._curve.target_residual(self.measure, self.until.value, start)
@@ -133,6 +133,9 @@ class RunTargets:
         Args:
             old: state before the snap-through.
             change: change of the control, dimensionless.
+
+        Returns:
+            Change of the control, dimensionless.
         """
         for target, bound in self.open:
             if isinstance(bound, Amplitude) and bound.is_controlled:
@@ -144,9 +147,10 @@ class RunTargets:
     # reasons for a run to give up, as text; "" if there is none
 
     def turned_back(self) -> str:
-        """Return a text if the run has lost more than half of its progress to the last target, else "".
+        """Return a reason to give up if the path leads away from the last target, else "".
 
-        A control may decrease after a limit point, but not below its first value.
+        This is the case if more than half of the progress is lost or, for a target of the control, all of it: the
+        control may decrease after a limit point.
         """
         if not self.is_open():
             return ""
@@ -159,7 +163,7 @@ class RunTargets:
         return ""
 
     def jumped_past(self, state: State) -> str:
-        """Return a text if the body has snapped to a state beyond the last target, else ""."""
+        """Return a reason to give up if the body has snapped to a state beyond the last target, else ""."""
         if state.kind == "jump" and self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
@@ -167,7 +171,7 @@ class RunTargets:
         return ""
 
     def stalled(self) -> str:
-        """Return a text if the last `patience` states came no nearer to the last target, else ""."""
+        """Return a reason to give up if the last `patience` states came no nearer to the last target, else ""."""
         if len(self.values) > self.patience:
             now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
             if abs(now - then) < 1e-3:
@@ -175,10 +179,10 @@ class RunTargets:
         return ""
 
     def pace(self, max_steps: int) -> str:
-        """Return as text how far a run came with all of its allowed steps, and how many steps are left at this pace.
+        """Return as text the progress of a run that used up its steps, and the number of steps that it still needs.
 
         Args:
-            max_steps: the number of allowed steps.
+            max_steps: largest number of steps, all of which were used.
         """
         target, (before, now) = self.until.value, self.values[-2:]
         if not (target - now) * (now - before) > 0:
@@ -189,15 +193,15 @@ class RunTargets:
 
 
 class Progress:
-    """Display of the progress of a run, on rank 0: a bar after two seconds, and a log line after each `silence`.
+    """Display of the progress of a run, on rank 0: a bar after two seconds, and log lines at intervals.
 
     Args:
-        comm: communicator of the run.
+        comm: MPI communicator of the run.
         words: text before the progress.
         shown: True for a bar and for log lines of the level WARNING; False for no bar and lines of the level INFO.
 
     Attributes:
-        silence: processor time after which a log line states the progress, s.
+        silence: processor time between two log lines, s.
     """
 
     silence = 30.0
@@ -219,7 +223,7 @@ class Progress:
         Args:
             gained: progress of the run, from 0 at the start to 1 at the target.
             states: number of states so far.
-            length: length of the next step.
+            length: length of the next step, as `StepControl.length`.
         """
         self._gained, self._states, self._length = gained, states, length
         if not self._bar.disable:
@@ -233,7 +237,7 @@ class Progress:
 
         Args:
             reason: the reason, as text.
-            length: length of the next attempt.
+            length: length of the next attempt, as `StepControl.length`.
         """
         self._limits[reason] += 1
         self._length = length
@@ -244,7 +248,7 @@ class Progress:
         self._bar.close()
 
     def _log_progress(self) -> None:
-        """Write a line to the log if the last one is more than `silence` ago."""
+        """Log the progress if the last line is at least the processor time `silence` ago."""
         now = time.process_time()
         if not self._here or now - self._said < self.silence:
             return
@@ -261,7 +265,7 @@ class Progress:
 
 
 def _duration_text(seconds: float) -> str:
-    """Return a duration in seconds as text with two digits and a suitable unit."""
+    """Return a duration, given in seconds, as text with two digits and a suitable unit."""
     for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}"

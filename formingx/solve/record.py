@@ -26,7 +26,7 @@ class Counts:
 
     Attributes:
         steps: number of accepted states without the start.
-        failures: number of failed attempts of steps.
+        failures: number of rejected attempts of steps.
         iterations: number of all Newton iterations, chord iterations and failed attempts included.
         seconds: duration of the run by the clock, s.
         limits: {reason for a shorter or failed step: number of such steps}.
@@ -55,19 +55,20 @@ class Segment:
 
 
 class InadmissibleState(ConvergenceError):
-    """Error of a run that found a state which no body can have."""
+    """Error of a run that found a state which no body can have, such as one with self-penetration."""
 
 
 class RunHooks:
     """Functions that a run calls.
 
     Attributes:
-        on_state: functions called with every accepted state, while the problem is at this state. They fill
-            `State.measures`.
-        on_step: functions called whenever a step is complete.
-        on_end: functions called when the run ends, with the text of the failure, or "", and the findings of the run.
-        renew: `renew(part, done)` calls `part`, which continues the run from its last state. With remeshing it repeats
-            this on new meshes until done() is True.
+        on_state: functions called with every accepted state, while the problem has its unknowns and history variables.
+            They fill `State.measures`.
+        on_step: functions called without arguments whenever a step is complete.
+        on_end: functions called when the run ends; their arguments are the text of the failure, or "", and the
+            findings.
+        renew: function of two functions `part` and `done`. It calls `part`, which continues the run from its last
+            state. With remeshing it calls `part` again on each new mesh, until done() is True.
     """
 
     def __init__(self) -> None:
@@ -91,7 +92,7 @@ class Record:
         ended: reason for which the run ended before its targets, as a result and not as an error; "" if it did not.
         hooks: functions that the run calls (`RunHooks`).
         findings: findings of the checks before the run.
-        judge: function that returns the reason for which no body can have a state with known measures, or "".
+        judge: function that returns the reason for which no body can have a state, or ""; it needs `State.measures`.
         allow_inadmissible: True if the run keeps states that no body can have.
     """
 
@@ -133,8 +134,8 @@ class Record:
     def restore(self) -> int:
         """Restore the step data and history variables of the last accepted state in the problem.
 
-        The first state with the same step data is restored before. Constrained unknowns and fading forces refer to this
-        state, and would else differ by round-off.
+        The first state with the same step data is restored before it, since the values of constrained unknowns and the
+        fading forces are taken from this state.
 
         Returns:
             Number of states at the end of the record with the same step data as the last one.

@@ -34,40 +34,41 @@ log = logging.getLogger("formingx")
 class SnapThrough:
     """Criteria for snap-through, and settings of the viscous motion to the next equilibrium state.
 
-    eta, over the shear modulus, begins low and grows to the smallest value that gives a solution. A little viscosity
-    finds a state that is near. Much viscosity slows the body while contact separates, and slip meanwhile changes the
-    final state. Where contact is about to open two states may be near, and the choice still depends on eta. The
-    dissipated energy depends on the distance moved in a viscous solution, and with friction so does the final state.
-    Both effects are measured in tests/test_jumps.py. Distances are dimensionless mean values. Forces are relative to
-    the support forces.
+    The viscosity eta, over the shear modulus, begins low and grows to the smallest value that gives a solution. With
+    low viscosity the motion ends at a near equilibrium. High viscosity slows the body while contact opens, and slip
+    changes the final state meanwhile. Where contact is about to open, two equilibria may be near, and the result
+    depends on eta. The dissipated energy depends on the distance moved in a viscous solution. With friction, so does
+    the final state. Both effects are measured in tests/test_jumps.py. Distances are root mean squares of the
+    displacement over the size of the body. Forces are relative to the support forces.
 
     Attributes:
-        lengths: step lengths below which a second failure triggers a snap-through, once each. The last is also the
-            length of the predictor where a kink reverses the path, or where no shorter step is left.
+        lengths: step lengths below which the second failure of a step triggers a snap-through, one for each length. The
+            last length is also the length of the predictor where a kink reverses the path, or no shorter step is left.
         ahead: change of the control in a snap-through, at first.
         furthest: largest change of the control in a snap-through.
         eta: first value of eta.
-        least: value of eta below which it counts as 0.
+        least: value of eta below which the snap-through has failed.
         most: largest eta before the body has begun to move.
         most_moving: largest eta after the body has begun to move.
-        falls: factor of eta after a viscous solution that took at most `few` iterations.
-        few: largest number of Newton iterations of a viscous solution after which eta falls.
+        falls: smallest factor of eta after a viscous solution with at most `few` Newton iterations.
+        few: largest number of Newton iterations of a viscous solution after which eta decreases.
         grows: factor of eta after a failed viscous solution, before the body has begun to move.
-        grows_moving: the same factor after the body has begun to move.
+        grows_moving: factor of eta after a failed viscous solution, after the body has begun to move.
         tolerances: tolerances of a viscous solution. If contact does not settle soon, more viscosity is cheaper than
             more iterations. With looser tolerances a nearly singular tangent looks like equilibrium too early.
         nearest: smallest distance that the body should move in a viscous solution.
         farthest: largest distance that the body should move in a viscous solution.
         share: distance that the body should move in a viscous solution, over the distance moved so far.
-        again: factor of this distance above which the first solution is repeated with more viscosity.
-        solutions: number of viscous solutions after which the body counts as never in equilibrium. Where a sheet is
-            drawn over an edge point by point, hundreds of short ones are needed.
-        too_far: distance moved after which the body counts as never in equilibrium.
+        again: distance moved in the first viscous solution, over the distance that the body should move, above which
+            this solution is repeated with more viscosity.
+        solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over an
+            edge point by point, hundreds of solutions are needed.
+        too_far: distance moved after which the snap-through has failed.
         iterations: Newton iterations of one step, failed attempts and snap-throughs included, after which the step
             tries no further snap-through and halves its length.
         near_rest: viscous forces below which a solution without viscosity is tried.
-        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without them fails. That
-            iteration may oscillate where a point is at a kink of its friction law.
+        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without viscosity fails.
+            This iteration may oscillate where a point is at a kink of its friction law.
     """
 
     lengths: tuple[float, ...] = (1e-2, 1e-3)
@@ -93,25 +94,26 @@ class SnapThrough:
     at_rest: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
-        """Return the step lengths below which a second failure triggers a snap-through.
+        """Return the step lengths below which the second failure of a step triggers a snap-through.
+
+        If all contacts with friction stick, only the last length is returned, since shorter steps succeed.
 
         Args:
-            limit: limits of a step by contact, or None. Where all contacts with friction stick, only the last length
-                counts, since shorter steps succeed.
+            limit: limits of a step by contact, or None.
 
         Returns:
-            Arc lengths, in decreasing order; one snap-through is tried at each.
+            Arc lengths, dimensionless, in decreasing order. One snap-through is tried below each.
         """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def most_of_step(self, iterations: int) -> float:
-        """Return the largest part of the length of a failed step that is tried next.
+        """Return the largest fraction of the length of a failed step with which the step is tried again.
 
         Args:
             iterations: Newton iterations of the step so far.
 
         Returns:
-            0.5 or 1.0; 1.0 is no restriction.
+            0.5 after more than the allowed iterations, else 1.0.
         """
         return 0.5 if iterations > self.iterations else 1.0
 
@@ -123,14 +125,14 @@ class NoEquilibrium(Failure):
 class ViscousDrag:
     """Viscous forces eta V (x - origin) on the body, with the matrix V of a viscous stress.
 
-    The forces are 0 at constrained unknowns.
+    At constrained unknowns the forces are 0.
 
     Args:
         viscosity: the viscosity of the problem, with the matrix V.
 
     Attributes:
-        eta: the viscosity over the shear modulus.
-        origin: unknowns from which the body moves, locally owned entries, shape (n,).
+        eta: viscosity over the shear modulus, dimensionless.
+        origin: unknowns at the position from which the body moves, locally owned entries, shape (n,).
     """
 
     def __init__(self, viscosity: Viscosity):
@@ -157,7 +159,7 @@ class _Motion:
     Args:
         curve: solver of the path.
         old: the state from which the body moves.
-        control: control during the motion.
+        control: control during the motion, which is constant.
         settings: criteria and settings.
         work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
         passed: earlier states of the path, to which the body must not return.
@@ -166,9 +168,9 @@ class _Motion:
         state: present position of the body, as a state.
         dissipated: energy dissipated so far, dimensionless.
         solved: number of viscous solutions so far.
-        unbalanced: unbalanced forces forces, relative to the support forces.
-        trial_force: unbalanced forces, relative to the support forces, below which equilibrium is tried.
-        settles: True if equilibrium should be tried next.
+        unbalanced: norm of the viscous forces in the last solution, relative to the support forces.
+        trial_force: value of `unbalanced` below which a solution without viscosity is tried.
+        settles: True if a solution without viscosity should be tried next.
     """
 
     def __init__(self, curve: Curve, old: State, control: float, settings: SnapThrough, work_sign: float = 0.0,
@@ -185,20 +187,20 @@ class _Motion:
         self._wait = False                                  # eta may not fall after the next solution
 
     def continues(self, eta: float) -> bool:
-        """Return True while eta and the distance moved by the body are within their bounds."""
+        """Return True if eta and the distance moved so far are within the bounds of the settings."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
         return settings.least < eta < most and self.curve.moved(self._old, self.state) < settings.too_far
 
     def move(self, origin: Array, eta: float) -> float:
-        """Solve once with viscosity.
+        """Solve F(x) + eta V (x - origin) = 0, and take the solution as the new position unless it is rejected.
 
         Args:
             origin: unknowns from which the body moves, locally owned entries, shape (n,).
-            eta: the viscosity over the shear modulus.
+            eta: viscosity over the shear modulus.
 
         Returns:
-            Factor of eta for the next solution.
+            Factor of eta for the next solution: above 1 after a rejected solution.
         """
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
@@ -231,7 +233,7 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _reject(self, grows: float = 0.0) -> float:
-        """Return the factor by which the viscosity grows after a rejected solution; it may not fall after the next one.
+        """Reject a solution, and return the factor by which eta grows; eta may not decrease after the next solution.
 
         grows: the factor; 0: the factor of the settings.
         """
@@ -242,10 +244,10 @@ class _Motion:
         """Return the equilibrium state near the present position, solved for without viscous forces.
 
         Returns:
-            The state, of kind "jump"; None if there is none near.
+            The state, of kind "jump"; None if none is near, or if it is a state to which the body must not return.
 
         Raises:
-            Failure: the viscous forces vanish, but a body without a history has no equilibrium here.
+            Failure: the viscous forces vanish, but a body without history variables has no equilibrium here.
         """
         try:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
@@ -267,19 +269,20 @@ class _Motion:
         return state
 
     def _goes_back(self, a: State, b: State) -> bool:
-        """Return True if the work of the controlled load from state a to state b has not the sign `work_sign`."""
+        """Return True if the work of the controlled load from state a to state b has the sign opposite to `work_sign`.
+        """
         return bool(self._work_sign) and self.curve.work(a, b) * self._work_sign < 0
 
     def _add_dissipation(self, a: Array, x: Array, pull: Array) -> None:
         """Add the work of the unbalanced forces in a motion to the dissipated energy, by the trapezoidal rule.
 
         Forces halfway are not used, since the straight line between the positions may pass through tools. Negative work
-        of the force at the start is left out: viscous forces do no negative work.
+        of the force at the start is left out, since viscous forces do no negative work.
 
         Args:
             a: unknowns at the start of the motion, locally owned entries, shape (n,).
-            x: unknowns at its end.
-            pull: unbalanced forces at its end.
+            x: unknowns at the end of the motion.
+            pull: unbalanced forces at the end of the motion, dimensionless.
         """
         dx = x - a
         self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
@@ -298,13 +301,13 @@ class _Motion:
 def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, work_sign: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
-    """Return the equilibrium state that the body reaches from a state when the control changes further.
+    """Return the equilibrium state to which the body snaps from a state when the control changes further.
 
     Args:
         curve: solver of the path.
         old: the state from which the body snaps.
         change: change of the control, dimensionless; its sign is the direction of the process.
-        ahead: True to start at the end of the tangent of `old`, False to start at `old`.
+        ahead: True to start at the point on the tangent of `old` with the changed control, False to start at `old`.
         settings: criteria and settings.
         solutions: largest number of viscous solutions; default `settings.solutions`.
         listener: function that is called before each viscous solution.
@@ -346,18 +349,18 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
 
 
 def at_limit_points(problem: Equations, falls: bool) -> str:
-    """Return the default rule at limit points of the control: "continue", "snap_through", or "continue_volume".
+    """Return the default rule at limit points of the control.
 
-    "continue_volume" follows the path while the volume of the air grows, as under volume control. The body snaps where
-    this volume has a maximum, too.
-
-    Time increases only. With a history the controlled quantity must not reverse either, as it would beyond a limit
-    point. Beyond the maximum of an applied pressure, however, the volume of the air continues to grow. The same holds
-    for a pressure on a body in contact, with a history or without, as a path may end where contact changes.
+    * "continue": follow the path through limit points. For problems without history variables, except for a pressure on
+      a body in contact.
+    * "continue_volume": follow the path while the enclosed volume grows, and snap where this volume has a maximum. For
+      an increasing pressure on a body with history variables or in contact.
+    * "snap_through": snap to the next equilibrium. For the other problems, and for time as the control: beyond a limit
+      point the control would reverse.
 
     Args:
         problem: the equations.
-        falls: True if the controlled quantity decreases towards 0, as a pressure that is released.
+        falls: True if the controlled quantity decreases towards 0, such as a pressure that is released.
 
     Returns:
         Name of the rule.
@@ -371,9 +374,7 @@ def at_limit_points(problem: Equations, falls: bool) -> str:
 
 
 def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """Return True if the body snaps at a state, since its path leads back from there.
-
-    The maximum of the volume may follow right after the maximum of the pressure.
+    """Return True if the body snaps at a state, where the control (or the enclosed volume) begins to reverse.
 
     Args:
         curve: solver of the path.
@@ -391,9 +392,9 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
-    """Return True if a new state lies on a piece of the path that was passed earlier, which a step must not reach.
+    """Return True if a new state lies on an earlier piece of the path, to which a step must not return.
 
-    After a snap-through such a state is admissible, since the history variables differ.
+    Pieces before a snap-through do not count, since the history variables differ.
 
     Args:
         curve: solver of the path.
@@ -402,7 +403,7 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
         new: the new state.
 
     Returns:
-        True if `new` lies on that piece, within a tenth of the step.
+        True if the distance of `new` from the earlier piece is less than a tenth of the step.
     """
     near = 0.1 * curve.distance(old, new)
     states = [] if old.kind == "jump" else passed[::-1]
@@ -424,7 +425,7 @@ def separate_points(curve: Curve, limit: StepLimit, old: State, new: State, jump
         limit: limits of a step by contact.
         old: the state from which the step started.
         new: the state found by the step.
-        jump: function that returns the state after a snap-through from a state, where the body snaps off its tool.
+        jump: function that returns the state after a snap-through from a given state, if the body snaps off its tool.
 
     Returns:
         The state, without contact points in tension.

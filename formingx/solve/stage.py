@@ -33,19 +33,19 @@ class Stage:
             from the reference configuration. With `amplitudes` it is a `process_time`, or None for the end of the
             tables. With a `duration` and no control it ends the stage early, such as `sag(30.0)`.
         intermediate: further targets to meet exactly during the stage; targets that are not met are left out.
-        inactive: items that are absent during the stage, themselves or their names: an open support, a tool that is
-            away, a load that is off. A support that becomes active again constrains the body at its present position. A
-            load returns with its value; its column is 0 while it is absent.
+        inactive: items that are inactive during the stage, themselves or their names, such as a support, a tool or a
+            load. A support that becomes active again constrains the body at its present position. A load that becomes
+            active again has its last value; its column is 0 while it is inactive.
         amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
-            units; the last value stays. A table that begins later than the stage is reached in a straight line from the
+            units; the last value stays. If a table begins later than the stage, the item changes linearly from its
             present value. With `control`, the key is not an item but a function that makes targets, such as
             `enclosed_volume`. The control is then adjusted so that this quantity follows the table. The table may be a
             function of time; then `until` is the `process_time` of its end.
-        speed: rate of the control (its unit per time), greater than 0: process time passes while the control changes.
-        duration: process time that the stage takes: until the target of the control is met, or while nothing is
-            controlled.
-        constant: with `control` and `duration`: a target, such as `force(2.0)`, that stays met, since the control is
-            adjusted.
+        speed: rate of the control, in its unit per time, greater than 0. Process time then passes in the stage.
+        duration: process time of the stage. With `control`, the control changes linearly to its target in this time.
+            Without, only time passes, until the target `until` if there is one.
+        constant: with `control` and `duration`: a target, such as `force(2.0)`. The control is adjusted so that the
+            target stays met.
         step: step control of this stage; default: the step control of the run.
         at_limit_point: rule where the control has a limit point, one of `AT_LIMIT_POINT`, as in `formingx.trace`.
 
@@ -92,13 +92,12 @@ class Stage:
 
     @property
     def waits(self) -> bool:
-        """True if the stage controls nothing, lets time pass and ends when the target `until` is met."""
+        """True if only time passes in the stage, until the target `until` is met."""
         return self.until is not None and self.control is None and not self.tables
 
     @property
     def highest(self) -> Target | None:
-        """Target with the largest value in the table that the controlled quantity follows; None if there is no such
-        table."""
+        """Target with the largest value in the table that a quantity follows (`prescribed`); None without a table."""
         if self.prescribed is None or callable(self.prescribed[1]):
             return None
         return self.prescribed[0](float(np.max(self.prescribed[1][:, 1])))
@@ -138,7 +137,7 @@ class Stage:
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _prescribed(self, amplitudes: Any) -> tuple[Any, Any]:
-        """Return the quantity that the control makes follow an amplitude, and this amplitude.
+        """Return the output quantity to which the control is adjusted, and its amplitude.
 
         Args:
             amplitudes: the argument `amplitudes` as the user gave it.
@@ -204,10 +203,10 @@ class Plan(NamedTuple):
 
     Attributes:
         stage: the stage.
-        numbers: numbers of the controlled item and of the items that move with it; empty without `Stage.control`.
+        numbers: numbers of the controlled item, then of the items that move with it; empty without `Stage.control`.
         tables: [(number of the item, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
         inactive: numbers of the inactive items.
-        names: all items of the scene, as text.
+        names: all items of the scene, as text, in the order of their numbers.
     """
 
     stage: Stage
@@ -218,12 +217,13 @@ class Plan(NamedTuple):
 
     @property
     def prescribes_quantity(self) -> bool:
-        """True if the control is adjusted so that another quantity follows an amplitude in time, or stays constant."""
+        """True if the control is adjusted so that an output quantity follows an amplitude in time, or stays constant.
+        """
         return bool(self.stage.prescribed or self.stage.constant)
 
     @property
     def by_time(self) -> bool:
-        """True if process time is the control: items follow tables, or nothing else is controlled while time passes."""
+        """True if process time is the control: items follow tables, or only time passes."""
         return bool(self.tables or self.stage.duration and not self.numbers)
 
 

@@ -28,12 +28,13 @@ class State:
         history_variables_before: history variables with which the state was solved for; empty in a loaded path.
         stage: name of the stage of a process.
         setting: step data of the stage, as plain data (`StepData`).
-        stepping: the data with which a run continues: its next step, its counts and its target; empty inside a step.
+        stepping: data with which a run continues after this state: its next step, its counts and its target; empty for
+            a state inside a step.
         time: process time.
-        orientation: sign of the determinant of the tangent times the sign of the slope; 0 if it is not known. It is
-            constant along a path, through limit points too, and changes where another path branches off.
-        verdict: reason for which no body can have this state, as text; "" for an admissible state. Only a run with
-            `allow_inadmissible=True` continues past an inadmissible state.
+        orientation: sign of det(dF/dx) times the sign of the slope; 0 if it is not known. It is constant along a path,
+            also through limit points, and changes its sign where another path branches off.
+        verdict: reason for which no body can have this state, as text; "" for an admissible state. A run continues past
+            an inadmissible state only with `allow_inadmissible=True`.
 
     >>> state = path.limit_points[0]
     >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)

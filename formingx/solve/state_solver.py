@@ -20,7 +20,8 @@ class StateSolver:
 
     .. math:: \Delta s^2 = \overline{|\Delta x|^2} + w \, \Delta\lambda^2,
 
-    with the mean squared displacement over the size of the body and the weight w of the control.
+    with the weight w of the control. The first term is the mean over the body of the squared displacement, made
+    dimensionless by the size of the body (`Residual.inner`).
 
     Args:
         problem: the equations.
@@ -28,7 +29,7 @@ class StateSolver:
 
     Attributes:
         problem: the equations.
-        newton: solver of F = 0 with a constraint.
+        newton: solver of F = 0 with a constraint (`BorderedNewton`).
         fixed_control: True if the solver cannot pass a limit point.
         control_weight: weight w of the squared control in arc length (dimensionless).
     """
@@ -82,7 +83,7 @@ class StateSolver:
         return self.norm(self._x, 0.0)
 
     def progress(self, old: State, new: State) -> float:
-        """Return the distance between two states, projected on the tangent of the first.
+        """Return the distance between two states along the tangent of the first.
 
         Args:
             old: first state.
@@ -101,7 +102,7 @@ class StateSolver:
 
         Raises:
             Failure: Newton's method does not converge from the unloaded state.
-            ConvergenceError: the body has no stiffness.
+            ConvergenceError: the tangent is singular near the unloaded state.
         """
         history: list[Iteration] = []
         self._x.set(0)
@@ -182,7 +183,7 @@ class StateSolver:
             old: accepted state at the start of the step.
 
         Returns:
-            The state, with kind, target, jump and direction along the path of `new`.
+            The state, with the kind, the target and the jump of `new`, and a tangent in the direction of `new`.
 
         Raises:
             Failure: Newton's method fails, or an element is inverted.
@@ -192,10 +193,11 @@ class StateSolver:
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
 
     def look_ahead(self, state: State) -> None:
-        """Compute the path tangent of an accepted state again, with updated history variables, for the next step.
+        """Compute the path tangent of an accepted state for the next step, with updated history variables.
 
-        The factors of its last iteration are used, unless many contact points differ or materials have advanced.
-        Predicted contact events need new factors, so that a run from a checkpoint finds the same events.
+        The factors of the last iteration are used again if the tangent differs at a few contact points only. Material
+        histories change the whole tangent. Predicted contact events need new factors, so that a run from a checkpoint
+        finds the same events.
 
         Args:
             state: the accepted state; its tangent is changed in place.
@@ -212,7 +214,7 @@ class StateSolver:
             self._ahead_of = state, self.newton.solver.count
 
     def factorise_ahead(self, state: State) -> bool:
-        """Factorise the tangent dF/dx towards the next step from a state, unless it was the last one factorised.
+        """Factorise the one-sided tangent dF/dx towards the next step, unless it was factorised last.
 
         Args:
             state: the accepted state.
@@ -242,10 +244,10 @@ class StateSolver:
         return float(bound.value(self._b, control))
 
     def target_residual(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
-        """Return the residual of the constraint "quantity = target" at a state, and its derivative by arc length.
+        """Return the residual c of the constraint "quantity = target" at a state, and dc/ds along the tangent.
 
-        The derivative is used since values a step ahead along the tangent mean nothing for a stiff quantity, such as a
-        contact force.
+        The target is extrapolated by this derivative. Values of the quantity on the tangent would be far off for a
+        stiff quantity, such as a contact force.
 
         Args:
             bound: the output quantity.
@@ -253,7 +255,7 @@ class StateSolver:
             state: the state.
 
         Returns:
-            (c, dc/ds) of the constraint c = 0, as `bound.equation` scales it; s: arc length along the tangent.
+            (c, dc/ds), scaled as `Measure.equation` scales the constraint; s is the arc length.
         """
         self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
         left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
@@ -266,18 +268,20 @@ class StateSolver:
             state: the state at which the derivative is taken.
 
         Returns:
-            Derivative along the tangent of the state.
+            Derivative dcontrol/ds along the tangent of the state.
         """
         return state.slope
 
     def work_ahead(self, state: State) -> float:
-        """Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
+        r"""Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
+
+        .. math:: -\frac{\partial F}{\partial \lambda} \cdot \frac{dx}{ds}
 
         Args:
             state: the state.
 
         Returns:
-            Work, dimensionless; for a pressure the growth of the enclosed volume over arc length.
+            Work, dimensionless; for a pressure the derivative of the enclosed volume with respect to arc length.
         """
         self._x.array_w[:] = state.x
         self._b.array_w[:] = state.direction
@@ -312,7 +316,7 @@ class StateSolver:
 
     @property
     def iterations(self) -> int:
-        """Number of Newton iterations of the present step (since the last call of `spent`)."""
+        """Number of Newton iterations since the last call of `spent`, failed attempts included."""
         return self._iterations
 
     def spent(self) -> int:
@@ -331,14 +335,14 @@ class StateSolver:
             vector.destroy()
 
     def _attempt(self) -> Attempt:
-        """Return the unknowns and last corrections of a failed run of Newton's method."""
+        """Return the unknowns and the last corrections of the run of Newton's method that just failed."""
         control, step = self.newton.reached
         return Attempt(self._x.array_r.copy(), control, self.newton.a.array_r.copy(), step)
 
     def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
-        """Return the state with the unknowns `_x` at a control.
+        """Return the state with the unknowns `_x` and a control, with the tangent that `newton` computed last.
 
-        Its tangent is the one of the last factorisation, directed away from the state `before`.
+        The tangent is directed away from the state `before`; None: the control increases along it.
         """
         b = self.newton.b
         size = self._length_of(b)
@@ -356,7 +360,7 @@ class StateSolver:
         return self.norm(b, 1.0)
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
-        """Return the inner product of two changes (x, control) and (y, other), by which arc length is measured."""
+        """Return the inner product of two changes (x, control) and (y, other), whose norm is the arc length."""
         self._a.array_w[:] = x
         self._b.array_w[:] = y
         return self.problem.inner(self._a, self._b) + self.control_weight * control * other

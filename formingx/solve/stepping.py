@@ -31,7 +31,7 @@ class StepControl:
     Attributes:
         length: length of the next step (dimensionless arc length: mean displacement over the size of the body); at most
             `largest`.
-        target: Newton iterations that a step should take.
+        target: number of Newton iterations with a new tangent that a step should take.
         growth: largest factor of the length from one step to the next, at least 1. A failure halves the length.
         smallest: step length below which a run gives up.
         largest: largest step length.
@@ -67,7 +67,7 @@ class StepControl:
         """Adapt the step length after a converged step of full length (Song 1993, eq. 4.21).
 
         Args:
-            iterations: Newton iterations of the step with a new tangent.
+            iterations: number of Newton iterations of the step with a new tangent.
             error: time integration error of the step over its tolerance.
         """
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
@@ -89,13 +89,13 @@ def allowed(caller: str, accuracy: str | float) -> float:
 
     Args:
         caller: name of the calling function, for messages.
-        accuracy: a key of `ACCURACY`, or the error itself, between 0 and 1.
+        accuracy: a key of `ACCURACY`, or the relative error itself, between 0 and 1.
 
     Returns:
         The relative error of stress and thickness.
 
     Raises:
-        InputError: an accuracy that is neither.
+        InputError: an accuracy that is neither of both.
     """
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
@@ -110,9 +110,10 @@ class TimeError:
 
     Args:
         problem: the equations.
-        accuracy: the relative error of stress and thickness that the run may have.
+        accuracy: allowed relative error of stress and thickness in the run.
         once: tolerance of the error at the end of a step, over `accuracy`.
-        adding_up: tolerance of the part of the error that persists in later steps, over `accuracy` to the power 3/2.
+        adding_up: tolerance of the part of the error that persists in later steps, and so adds up, over `accuracy` to
+            the power 3/2.
     """
 
     def __init__(self, problem: Equations, accuracy: float, once: float = 0.5, adding_up: float = 0.5):
@@ -122,7 +123,8 @@ class TimeError:
     def ratio(self, states: Sequence[State], x: Array, control: float) -> float:
         """Return the time integration error of a step over its tolerance.
 
-        The larger ratio counts: of the error at the end of the step, and of its part that persists in later steps.
+        It is the larger of two ratios, of the error at the end of the step and of its part that persists in later
+        steps.
 
         Args:
             states: the accepted states; the step starts from the last one.
@@ -146,10 +148,10 @@ class Cutback(Exception):
 
     Args:
         why: the reason, as text.
-        part: admissible part of the length of the step.
+        part: admissible length of the step, over its length.
         lasts: True if later steps must be shorter, too.
-        control: control at the end of the repeated step, in place of its length, or None. Arc length and time are far
-            from proportional where the body moves at once as a step begins.
+        control: control at which the repeated step ends; None: it ends at its length. The control is given where time
+            is not proportional to arc length, since the body moves at once when a step begins.
     """
 
     def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
