@@ -78,7 +78,7 @@ def _error_map(axes, path):
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import LogNorm
     fields = Fields(path)
-    found = fields.of(path.last)
+    found = fields.evaluate(path.last)
     corners = (fields.points + found["displacement"])[:, :3]
     shades = PolyCollection(corners, array=found["stress_error"][:, 0, 0], norm=LogNorm(1e-3, 1.0), cmap="viridis",
                             edgecolors="face", linewidths=0.5)

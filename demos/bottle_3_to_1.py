@@ -12,7 +12,7 @@ from relaxing import cost
 
 import formingx as fx
 from formingx.results import files
-from formingx.results.evaluate.profile import fine
+from formingx.results.evaluate.profile import refined
 from formingx.results.show import plots
 
 RADIUS, BODY, PRESSURE = 10.0, 33.0, 0.3
@@ -34,7 +34,7 @@ def blow(material, elements):
 
 def section(axes, profile, side, colour):
     """Fill one side of a section: side = 1 or -1."""
-    r, z = np.vstack([fine(profile.bottom), fine(profile.top)[::-1]]).T
+    r, z = np.vstack([refined(profile.bottom), refined(profile.top)[::-1]]).T
     axes.fill(side * r, z, color=colour)
 
 

@@ -98,7 +98,7 @@ def draw(numbers, paths, out):
 def stressed(axes, path, held):
     """Draw the deformed elements at the rim; return their colours by the largest principal stress."""
     fields = Fields(path)
-    found = fields.of(path.met(fx.pole_stretch(STRETCH)))
+    found = fields.evaluate(path.met(fx.pole_stretch(STRETCH)))
     corners = (fields.points + found["displacement"])[:, :3]
     shades = PolyCollection(corners, array=found["principal_stresses"][:, :3, 0].mean(1), cmap="viridis",
                             edgecolors="white", linewidths=0.2, clim=(0, 12))

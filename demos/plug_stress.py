@@ -31,7 +31,7 @@ class Corners:
 
     def __init__(self, path, state):
         fields, stress = Fields(path), path.stress(state).in_cells(CORNERS)
-        u = fields.of(state)["displacement"]
+        u = fields.evaluate(state)["displacement"]
         sigma, F = stress.cauchy, stress.deformation_gradient
         plane = np.linalg.eigvalsh(sigma[:, :2, :2])
         value, vector = np.linalg.eigh((F @ F.transpose(0, 2, 1))[:, :2, :2])

@@ -18,7 +18,7 @@ from relaxing_pot import EDGE, INSTANT, PLUG_RADIUS, TRAVEL
 
 import formingx as fx
 from formingx.results import files
-from formingx.results.evaluate.profile import fine
+from formingx.results.evaluate.profile import refined
 from formingx.results.show import plots
 
 HOT, COLD, GLASS, SETS = 150.0, 20.0, 10e3, (75, 85)
@@ -55,7 +55,7 @@ def draw(axes, wall, colour, label):
     """Draw the section of a part that stands on its base; the run has it upside down."""
     base = max(wall.profile.bottom[:, 1].max(), wall.profile.top[:, 1].max())
     for side in (1, -1):
-        outline = np.vstack([fine(wall.profile.bottom), fine(wall.profile.top)[::-1]])
+        outline = np.vstack([refined(wall.profile.bottom), refined(wall.profile.top)[::-1]])
         axes.fill(side * outline[:, 0], base - outline[:, 1], color=colour, label=label if side == 1 else None)
 
 

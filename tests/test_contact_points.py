@@ -50,7 +50,7 @@ def test_table_is_that_of_contact_at_nodes():
     for points in ("nodes", 3):
         path = fx.trace(cup("none", depth=1.5, points=points), until=fx.pressure(8.0), progress=False)
         tables.append(path.contact())
-        shown = Fields(path).of(path.last)["contact_pressure"]
+        shown = Fields(path).evaluate(path.last)["contact_pressure"]
         assert shown.max() == pytest.approx(tables[-1].pressure.max(), rel=1e-12) and np.mean(shown == 0) > 0.4
     nodes, gauss = tables
     flat = gauss.reference_points[:, 0] < 5

@@ -105,7 +105,7 @@ def test_an_interface_keeps_both_sides(tmp_path):
 def test_contact_pressure_is_the_blowing_pressure_on_the_floor(formed):
     """A stretched sheet that lies flat passes on the pressure: p = 8 per deformed area, and sigma_zz = -8."""
     fields = Fields(formed)
-    values, X = fields.of(formed.last), fields.points
+    values, X = fields.evaluate(formed.last), fields.points
     p, top = values["contact_pressure"][..., 0], np.abs(X[..., 1] - 0.3) < 1e-9
     flat = top & (X[..., 0] > 0.9) & (X[..., 0] < 2.8)
     assert flat.sum() > 10 and values["thickness_ratio"][flat].max() < 0.8

@@ -108,7 +108,7 @@ def test_a_pole_that_is_thinner_than_nothing_is_no_state():
 def test_a_good_state_has_no_verdict():
     path = fx.trace(block(), until=fx.travel(0.3), progress=False)
     verdict = AdmissibilityCheck(path.problem)
-    assert [verdict.of(state) for state in path.states] == [""] * len(path)
+    assert [verdict.reason(state) for state in path.states] == [""] * len(path)
 
 
 def test_contact_points_sink_by_less_than_a_seventh_of_the_wall():

@@ -151,7 +151,7 @@ def test_walls_that_a_jump_with_friction_changes_much_are_doubted(rough):
     assert (snap.jumps, snap.state) == (len(rough.jumps), k)
     assert snap.change == pytest.approx(np.abs(ratios[1] / ratios[0] - 1).max(), rel=1e-12)
     assert 0.005 < snap.change < 0.05 and snaps.findings(snap) == []
-    finding, = snaps.findings(snap._replace(after=1.1 * snap.before))
+    finding, = snaps.findings(snap._replace(ratio_after=1.1 * snap.ratio_before))
     assert finding.severity == "warning" and f"state {k}" in finding.text and "StepControl" in finding.text
 
 

@@ -74,11 +74,11 @@ def test_elastic_stretch_of_branches(law):
     path = run(block(law(RUBBER, BRANCHES)), AT_ONCE, Stage("hold", duration=1.0), Stage("later", duration=1e9),
                accuracy=1e-4)
     fields, at_once = Fields(path), next(s for s in path.states if s.stage == "hold")
-    first, last = fields.of(at_once), fields.of(path.last)
+    first, last = fields.evaluate(at_once), fields.evaluate(path.last)
     for k in (1, 2):
         assert first[f"elastic_stretch_{k}"] == pytest.approx(first["stretches"][..., :1], rel=1e-9)
         assert last[f"elastic_stretch_{k}"] == pytest.approx(1.0, abs=1e-9)
-    held = fields.of([s for s in path.states if s.stage == "hold"][-1])
+    held = fields.evaluate([s for s in path.states if s.stage == "hold"][-1])
     assert 1.001 < held["elastic_stretch_1"].max() < held["elastic_stretch_2"].min() < 1.999
 
 
@@ -86,7 +86,7 @@ def test_a_layer_without_branches_has_no_elastic_stretch():
     mesh = fx.mesh.disc(radius=1.0, thickness={"relaxing": 0.5, "rubber": 0.5}, elements=(1, 1))
     path = run(block({"relaxing": POLYMER, "rubber": RUBBER}, mesh), AT_ONCE)
     fields = Fields(path)
-    found, low = fields.of(path.last)["elastic_stretch_1"][..., 0], fields.points[..., 1].mean(axis=1) < 0.5
+    found, low = fields.evaluate(path.last)["elastic_stretch_1"][..., 0], fields.points[..., 1].mean(axis=1) < 0.5
     assert np.isnan(found[~low]).all() and np.all(found[low] > 1)
 
 

@@ -608,7 +608,7 @@ def test_a_path_in_space_gives_what_it_has(tmp_path):
     plug = fx.Contact("top", fx.tools.box(half=(0.3, 0.1), depth=0.2, mouth=0.5, plug=True), direction=(0, 0, 1))
     scene = fx.Scene(mesh=disc().mesh, thickness=0.02, materials=MATERIALS[0], supports=HELD, contacts=[plug])
     assert "must it be direction = (0, 0, -1)?" in str(fx.check(scene))
-    fields = Fields(path).of(path.last)
+    fields = Fields(path).evaluate(path.last)
     np.testing.assert_allclose(np.sort(fields["thickness"][:, 0, 0]), np.sort(path.wall().wall), rtol=1e-12)
     np.testing.assert_allclose(fields["thickness_ratio"] * 0.02, fields["thickness"], rtol=1e-12)
     assert fields["displacement"].shape[-1] == 3 and fields["displacement"][..., 2].min() < -0.1

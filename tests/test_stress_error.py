@@ -132,6 +132,6 @@ def test_patches_reproduce_cubics():
         return np.stack([1 + r - z + r * z - z**2 + r**3 - 2 * r**2 * z + z**3, r * z**2], -1)
     patches = Patches(points, corners, np.zeros(n, dtype=int), np.arange(n))
     there = mesh.domain.geometry.x[corners, :2]
-    np.testing.assert_allclose(patches.at(patches.fit(cubic(points)), there), cubic(there), atol=1e-9)
+    np.testing.assert_allclose(patches.evaluate(patches.fit(cubic(points)), there), cubic(there), atol=1e-9)
     alone = Patches(points, corners, np.arange(n), np.arange(n))                 # each cell a layer of its own
-    np.testing.assert_allclose(alone.at(alone.fit(cubic(points)), points), cubic(points), atol=1e-9)
+    np.testing.assert_allclose(alone.evaluate(alone.fit(cubic(points)), points), cubic(points), atol=1e-9)

@@ -20,7 +20,7 @@ def volumes(path: Any) -> Iterator[Finding]:
     """Report elements of a `Path` that do not keep their volumes in its last state; collective."""
     error = path.last.measures["volume_error"]
     yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > volume.BOUND else None)
-    yield from volume.of_point(path)
+    yield from volume.extreme_ratio(path)
 
 
 @register("end")

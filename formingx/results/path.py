@@ -65,7 +65,7 @@ class Path(States):
             InputError: the mesh has no two faces of a sheet, or the sheet is in three dimensions.
         """
         state = state or self.last
-        return self._view(self.segment(state)).profiles.of(state)
+        return self._view(self.segment(state)).profiles.evaluate(state)
 
     def stress(self, state: State | None = None) -> StressField:
         """Return the stresses and stretches in a state (default: the last), layer by layer; collective.
@@ -75,7 +75,7 @@ class Path(States):
         """
         self.section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
-        return self._view(self.segment(state)).stresses.of(state)
+        return self._view(self.segment(state)).stresses.evaluate(state)
 
     def to_csv(self, file: Any, units: Units | None = None) -> None:
         """Write a CSV file with one row per state (rank 0 writes).
@@ -287,8 +287,8 @@ class Path(States):
         """
         self.section_only("contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
-        on_mesh = self.alone(state or self.last)
-        return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).of(state or self.last)
+        on_mesh = self.same_mesh(state or self.last)
+        return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).evaluate(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
         """Return the temperature of material points in a state.

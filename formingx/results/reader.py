@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from ..contact.face import FaceContact
     from .evaluate.filling import Filling
     from .evaluate.wall import Wall
-    from .files.sheet import Sheet
+    from .files.column_table import ColumnTable
 
 
 class Reader(Protocol):
     """Interface of the class that evaluates the states of one path."""
 
-    def wall(self, state: State) -> Sheet:
+    def wall(self, state: State) -> ColumnTable:
         """Return the wall thickness of the part in a state as a table, one row per point or triangle."""
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
         """Return the key numbers of the part in a state; for the arguments see `Path.part`."""
 
-    def filling(self, contact: FaceContact) -> Sheet:
+    def filling(self, contact: FaceContact) -> ColumnTable:
         """Return the remaining gaps between the body and the tool of a contact in every state, as a table."""
 
     def view(self, file: object, state: State, grid: float | None) -> None:
@@ -63,7 +63,7 @@ class SectionReader:
 
     def wall(self, state: State) -> Wall:
         """Return the wall thickness along the section of the part in a state."""
-        return self._walls.of(state)
+        return self._walls.evaluate(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:
         """Return the `Part` in a state; for the arguments see `Path.part`."""
@@ -78,7 +78,7 @@ class SectionReader:
         """
         if len(self._path.segments) > 1:
             raise InputError("filling: is not available for a remeshed run as a whole: evaluate the states of one"
-                             " mesh, path.alone(state).filling()")
+                             " mesh, path.same_mesh(state).filling()")
         from .evaluate.filling import filling
         return filling(self._path, contact)
 

@@ -67,7 +67,7 @@ class States:
             self._views = other._views
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
-        record.judge = lambda state: self._view(record.segments[-1]).admissibility.of(state)
+        record.judge = lambda state: self._view(record.segments[-1]).admissibility.reason(state)
 
     @property
     def segments(self) -> list[Segment]:
@@ -305,7 +305,7 @@ class States:
             self._fill(segment, record.states[:k])
         return record.last
 
-    def between(self, a: State, b: State, fraction: float) -> State:
+    def interpolate(self, a: State, b: State, fraction: float) -> State:
         """Return a state interpolated on the cubic path between two successive states, for drawing.
 
         It is not in equilibrium. Between two stages, the second state is returned.
@@ -418,7 +418,7 @@ class States:
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
-    def alone(self, state: State) -> Any:
+    def same_mesh(self, state: State) -> Any:
         """Return a path of the states on the mesh of a given state; the path itself if the run has one mesh."""
         if len(self.segments) == 1:
             return self

@@ -301,7 +301,7 @@ class DesignRun:
             nodes, perturbed_nodes = (problem.scene.mesh.domain.geometry.x
                                       for problem in (self.path.problem, perturbed.problem))
             same_nodes = self.path.problem.comm.allreduce(np.array_equal(nodes, perturbed_nodes), MPI.LAND)
-            return (self._profiles if same_nodes else Profiles(perturbed.problem)).of(state).thickness
+            return (self._profiles if same_nodes else Profiles(perturbed.problem)).evaluate(state).thickness
         if perturbed.path is None:
             perturbed.path = _path_of(state, Record(perturbed.problem, Curve(perturbed.problem, self._tolerances)))
         return perturbed.path[measure] if isinstance(measure, str) else np.asarray(measure(perturbed.path), dtype=float)

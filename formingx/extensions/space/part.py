@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError, finite, positive
 from ...mesh.nodes import COORDINATES
-from ...results.files.sheet import Sheet
+from ...results.files.column_table import ColumnTable
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
@@ -119,7 +119,7 @@ def _positive_share(d: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, repr=False)
-class SheetFilling(Sheet):
+class SheetFilling(ColumnTable):
     """Filling of a tool by a sheet in each of the n states of a run.
 
     Attributes:

@@ -13,13 +13,13 @@ from ...errors import InputError, direction, pair, positive, triple
 from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...ranks import gathered
-from ...results.files.sheet import Sheet
+from ...results.files.column_table import ColumnTable
 from .sheet import MAX_TRIANGLES
 from .surface import wrinkled
 
 
 @dataclass(frozen=True, repr=False)
-class SheetWall(Sheet):
+class SheetWall(ColumnTable):
     """Wall thickness of a sheet of m triangles and n nodes in one state of a run; the same on all ranks.
 
     Attributes:

@@ -12,14 +12,14 @@ from ...physics.models import Membrane
 from ...results.evaluate.tension import Tension
 from ...results.evaluate.wall import between_layers
 from ...results.extend import method_of
-from ...results.files.sheet import Sheet
+from ...results.files.column_table import ColumnTable
 from ...results.path import Path
 
 _POINTS_PER_LAYER = 4               # Gauss points of a layer
 
 
 @dataclass(frozen=True, repr=False)
-class HoopResultants(Sheet):
+class HoopResultants(ColumnTable):
     """Hoop stress resultants of a sheet in one state, at n points of its middle line from the axis to the rim.
 
     A negative resultant is necessary for wrinkles, not sufficient: a thick sheet may stay stable (`Path.stability`). A

@@ -29,7 +29,7 @@ from mpi4py import MPI
 
 from ...errors import InputError, count, file_path, known
 from ...results.files import replace
-from ...results.files.sheet import Sheet
+from ...results.files.column_table import ColumnTable
 from . import effects, stored_runs
 from .task import Measure, StudyRun, Task, as_text, check_importable, finished, pool_of
 from .variables import design
@@ -38,7 +38,7 @@ _EDGE_TOLERANCE = 1e-3
 """Distance from the ends of the range of a variable, over this range, within which the best value is at its edge."""
 
 
-class Study(Sheet):
+class Study(ColumnTable):
     """Runs of a parameter study; prints a summary with the best run.
 
     Attributes:

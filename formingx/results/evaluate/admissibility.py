@@ -98,7 +98,7 @@ class AdmissibilityCheck:
             self._faces = [self._outline.mask(contact.contact.on) for contact in problem.contacts]
             self._reference_lengths = _lengths(self._outline.rest)
 
-    def of(self, state: State) -> str:
+    def reason(self, state: State) -> str:
         """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
 
         Args:

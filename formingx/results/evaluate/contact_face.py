@@ -12,11 +12,11 @@ from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...mesh.nodes import facet_node_positions, nearest
 from ...ranks import gathered
-from ..files.sheet import Sheet
+from ..files.column_table import ColumnTable
 
 
 @dataclass(frozen=True, repr=False)
-class ContactTable(Sheet):
+class ContactTable(ColumnTable):
     """Contact quantities at the n contact points (nodes or Gauss points) of a face, ordered by reference radius.
 
     Attributes:
@@ -70,7 +70,7 @@ class ContactFace:
             self._edges = np.unique(self.nearest.reshape(-1, 3), axis=0)             # ghost edges occur twice
             self._reference_tangents = _tangents(self.reference_points[self._edges])
 
-    def of(self, state: Any) -> ContactTable:
+    def evaluate(self, state: Any) -> ContactTable:
         """Return the contact quantities in a state; pressure and friction are 0 if the tool is inactive."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:

@@ -10,8 +10,8 @@ import numpy as np
 from ...errors import InputError, non_negative
 from ...forms.probes import probe
 from ...tools.shapes import Arc, Tool
-from ..files.sheet import Sheet
-from .profile import distance_to_line, fine
+from ..files.column_table import ColumnTable
+from .profile import distance_to_line, refined
 
 _SMOOTH_ANGLE = 1e-6  # radians: a joint that turns less is no corner
 
@@ -29,7 +29,7 @@ class Corner(NamedTuple):
 
 
 @dataclass(frozen=True, repr=False)
-class Filling(Sheet):
+class Filling(ColumnTable):
     """Remaining gaps in the k corners of a tool, in n states.
 
     Attributes:
@@ -103,7 +103,7 @@ def filling(path: Any, contact: Any) -> Filling:
         travel = tooling.travels(state.setting, state.control)[number] or 0.0
         shift = travel * contact.contact.travel_vector
         with path.problem.state_context(state) as problem:
-            line = fine(face.points + face.displacement(problem.x))
+            line = refined(face.points + face.displacement(problem.x))
         gaps[n] = [distance_to_line(points + shift, line).max() for _, points in corners]
     driven = [c for c in path.columns if c.endswith("pressure")] or [
         path.problem.scene.column(item) for item in path.problem.scene.drivable]

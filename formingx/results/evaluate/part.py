@@ -11,7 +11,7 @@ from ...errors import InputError, finite, known, positive, several
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from ...units import NONE, Units
 from ..numbers import PartNumbers, without_round_off
-from .profile import fine
+from .profile import refined
 from .wall import Wall
 
 
@@ -92,10 +92,10 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
     units = units if axisymmetric else units.per_depth()
-    strips = _strips(fine(profile.bottom), fine(profile.top), axisymmetric)
-    middle = _surface(fine(profile.middle), axisymmetric)
-    reference = _surface(fine((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
-    reference_strips = _strips(fine(profile.reference_bottom), fine(profile.reference_top), axisymmetric)
+    strips = _strips(refined(profile.bottom), refined(profile.top), axisymmetric)
+    middle = _surface(refined(profile.middle), axisymmetric)
+    reference = _surface(refined((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
+    reference_strips = _strips(refined(profile.reference_bottom), refined(profile.reference_top), axisymmetric)
     inside = strips_within(wall, trim)
     volume, area, *before = (_sums(v, len(wall.r)) for v in (strips, middle, reference, reference_strips))
     sums = [float((v * inside).sum()) for v in (volume, area, *before)]
@@ -152,7 +152,7 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     """
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
-        slices = _sums(_up_to(fine(face)[:-1], fine(face)[1:], axisymmetric), len(wall.r)) * inside
+        slices = _sums(_up_to(refined(face)[:-1], refined(face)[1:], axisymmetric), len(wall.r)) * inside
         tolerance = 1e-12 * np.abs(face).max() ** (2 + axisymmetric)           # below it is round-off
         found.append(abs(float(slices.sum())) if abs(slices.sum()) > tolerance else 0.0)
     return min(found)

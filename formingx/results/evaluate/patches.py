@@ -80,7 +80,7 @@ class Patches:
             self._operators[chunk.start] = operator
         return operator
 
-    def at(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
+    def evaluate(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return the values of the fitted cubics of k fields at points, shape (m, p, k).
 
         Args:

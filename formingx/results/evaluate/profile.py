@@ -77,7 +77,7 @@ class Profile:
     @property
     def wall_thickness(self) -> np.ndarray:
         """Shortest deformed distance from each of the n bottom points to the top face, shape (n,), length."""
-        return distance_to_line(self.bottom, fine(self.top))
+        return distance_to_line(self.bottom, refined(self.top))
 
     @property
     def middle(self) -> np.ndarray:
@@ -131,7 +131,7 @@ class Profiles:
         self._problem = problem
         self._probe: Probe | None = None
 
-    def of(self, state: Any) -> Profile:
+    def evaluate(self, state: Any) -> Profile:
         """Return the profile of a state; collective."""
         self._probe = faces = self._probe or self._make_probe()
         deformed = faces.points + faces.displacement_in(state)
@@ -158,7 +158,7 @@ class Profiles:
         return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
 
 
-def fine(line: np.ndarray, parts: int = 6) -> np.ndarray:
+def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
     """Return points along the curved edges of quadratic elements, which are parabolas through three nodes.
 
     Args:

@@ -19,21 +19,21 @@ class Snap(NamedTuple):
     Attributes:
         jumps: number of snap-throughs in the run.
         state: number of the state of the path that follows this snap-through.
-        before: wall over original thickness at this place before the snap-through.
-        after: wall over original thickness at this place after the snap-through.
+        ratio_before: wall over original thickness at this place before the snap-through.
+        ratio_after: wall over original thickness at this place after the snap-through.
         point: reference radius of this place, length.
     """
 
     jumps: int
     state: int
-    before: float
-    after: float
+    ratio_before: float
+    ratio_after: float
     point: float
 
     @property
     def change(self) -> float:
-        """Relative change of the wall at this place, |after / before - 1|."""
-        return abs(self.after / self.before - 1)
+        """Relative change of the wall at this place, |ratio_after / ratio_before - 1|."""
+        return abs(self.ratio_after / self.ratio_before - 1)
 
 
 def largest(path: Any) -> Snap | None:
@@ -75,8 +75,8 @@ def findings(snap: Snap | None) -> list[Finding]:
     if snap is None or snap.change < _WALL_CHANGE:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
-    return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall went"
-                    f" from {snap.before:.4g} to {snap.after:.4g} of the original at R = {snap.point:.5g}. With"
-                    f" friction or a relaxing material, the equilibrium where it comes to rest depends on the motion"
-                    f" to it. Later states are certain only if runs with other steps agree: compare"
-                    f" StepControl(target=4) and StepControl(target=8).")]
+    return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall"
+                    f" went from {snap.ratio_before:.4g} to {snap.ratio_after:.4g} of the original at"
+                    f" R = {snap.point:.5g}. With friction or a relaxing material, the equilibrium where it"
+                    f" comes to rest depends on the motion to it. Later states are certain only if runs with"
+                    f" other steps agree: compare StepControl(target=4) and StepControl(target=8).")]

@@ -194,7 +194,7 @@ class Stresses:
         self._patches: Patches | None = None
         self._located: dict[str, tuple[np.ndarray, LocatedPoints]] = {}
 
-    def of(self, state: Any) -> StressField:
+    def evaluate(self, state: Any) -> StressField:
         """Return the stresses of a state; collective."""
         if not self._ready:
             self._prepare()
@@ -275,7 +275,7 @@ class Stresses:
             points_of_all, numbers, layer = (gathered(comm, v) for v in (points, numbers, layer))
             self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + owned))
         cubics = self._patches.fit(gathered(comm, values))
-        return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.at(cubics, points)), cubics)
+        return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.evaluate(cubics, points)), cubics)
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest fitted principal stress at the corners of each of this rank's m cells.
@@ -289,7 +289,7 @@ class Stresses:
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
         assert self._patches is not None
-        largest = np.linalg.eigvalsh(_cauchy(self._patches.at(fitted.cubics, X)))[..., -1]
+        largest = np.linalg.eigvalsh(_cauchy(self._patches.evaluate(fitted.cubics, X)))[..., -1]
         top = (owned, largest.argmax(1))
         return largest[top], X[top]
 

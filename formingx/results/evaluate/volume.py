@@ -72,7 +72,7 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
     return np.vstack([np.zeros((0, 2)), *faces]), _CORNER_DISTANCE * reach
 
 
-def of_point(path: Any) -> list[Finding]:
+def extreme_ratio(path: Any) -> list[Finding]:
     """Return a finding in a list if J is above 2 or below 1/2 at a point of the last state; else an empty list.
 
     Collective.

@@ -14,12 +14,12 @@ from ...errors import InputError, finite
 from ...forms.probes import probe
 from ...mesh.nodes import cell_node_positions, facet_node_positions
 from ...ranks import gathered
-from ..files.sheet import Sheet
+from ..files.column_table import ColumnTable
 from .profile import Profile, distance_to_line
 
 
 @dataclass(frozen=True, repr=False)
-class Wall(Sheet):
+class Wall(ColumnTable):
     """Wall of a sheet in one state, at the n nodes of the bottom (inner) face from the axis to the rim.
 
     Attributes:
@@ -106,7 +106,7 @@ class Walls:
         self._path = path
         self._lines: tuple[list[str], Any] | None = None
 
-    def of(self, state: Any) -> Wall:
+    def evaluate(self, state: Any) -> Wall:
         """Return the wall in a state; collective."""
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)

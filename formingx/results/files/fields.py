@@ -67,7 +67,7 @@ class Fields:
         self._between: tuple[np.ndarray, np.ndarray] | None = None
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
-    def of(self, state: Any) -> dict[str, np.ndarray]:
+    def evaluate(self, state: Any) -> dict[str, np.ndarray]:
         """Return the fields of a state; collective.
 
         Returns:
@@ -124,7 +124,7 @@ class Fields:
                 distance, numbers = nearest(face.nodes, self.points.reshape(-1, self.points.shape[-1]))
                 self._faces[k] = face, face.nearest[numbers], distance < 1e-9 * self._problem.forms.length
             face, numbers, on_face = self._faces[k]
-            pressure += np.where(on_face, face.of(state).pressure[numbers], 0.0).reshape(pressure.shape)
+            pressure += np.where(on_face, face.evaluate(state).pressure[numbers], 0.0).reshape(pressure.shape)
         return pressure
 
 
@@ -150,10 +150,10 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
     for number, state in _chosen(path, states):
         key = id(path.segment(state).problem)
         if key not in meshes:
-            fields = Fields(path.alone(state))
+            fields = Fields(path.same_mesh(state))
             meshes[key] = fields, _gather(fields.points, comm)
         fields, points = meshes[key]
-        values = {name: _gather(v, comm) for name, v in fields.of(state).items()}
+        values = {name: _gather(v, comm) for name, v in fields.evaluate(state).items()}
         piece = file.with_name(f"{file.stem}-{number}.vtu")
         text = _as_vtu(points, values) if comm.rank == 0 else ""
         files.on_root(comm, partial(write, piece, text))

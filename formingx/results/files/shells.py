@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluate.profile import distance_to_line, fine
+from ..evaluate.profile import distance_to_line, refined
 from . import tabular
 
 
@@ -25,8 +25,8 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
         Nodes (x, y, z), shape (n, 3), length. Wall thickness at the nodes, shape (n,), length. Node numbers from 0 of
         the triangles (S6), shape (m, 6), and of the quadrilaterals (S8R), shape (k, 8).
     """
-    wall = (distance_to_line(profile.bottom, fine(profile.top))
-            + distance_to_line(profile.top, fine(profile.bottom))) / 2
+    wall = (distance_to_line(profile.bottom, refined(profile.top))
+            + distance_to_line(profile.top, refined(profile.bottom))) / 2
     line = profile.middle
     n, turn = len(line), np.linspace(0, 2 * np.pi, 2 * parts, endpoint=False)
     points = np.stack([np.outer(np.cos(turn), line[:, 0]), np.outer(np.sin(turn), line[:, 0]),

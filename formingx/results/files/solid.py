@@ -10,7 +10,7 @@ import numpy as np
 
 from ...io.stl import volume, write_stl
 from ...units import LENGTHS, NONE, Units
-from ..evaluate.profile import fine
+from ..evaluate.profile import refined
 from . import tabular
 
 _EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an element
@@ -30,7 +30,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         Points (x, y, z), shape (n, 3), length. For each triangle the rows of its corners in the points, shape (m, 3),
         counter-clockwise seen from outside.
     """
-    line = np.vstack([fine(profile.bottom, _EDGE_PIECES), fine(profile.top, _EDGE_PIECES)[::-1]])  # edges are curved
+    line = np.vstack([refined(profile.bottom, _EDGE_PIECES), refined(profile.top, _EDGE_PIECES)[::-1]])  # edges are curved
     n = len(line)
     on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
     if axisymmetric:

@@ -107,7 +107,7 @@ def of_folder(folder: Any) -> Status:
     done = [s for s in states if s["stepping"] and s["stage"] == last["stage"]]
     stepping: dict[str, Any] = done[-1]["stepping"] if done else {}
     counts = stepping.get("counts", {})
-    name, goal = aimed(stepping, last["measures"]) or ("", 0.0)
+    name, goal = target_column(stepping, last["measures"]) or ("", 0.0)
     if name not in last["measures"]:
         return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
                       counts.get("limits", {}), age, ended)
@@ -123,7 +123,7 @@ def of_folder(folder: Any) -> Status:
                   counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 
 
-def aimed(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
+def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
     """Return the target of the stage that a step belongs to, as a column and its value.
 
     A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure".

@@ -41,7 +41,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
     shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
     for a, b, fraction in spread(path, frames):
-        interpolated = path.between(a, b, fraction)
+        interpolated = path.interpolate(a, b, fraction)
         shapes.append(path.profile(interpolated))
         names = shown[b.stage]
         now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))

@@ -16,10 +16,10 @@ from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
 from ..evaluate.filling import corners_of
-from ..evaluate.profile import Profile, distance_to_line, fine
+from ..evaluate.profile import Profile, distance_to_line, refined
 from ..files.description import plain
 from ..files.progress import progress as shown_progress
-from ..files.status import aimed
+from ..files.status import target_column
 
 PENETRATION = 0.05
 """Penetration over the smallest thickness of the sheet above which a report warns."""
@@ -148,7 +148,7 @@ class Record:
         if "penetration" in self.measures:
             deep, thickness = self.measures["penetration"].max(), self._smallest_thickness()
             if thickness is not None and deep > PENETRATION * thickness:
-                begins = self._from(self.measures["penetration"] > PENETRATION * thickness)
+                begins = self._first(self.measures["penetration"] > PENETRATION * thickness)
                 found.append(Finding("warning" if deep > 4 * PENETRATION * thickness else "note", "penetration",
                                      f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
                                      f" smallest thickness{begins}: a larger contact penalty reduces it."))
@@ -156,9 +156,9 @@ class Record:
         if worst > MASS:
             found.append(Finding("warning" if worst > 10 * MASS else "note", "mass",
                                  f"The mass changes by up to {100 * worst:.2g} %"
-                                 f"{self._from(np.abs(self.measures['mass_error']) > MASS)}: use a smaller eps or a"
+                                 f"{self._first(np.abs(self.measures['mass_error']) > MASS)}: use a smaller eps or a"
                                  f" finer mesh."))
-        found += [*self._of_volume(), *self._of_verdict()]
+        found += [*self._volume_findings(), *self._verdict_findings()]
         subjects = {finding.about for finding in found}      # these are on all states, `self.findings` on the last one
         found += [finding for finding in self.findings if finding.about not in subjects]
         if self.counts.get("failures", 0) > len(self.kinds):
@@ -188,10 +188,10 @@ class Record:
                 faces = [self.profiles[i].top if contact.on in ("top", "outer") else self.profiles[i].bottom
                          for i in states]
                 found[f"{contact.name or 'tool'}, corner {k}"] = np.array(
-                    [distance_to_line(points, fine(face)).max() for face in faces])
+                    [distance_to_line(points, refined(face)).max() for face in faces])
         return found
 
-    def _from(self, where: np.ndarray) -> str:
+    def _first(self, where: np.ndarray) -> str:
         """Return the number, stage and control of the first state that satisfies a condition, as text.
 
         Args:
@@ -206,7 +206,7 @@ class Record:
         column = self.control(state)
         return f"{words(column)} = {self.measures[column][state]:.5g}"
 
-    def _of_volume(self) -> list[Finding]:
+    def _volume_findings(self) -> list[Finding]:
         """Return the findings on elements that do not keep their volumes, in a list."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
@@ -216,12 +216,12 @@ class Record:
         clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
         return clamped or volume.findings(errors[k], where)
 
-    def _of_verdict(self) -> list[Finding]:
+    def _verdict_findings(self) -> list[Finding]:
         """Return a finding on the first inadmissible state in a list; empty if all states are admissible."""
         k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
         return [] if k is None else [
-            Finding("serious", "state", f"From{self._from(np.arange(len(self.kinds)) >= k)[6:]} the results must not be"
-                    f" used: {self.verdicts[k]}.")]
+            Finding("serious", "state", f"From{self._first(np.arange(len(self.kinds)) >= k)[6:]} the results must not"
+                    f" be used: {self.verdicts[k]}.")]
 
     def warnings(self) -> list[str]:
         """Return the texts of `all_findings`."""
@@ -251,16 +251,17 @@ def of_path(path: Any) -> Record:
         drawn = drawn if timed else frames(progress(measures, profiles), kinds, stages)
         shown: list[dict[str, np.ndarray]] = [{} for _ in states]
         if profiles[-1] is not None:
-            fields = {id(entry): _Fields(path.alone(entry.states[0]), profiles[-1]) for entry in path.segments}
+            fields = {id(entry): _Fields(path.same_mesh(entry.states[0]), profiles[-1]) for entry in path.segments}
             for i, k in enumerate(drawn):
                 done(i / len(drawn))
-                shown[k] = fields[id(path.segment(states[k]))].of(states[k])
+                shown[k] = fields[id(path.segment(states[k]))].evaluate(states[k])
         stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
         tooling = Tooling.of_problem(problem)
         wall = path.wall() if profiles[-1] is not None else None
         return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
-                      aimed(stepping, measures), tooling, [tooling.travels(s.setting, s.control) for s in states],
+                      target_column(stepping, measures), tooling,
+                      [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
                       path.findings(), verdicts=[s.verdict for s in states],
                       space=problem.scene.kinematics.components == 3, planes=problem.scene.symmetry,
@@ -282,7 +283,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
     return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], [s["stage"] for s in states],
                   measures, [s["history"] for s in states], profiles, stepping.get("counts", {}),
-                  aimed(stepping, measures), tooling,
+                  target_column(stepping, measures), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
                   _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
@@ -327,23 +328,23 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     return found
 
 
-def frames(at: np.ndarray, kinds: list[str], stages: list[str], most: int = FRAMES) -> list[int]:
+def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: int = FRAMES) -> list[int]:
     """Return the numbers of the states to be drawn; all states if they are few.
 
     Ends of stages and limit points are included. Further states are spaced evenly over the mean of the progress of the
     process and the fraction of the states.
 
     Args:
-        at: progress of the process in n states (`progress`), shape (n,).
+        progressed: progress of the process in n states (`progress`), shape (n,).
         kinds: kind of each state (`State.kind`).
         stages: name of the stage of each state.
-        most: approximate number of drawn states.
+        count: approximate number of drawn states.
     """
-    n = len(at)
+    n = len(progressed)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
-    position = (at + np.linspace(0, 1, n)) / 2
-    even = np.searchsorted(position, np.linspace(0, 1, max(most - len(marked), most // 2)))
-    return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > most else list(range(n))
+    position = (progressed + np.linspace(0, 1, n)) / 2
+    even = np.searchsorted(position, np.linspace(0, 1, max(count - len(marked), count // 2)))
+    return sorted({*marked, *map(int, even.clip(0, n - 1))}) if n > count else list(range(n))
 
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
@@ -396,7 +397,7 @@ class _Fields:
         self._stressed = solid and len(path.problem.scene.mesh.layers) == 1
         self._faces = [ContactFace(path, contact) for contact in path.problem.contacts]
 
-    def of(self, state: Any) -> dict[str, np.ndarray]:
+    def evaluate(self, state: Any) -> dict[str, np.ndarray]:
         """Return {name of a field: values at the nodes, shape (m,)} in a state; collective."""
         path, points, found = self._path, self._points, {}
         if path.problem.scene.heat is not None:
@@ -405,7 +406,7 @@ class _Fields:
             stress = path.stress(state).at_points(np.vstack(points))
             found["largest principal stress"] = stress.principal_stresses[:, 0].reshape(2, -1).max(0)
         if self._faces:
-            found["contact pressure"] = sum(_nearest(face.of(state), self._positions) for face in self._faces)
+            found["contact pressure"] = sum(_nearest(face.evaluate(state), self._positions) for face in self._faces)
         return found
 
 

@@ -139,7 +139,7 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
         body += _details(record, units)
-    body += ["<h2>Made with</h2>", page.table(["", ""], _made(records))]
+    body += ["<h2>Made with</h2>", page.table(["", ""], _versions(records))]
     return page.page(title, body, scripts(interactive.data(records, names, units)))
 
 
@@ -212,20 +212,20 @@ def _warnings(record: Record, lead: str = "") -> str:
     findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Only curves and inputs are shown: {_NO_MESH}.</p>"
-        return lead + "".join(map(_noted, findings))
+        return lead + "".join(map(_finding, findings))
     if not findings:
         return (f"<p class=good>{html.escape(lead)}No warnings: the target was met. Mass, volume of the elements and"
                 f" penetration are within bounds. No face crosses another or the axis.</p>")
-    return "".join(_noted(found._replace(text=lead + found.text)) for found in findings)
+    return "".join(_finding(found._replace(text=lead + found.text)) for found in findings)
 
 
-def _noted(found: Finding) -> str:
+def _finding(found: Finding) -> str:
     """Return a finding as an element of the page."""
     return (f"<details class='note{' bad' if found.severity != 'note' else ''}'><summary><b>{found.severity}</b>:"
             f" {html.escape(found.text)}</summary></details>")
 
 
-def _made(records: list[Record]) -> list[list[str]]:
+def _versions(records: list[Record]) -> list[list[str]]:
     """Return rows (name, value) with the date, the scripts and the versions of programs."""
     try:
         version = importlib.metadata.version("formingx")

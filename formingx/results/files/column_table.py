@@ -13,7 +13,7 @@ _PRINTED_ROWS = 10        # number of printed rows, half of them at the beginnin
 _LONGEST = 32_767  # largest number of characters in a cell of Excel
 
 
-class Sheet:
+class ColumnTable:
     """Base class of tables with named columns; it prints its first and last rows.
 
     Attributes:
