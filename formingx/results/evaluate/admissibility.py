@@ -21,23 +21,24 @@ class Limits:
     """Limits beyond which a state is inadmissible, and limits from which a run warns.
 
     Attributes:
-        volume: largest root mean square of J - 1, J: volume ratio. Creases at clamped rims and at corners of coarse
-            blocks stay below 0.17.
+        volume: largest root mean square of J - 1 over the body, J = det F. Creases at clamped rims and at corners of
+            coarse blocks stay below 0.17.
         inverted_elements: largest fraction of the elements that have a point with J <= 0.
-        allowed_elements: number of such elements that is always allowed, because corners are singular.
-        depth: largest depth of the body in a tool. A state is inadmissible if the depth exceeds this factor times the
-            thickness and times the length of an element edge.
-        penetration: largest penetration of contact points, over the local wall. Beyond it the body did not follow the
-            tool. Williams' plug on coarse elements reaches 0.051.
-        warning_error: relative change of a tool force by penetration from which a run warns.
-        largest_error: largest relative change of a tool force by penetration.
-        largest_energy_ratio: upper bound of the estimated change of force, over the fraction of the strain energy that
-            penetration stores. It applies to a body that is pressed flat.
-        difference_step: step in arc length of a central difference quotient.
-        negligible_penetration: penetration over the thickness below which the change of force is not limited, as at a
-            first touch.
-        pole_stretch: largest pole stretch; the column is 1e150 for a negative wall.
-        tensile_force: largest tensile force on a frictionless tool, over the compressive forces on it.
+        allowed_elements: number of elements with J <= 0 that is allowed on any mesh, because corners are singular.
+        depth: largest depth of the boundary in a tool, over the sheet thickness or the length of the element edge,
+            whichever is larger.
+        penetration: largest penetration of a contact point, over the deformed wall there. Beyond it the body did not
+            follow the tool. Williams' plug on coarse elements reaches 0.051.
+        warning_error: relative error of a tool force due to penetration above which a run warns.
+        largest_error: largest relative error of a tool force due to penetration.
+        largest_energy_ratio: upper bound of the estimated relative error of a tool force, over the fraction of the
+            strain energy that penetration stores. It matters for a body that is pressed flat.
+        difference_step: half the step, in arc length of the path, of a central difference quotient; dimensionless.
+        negligible_penetration: penetration over the sheet thickness up to which `largest_error` does not apply, as at
+            a first touch.
+        pole_stretch: largest value of the column "pole_stretch". It is 1e150 if the two faces cross at the pole.
+        tensile_force: largest force with which the body pulls a frictionless tool, over the sum of the normal forces on
+            it.
     """
 
     volume: float = 0.25
@@ -61,8 +62,8 @@ class Depth(NamedTuple):
     """Deepest point of a body in a tool.
 
     Attributes:
-        ratio: `depth` over the allowed depth.
-        depth: distance of the point from the surface of the tool, length.
+        ratio: `depth` over the allowed depth, above 1.
+        depth: distance of the point inside the tool from the tool's surface, positive, length.
         place: deformed position of the point, shape (2,) or (3,), length.
         contact: the `FaceContact` with the tool.
         name: name of the tool, or of the face that touches it.
@@ -82,9 +83,9 @@ class Depth(NamedTuple):
 
 
 class AdmissibilityCheck:
-    """Checks the states of one problem; an inadmissible state satisfies the equations, but no real body has it.
+    """Check of the states of one problem; an inadmissible state satisfies the equations, but no real body can have it.
 
-    Examples are states with inverted elements, with a face inside a tool, or with forces that penetration falsifies.
+    Examples are states with inverted elements, with a face inside a tool, or with tool forces that penetration changes.
 
     Args:
         problem: the discretised problem.
@@ -102,12 +103,19 @@ class AdmissibilityCheck:
         """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
 
         Args:
-            state: a state with its output quantities.
+            state: a state with its output quantities (`State.measures`).
         """
         return next(self._reasons(state), "")
 
     def findings(self, state: State) -> list[Finding]:
-        """Return the warnings on the contact in an admissible state; collective."""
+        """Return findings on penetration of the tools in an admissible state; collective.
+
+        Args:
+            state: the state.
+
+        Returns:
+            The findings; empty if no penetration exceeds its limit. In three dimensions they are "serious".
+        """
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
@@ -170,12 +178,13 @@ class AdmissibilityCheck:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
     def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Yield for each tool in a section the deepest point of the boundary, if it is deeper than allowed.
+        """Yield for each active tool in a section the deepest point of the boundary, if it is deeper than allowed.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
             state: the state.
-            own: True to examine the face of the contact alone, with the limit of a warning.
+            own: True to examine the face of the contact alone, with the limit of a warning; False: the whole boundary,
+                with `Limits.depth`.
         """
         present = [pair for pair in zip(self._problem.contacts, self._faces) if pair[0].present]
         points, length = (edge_points(edges), _lengths(edges)) if present else (edges, edges)
@@ -207,7 +216,7 @@ class AdmissibilityCheck:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
-        """Yield for each tool the contact point with the largest penetration over the local wall, if it is too large.
+        """Yield for each tool the contact point of largest penetration over the deformed wall, if above its limit.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
@@ -227,7 +236,7 @@ class AdmissibilityCheck:
 
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
-    """Return the depths of points in the tool of a contact in a state, shape (m, n), length; negative outside it.
+    """Return the depths of points in the tool of a contact in a state, shape (m, n), length; negative outside the tool.
 
     Args:
         contact: the `FaceContact`.
@@ -248,10 +257,15 @@ def _allowed_penetration(contact: Any) -> np.ndarray:
 
 
 def _force_error(contact: Any, state: State, images: int) -> float:
-    """Return the estimated relative change of the force F on a tool by penetration; collective.
+    r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
 
-    With the energy E of penetration, the tool advances by 2 E/F into the body. The change of force is this distance
-    times dF/dtravel. For a fixed tool 0 is returned.
+    Penetration stores the energy E of the total strain energy W, so the tool is 2 E/F too far in the body. With its
+    travel t and the limit c = `Limits.largest_energy_ratio`, the estimate is
+
+    .. math::
+        \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
+
+    E/W is returned if it is small, or if F or the change of t is 0; 0 is returned for a fixed tool.
 
     Args:
         contact: the `FaceContact` with the tool.
@@ -279,13 +293,13 @@ def _penalty_advice(contact: Any, error: float) -> str:
 
     Args:
         contact: the `FaceContact`.
-        error: relative change of the tool force by penetration (`_force_error`).
+        error: relative error of the tool force due to penetration (`_force_error`).
     """
     return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warning_error * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
-    """Return True if the body pulls a frictionless moving tool along its travel; collective.
+    """Return True if the body pulls a frictionless moving tool forward along its travel; collective.
 
     Args:
         contact: the `FaceContact`.

@@ -23,9 +23,9 @@ class ContactTable(ColumnTable):
         reference_points: reference positions (R, Z) of the points, shape (n, 2), length.
         points: deformed positions (r, z) of the points, shape (n, 2), length.
         gap: distance of each point from the tool, negative inside it, shape (n,), length.
-        pressure: contact pressure per deformed area, shape (n,), stress.
-        friction: tangential traction of the body on the tool per deformed area, along the tool's profile, shape (n,),
-            stress.
+        pressure: contact pressure per deformed area, positive in compression, shape (n,), stress.
+        friction: tangential traction of the body on the tool per deformed area, shape (n,), stress; positive in the
+            direction of the tool's profile.
         comm: MPI communicator of the run.
     """
 
@@ -46,9 +46,9 @@ class ContactTable(ColumnTable):
 
 
 class ContactFace:
-    """Evaluates the contact pressure, friction and gap of one `FaceContact`; each method gives the points of all ranks.
+    """Contact pressure, friction and gap of one `FaceContact`, at the contact points of all ranks.
 
-    Collective.
+    Creating it and all of its methods are collective.
 
     Args:
         path: the path whose states are evaluated.
@@ -71,7 +71,11 @@ class ContactFace:
             self._reference_tangents = _tangents(self.reference_points[self._edges])
 
     def evaluate(self, state: Any) -> ContactTable:
-        """Return the contact quantities in a state; pressure and friction are 0 if the tool is inactive."""
+        """Return the contact quantities in a state of a section; pressure and friction are 0 if the tool is inactive.
+
+        Args:
+            state: a state on the mesh of the path.
+        """
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
@@ -90,7 +94,9 @@ class ContactFace:
         return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed over reference area at each contact point; a node of two edges gets the mean of both.
+        """Return deformed over reference area at each contact point, a node of the face.
+
+        A node that two edges share gets the mean of the ratios of both edges.
 
         Args:
             points: deformed positions of the contact points, shape (n, 2), length.
@@ -134,11 +140,11 @@ def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
 
     Args:
         path: the computed `Path`.
-        tool: name of the tool, the `Tool` or a `Contact`; None if there is only one.
+        tool: name of the tool or of a face that touches it, the `Tool` or the `Contact`; None: the only tool.
         caller: name of the calling method, for the message.
 
     Returns:
-        The `FaceContact` objects of the tool.
+        The `FaceContact` objects of the tool, one for each face.
 
     Raises:
         InputError: there is no such tool, or there are several and `tool` is None.
@@ -160,6 +166,9 @@ def tool_forces(path: Any) -> dict[str, np.ndarray]:
 
     The force on a moving tool is taken along its travel, positive if it resists the travel. The force on a fixed tool
     is taken along Z, positive if the body pushes the tool up.
+
+    Args:
+        path: the computed `Path`.
 
     Returns:
         {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.

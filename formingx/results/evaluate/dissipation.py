@@ -7,17 +7,23 @@ from ...solve.state import State
 
 
 def dissipated_energy(segment: Segment, states: list[State], power: Quantity) -> float:
-    """Return the energy that materials dissipate between the last two of given states, by Simpson's rule; collective.
+    r"""Return the energy that materials dissipate between the last two of given states; collective.
 
-    In the middle of the step the body lies on the predicted curve, and its history variables are advanced to that time.
+    The dissipated power D is integrated over the process time t along the parabola through three values:
+
+    .. math::
+        \int_{t_0}^{t_1} D \, dt
+
+    The third value lies between both states. There the unknowns are interpolated, and the history variables are
+    advanced to that time.
 
     Args:
-        segment: the segment of the states.
-        states: successive states with the column "dissipated_power".
+        segment: the segment of the run with these states.
+        states: successive states, at least two, with the column "dissipated_power".
         power: the dissipated power of the whole part, bound to the problem of the segment.
 
     Returns:
-        The energy of the whole part, stress length^3; in plane strain stress length^2.
+        The energy of the whole part, stress length^3; in plane strain stress length^2. It is 0 if no time passes.
     """
     before, state = states[-2:]
     if not before.time < state.time:                         # as after remeshing

@@ -28,16 +28,17 @@ class Edge(NamedTuple):
 
 
 def coarsest(path: Any, state: Any) -> Edge | None:
-    """Return the edge of a tool at which the tool normal turns most from one contact point to the next; collective.
+    """Return the tool edge at which the tool normal turns most between two neighbouring contact points; collective.
 
-    Neighbours are points that follow each other by R, then Z. Points with constrained displacements do not slide.
+    Only tools from which the body may separate are examined, without stick. Neighbours follow each other by R, then Z.
+    Points with constrained displacements do not slide.
 
     Args:
         path: the computed `Path`.
-        state: a state on its last mesh.
+        state: a state on the last mesh of the path.
 
     Returns:
-        The edge, or None if the body slides over no edge.
+        The edge, or None if the body slides over no convex edge.
     """
     found: list[Edge] = []
     with path.problem.state_context(state) as problem:
@@ -67,13 +68,13 @@ def coarsest(path: Any, state: Any) -> Edge | None:
 
 
 def findings(edge: Edge | None) -> list[Finding]:
-    """Return a warning if the elements are too large for the sharpest edge over which the body slides.
+    """Return a warning in a list if the elements are too large for the tool edge over which the body slides.
 
     Args:
-        edge: result of `coarsest`.
+        edge: the edge with the largest turn of the tool normal between contact points (`coarsest`), or None.
 
     Returns:
-        A list with the warning; empty if the tool normal turns by less than 40 degrees.
+        A list with the warning; empty if the tool normal turns by less than 40 degrees, or without an edge.
     """
     if edge is None or edge.turn < _WARNED_ANGLE:
         return []

@@ -34,8 +34,9 @@ class Filling(ColumnTable):
 
     Attributes:
         corners: the k corners, in the order of the tool's profile.
-        control: {column: its values, shape (n,)} for each pressure; without a pressure, for each controlled quantity.
-        gaps: largest distance of the points of each corner from the body, shape (n, k), length.
+        control: {column: its values, shape (n,)} for each pressure; without a pressure, for each load, support and tool
+            that a stage can control.
+        gaps: largest distance from the points of each corner to the deformed face, shape (n, k), length.
         comm: MPI communicator of the run.
     """
 
@@ -46,7 +47,7 @@ class Filling(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the table: {name: values, shape (n,)}; the first corner is "corner_1_gap"."""
+        """Columns of the table: {name: values, shape (n,)}: the controls, and "corner_1_gap", "corner_2_gap", ..."""
         return self.control | {f"corner_{k}_gap": gap for k, gap in enumerate(self.gaps.T, 1)}
 
     @property
@@ -55,7 +56,7 @@ class Filling(ColumnTable):
         return next(iter(self.control.values()))
 
     def pressure_at(self, gap: float, corner: int | None = None) -> float:
-        """Return the pressure from which on the gap stays below a value, interpolated linearly between states.
+        """Return the pressure from which on the gap stays at or below a value, interpolated linearly between states.
 
         Args:
             gap: remaining gap, length.
@@ -65,7 +66,7 @@ class Filling(ColumnTable):
             The value of `pressure`, stress, or the value of another control in its unit.
 
         Raises:
-            InputError: the gap is not reached, or there is no such corner.
+            InputError: the gap is negative or is not reached, or there is no such corner.
         """
         gap = non_negative("pressure_at: gap", gap)
         if corner is not None and corner not in range(len(self.corners)):
@@ -117,7 +118,8 @@ def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
         tool: the tool, before it moves.
 
     Returns:
-        For each corner a pair (`Corner`, points (r, z) on it, shape (m, 2), length).
+        For each corner a pair (`Corner`, points (r, z) on it, shape (m, 2), length). A fillet has m = 17 points, a
+        sharp corner m = 1.
     """
     found = []
     pieces = list(tool.pieces)

@@ -38,8 +38,8 @@ class Part(PartNumbers):
             change with the temperature.
         walls: {height: wall at this height}, length.
         scrap: fraction of the volume of the whole sheet that lies beyond the trim.
-        capacity: volume that the part holds: the volume inside the inner face, up to planes across its ends, length^3.
-            A closed bottle counts whole, a pot up to its rim or trim.
+        capacity: volume that the part holds, length^3: it lies inside the inner face, up to planes across the ends of
+            this face. For a pot, such a plane lies at its rim or trim.
         basis: reference of volume, area, weight and capacity as text, such as "the part, per mm of depth"; "" for an
             axisymmetric part that is modelled whole.
         units: units of the printed values.
@@ -81,10 +81,10 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
         wall: the wall in a state.
         axisymmetric: False in plane strain.
         density: density of the material for the weight, g/cm3; None: no weight.
-        trim: radius, or ("height", h), at which the part is cut off, length.
-        heights: heights at which the wall is given, too, length.
+        trim: radius r, or ("height", h), at which the part is cut off, length; None: not cut.
+        heights: heights (`Wall.height`) for `Part.walls`, length.
         units: units of the script.
-        planes: symmetry planes that cut the body.
+        planes: symmetry planes at which only a half or a quarter of the part is modelled.
 
     Raises:
         InputError: the part does not reach the trim or a height.
@@ -118,11 +118,13 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
-    """Return the fraction of each strip between two nodes that lies before the trim, 0 to 1, shape (n - 1,).
+    """Return the fraction, 0 to 1, of each strip between two nodes that belongs to the trimmed part, shape (n - 1,).
+
+    The cut lies where the middle line passes the trim upwards for the last time on its way from the axis to the rim.
 
     Args:
         wall: the wall at n nodes, from the axis to the rim.
-        trim: radius, or ("height", h), at which the part is cut off, length; None: not cut.
+        trim: radius r, or ("height", h), at which the part is cut off, length; None: not cut.
 
     Raises:
         InputError: the part does not reach the trim.
@@ -143,7 +145,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume inside the inner face of a part, length^3; in plane strain per unit depth.
+    """Return the volume inside the inner face of a part, length^3; in plane strain per unit depth, length^2.
 
     Args:
         wall: the wall at n nodes.
@@ -159,7 +161,7 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
 
 
 def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes of the strips between two lines, shape (m - 1,), length^3; in plane strain per unit depth.
+    """Return the volumes of the m - 1 strips between two lines, length^3; in plane strain per unit depth, length^2.
 
     Args:
         bottom: points (r, z) of a line, shape (m, 2), length.
@@ -174,12 +176,12 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarr
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes between the axis r = 0 and straight lines, shape (n,), length^3; positive if b is above a.
+    """Return the volumes between the axis r = 0 and n straight lines, shape (n,), length^3; positive if b is above a.
 
     Args:
         a: first end (r, z) of each line, shape (n, 2), length.
         b: second end of each line, shape (n, 2), length.
-        axisymmetric: False in plane strain, where the volumes are per unit depth.
+        axisymmetric: True for the volumes of revolution; False for plane strain, per unit depth, length^2.
     """
     (r, z), (s, w) = a.T, b.T
     return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)

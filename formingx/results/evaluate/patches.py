@@ -17,7 +17,9 @@ _KEPT = 2**25  # matrices of the fits are stored for the next state if they have
 
 
 class Patches:
-    """Least-squares fits of cubics to values at quadrature points, on the patches of m of the n cells of a mesh.
+    """Least-squares fits of cubics to values at quadrature points, for m of the n cells of a mesh.
+
+    The cubic of a cell is fitted to the values in its patch: the cells of the same layer that share a corner with it.
 
     Args:
         points: q quadrature points (R, Z) of each of the n cells, shape (n, q, 2), length.
@@ -61,13 +63,14 @@ class Patches:
         return found
 
     def _operator(self, chunk: slice) -> np.ndarray:
-        """Return matrices that map the values at the points of each patch to the coefficients of its cubic.
+        """Return matrices that map the values at the quadrature points of a patch to the coefficients of its cubic.
 
         Args:
             chunk: slice of the m cells.
 
         Returns:
-            Shape (cells of the slice, 10, points of the largest patch).
+            One matrix per cell, shape (cells of the slice, 10, points of the largest patch). The columns of missing
+            points are 0.
         """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
@@ -81,16 +84,19 @@ class Patches:
         return operator
 
     def evaluate(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return the values of the fitted cubics of k fields at points, shape (m, p, k).
+        """Return the values of the cubics of the m cells at points, for k fields.
 
         Args:
-            coefficients: coefficients from `fit`, shape (m, 10, k).
-            points: p points (R, Z) of each of the m cells, shape (m, p, 2), length.
+            coefficients: coefficients of the cubics from `fit`, shape (m, 10, k).
+            points: p points (R, Z) in each of the m cells, shape (m, p, 2), length.
+
+        Returns:
+            The values, shape (m, p, k), in the units of the fitted fields.
         """
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
-        """Return the ten monomials of a cubic in scaled coordinates at points, shape (cells, ..., 10).
+        """Return the ten monomials of a cubic at points, in coordinates scaled by the patch, shape (cells, ..., 10).
 
         Args:
             chunk: slice of the m cells.
@@ -102,5 +108,5 @@ class Patches:
         return powers[..., 0, _POWERS[:, 0]] * powers[..., 1, _POWERS[:, 1]]
 
     def _chunks(self) -> list[slice]:
-        """Return slices that divide the m cells into groups of at most `_CHUNK`, to limit the memory."""
+        """Return slices that divide the m cells into groups of at most 2048 (`_CHUNK`), to limit the memory."""
         return [slice(k, k + _CHUNK) for k in range(0, len(self._patch), _CHUNK)]

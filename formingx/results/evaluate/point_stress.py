@@ -29,7 +29,9 @@ class FaceStress(NamedTuple):
 
 @dataclass(frozen=True)
 class Stress:
-    """Stresses and stretches at n points. Tensor components are ordered r, z, hoop; in plane strain r, z, out of plane.
+    """Stresses and stretches at n points.
+
+    Tensor components are ordered r, z, hoop; in plane strain r, z, out of plane.
 
     Attributes:
         points: reference positions (R, Z), shape (n, 2), length.
@@ -47,26 +49,29 @@ class Stress:
 
     @cached_property
     def first_piola(self) -> np.ndarray:
-        """First Piola-Kirchhoff stress P = F S, shape (n, 3, 3), stress; P N is the force on a unit area with normal N.
+        """First Piola-Kirchhoff stress P = F S, shape (n, 3, 3), stress.
 
-        The area and N belong to the reference configuration.
+        P N is the force per reference area on a face with the unit normal N in the reference configuration.
         """
         return self.deformation_gradient @ self.second_piola
 
     @cached_property
     def cauchy(self) -> np.ndarray:
-        """Cauchy stress P F^T / J, positive in tension, shape (n, 3, 3), stress; J = det F."""
+        """Cauchy stress sigma = F S F^T / J, J = det F, positive in tension, shape (n, 3, 3), stress."""
         F = self.deformation_gradient
         return self.first_piola @ F.transpose(0, 2, 1) / (_det(F) * F[:, 2, 2])[:, None, None]
 
     @property
     def hydrostatic_pressure(self) -> np.ndarray:
-        """Hydrostatic pressure -tr(sigma)/3, shape (n,), stress."""
+        """Hydrostatic pressure -tr(sigma) / 3, sigma: Cauchy stress; positive in compression, shape (n,), stress."""
         return -np.trace(self.cauchy, axis1=1, axis2=2) / 3
 
     @property
     def principal_stretches(self) -> np.ndarray:
-        """Larger and smaller principal stretch in the section, then the hoop stretch, shape (n, 3)."""
+        """Larger and smaller principal stretch in the section, then the hoop stretch, shape (n, 3).
+
+        In plane strain the third stretch is the one out of plane, 1.
+        """
         F = self.deformation_gradient
         larger = (np.hypot(F[:, 0, 0] + F[:, 1, 1], F[:, 0, 1] - F[:, 1, 0])
                   + np.hypot(F[:, 0, 0] - F[:, 1, 1], F[:, 0, 1] + F[:, 1, 0])) / 2
@@ -80,10 +85,15 @@ class Stress:
         return np.sort(np.column_stack([mean + radius, mean - radius, s[:, 2, 2]]))[:, ::-1]
 
     def on_face(self, normal: Any) -> FaceStress:
-        """Return the Cauchy stress on faces through the points.
+        r"""Return the Cauchy stress on material faces through the points.
+
+        The unit normal n of a deformed face follows from its reference normal N (Nanson's formula):
+
+        .. math::
+            n = F^{-T} N / |F^{-T} N|
 
         Args:
-            normal: normals (N_R, N_Z) of the faces in the reference configuration, shape (2,) or (n, 2).
+            normal: normals (N_R, N_Z) of the faces in the reference configuration, of any length, shape (2,) or (n, 2).
 
         Returns:
             The stress on the deformed faces.
@@ -100,5 +110,5 @@ class Stress:
 
 
 def _det(F: np.ndarray) -> np.ndarray:
-    """Return the determinant of the first two rows and columns of deformation gradients F (n, 3, 3), shape (n,)."""
+    """Return the determinants of the upper left 2 x 2 blocks of deformation gradients F (n, 3, 3), shape (n,)."""
     return F[:, 0, 0] * F[:, 1, 1] - F[:, 0, 1] * F[:, 1, 0]

@@ -105,7 +105,7 @@ class Profile:
 
 
 def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the shortest distances of points from a polyline.
+    """Return the shortest distance of each point from a polyline.
 
     Args:
         points: positions, shape (m, 2), length.
@@ -121,7 +121,7 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 class Profiles:
-    """Computes the `Profile` of states of a sheet.
+    """Computes the `Profile` of a sheet in states of one problem.
 
     Args:
         problem: the discretised problem. Its mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
@@ -132,14 +132,18 @@ class Profiles:
         self._probe: Probe | None = None
 
     def evaluate(self, state: Any) -> Profile:
-        """Return the profile of a state; collective."""
+        """Return the profile of a state; collective.
+
+        Raises:
+            InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
+        """
         self._probe = faces = self._probe or self._make_probe()
         deformed = faces.points + faces.displacement_in(state)
         n = len(faces.points) // 2
         return Profile(faces.points[:n].copy(), faces.points[n:].copy(), deformed[:n], deformed[n:])
 
     def _make_probe(self) -> Probe:
-        """Return the `Probe` that evaluates displacements at the bottom points, then at the top points.
+        """Return the `Probe` that evaluates displacements at the bottom points, then at the opposite top points.
 
         Raises:
             InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
@@ -159,11 +163,11 @@ class Profiles:
 
 
 def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
-    """Return points along the curved edges of quadratic elements, which are parabolas through three nodes.
+    """Return points along the curved edges of quadratic elements; each edge is a parabola through its three nodes.
 
     Args:
-        line: nodes along the line of edges: end, middle, end, middle, ..., end, shape (n, 2), length.
-        parts: number of pieces of each edge.
+        line: nodes along successive edges: end, middle, end, middle, ..., end, shape (n, 2), length.
+        parts: number of equal parameter intervals into which each edge is divided.
 
     Returns:
         Points in order, shape (parts (n - 1) / 2 + 1, 2), length.

@@ -20,12 +20,13 @@ _LARGE_SHIFT = 0.1
 
 
 class Resticking(NamedTuple):
-    """Contact point with the largest distance along a tool between successive positions at which it stuck.
+    """Contact point that separated from its tool and stuck again furthest from its previous position.
 
     Attributes:
         tool: name of the tool, or of the face that touches it.
         points: number of points on this tool that separated and stuck again.
-        shift: sum of the distances between successive sticking positions, over the tributary length of the point.
+        shift: sum of the distances between successive sticking positions on the tool, over the tributary length of the
+            point.
         point: reference position (R, Z) of the point, length.
     """
 
@@ -36,10 +37,10 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the contact point with the largest distance between successive sticking positions; collective.
+    """Return the contact point with the largest `Resticking.shift` of all tools; collective.
 
-    A point that sticks again elsewhere changes the strain beside it by `Resticking.shift`. Whether a point separates
-    may depend on small changes of the forces. So this number also estimates the error due to the step lengths.
+    A point that sticks again elsewhere changes the strain beside it by its shift. Whether a point separates may depend
+    on small changes of the forces. So the shift also estimates the error of the wall due to the step lengths.
 
     Args:
         path: the computed `Path`. In a remeshed run only the states on the last mesh are examined.
@@ -64,11 +65,11 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return `Resticking.shift` of the n contact points that this rank owns, shape (n,).
+    """Return `Resticking.shift` of the n contact points that this rank owns, shape (n,), dimensionless.
 
     Args:
         contact: the `FaceContact`.
-        touches: history variables of its points in successive states, with `distance` (n,) and `position` (n, 2).
+        touches: `ContactHistory` of its points in successive states.
     """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
@@ -84,7 +85,7 @@ def findings(item: Resticking | None) -> list[Finding]:
     """Return a warning in a list if the wall depends on points that stick again elsewhere; else an empty list.
 
     Args:
-        item: result of `furthest`.
+        item: the contact point with the largest shift (`furthest`), or None.
     """
     if item is None or item.shift < _WALL_CHANGE:
         return []

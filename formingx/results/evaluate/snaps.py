@@ -18,10 +18,10 @@ class Snap(NamedTuple):
 
     Attributes:
         jumps: number of snap-throughs in the run.
-        state: number of the state of the path that follows this snap-through.
+        state: number of the first state of the path after this snap-through.
         ratio_before: wall over original thickness at this place before the snap-through.
         ratio_after: wall over original thickness at this place after the snap-through.
-        point: reference radius of this place, length.
+        point: reference radius R of this place, length.
     """
 
     jumps: int
@@ -39,14 +39,14 @@ class Snap(NamedTuple):
 def largest(path: Any) -> Snap | None:
     """Return the snap-through of a path in which the wall changed most; collective.
 
-    Only paths with friction or a viscoelastic material are examined. There the state after a snap-through depends on
-    the history.
+    Only problems with history variables are examined, such as those of friction and viscoelasticity. There the state
+    after a snap-through depends on the motion to it.
 
     Args:
         path: the computed `Path`.
 
     Returns:
-        The snap-through, or None if there was none or the body is not a sheet.
+        The snap-through, or None if there was none, or if the body is not a sheet with a wall.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:
@@ -70,7 +70,7 @@ def findings(snap: Snap | None) -> list[Finding]:
     """Return a warning in a list if the wall changed by 5 % or more in a snap-through; else an empty list.
 
     Args:
-        snap: result of `largest`.
+        snap: the snap-through in which the wall changed most (`largest`), or None.
     """
     if snap is None or snap.change < _WALL_CHANGE:
         return []

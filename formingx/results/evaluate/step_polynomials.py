@@ -27,7 +27,9 @@ class Polynomial(NamedTuple):
 
 
 def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomial:
-    """Return the polynomial with given values, and possibly slopes, at its ends: a cubic, parabola or straight line.
+    """Return the polynomial with given values at s = 0 and s = 1, and with given slopes there, if any.
+
+    It is a cubic with two slopes, a parabola with one, and a straight line without slopes.
 
     Args:
         a: value at s = 0, a number or an array.
@@ -46,5 +48,13 @@ def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomia
 
 
 def integral(f: Polynomial, y: Polynomial) -> float:
-    """Return the integral of f dy over 0 <= s <= 1, exact if f and y are cubics."""
+    r"""Return the integral of a force over a travel, exact if both are cubics; products of arrays are summed.
+
+    .. math::
+        \int_0^1 f \, \frac{dy}{ds} \, ds
+
+    Args:
+        f: the force as a polynomial.
+        y: the travel as a polynomial.
+    """
     return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

@@ -48,7 +48,7 @@ log = logging.getLogger("formingx")
 
 
 class StressField:
-    """Stresses of one state: projected on smooth fields (`at_points`), or as computed (`at_quadrature_points`).
+    """Stresses of one state: projected on continuous fields (`at_points`), or as computed (`at_quadrature_points`).
 
     Args:
         recovery: the `Stresses` of the problem.
@@ -68,10 +68,11 @@ class StressField:
 
         Args:
             points: reference positions (R, Z), shape (n, 2), length, equal on all ranks.
-            layer: name of a layer; optional if there is only one. At an interface it selects the side.
+            layer: name of the layer in which the points lie; optional if there is only one layer. At an interface it
+                selects the side.
 
         Returns:
-            The stresses at the n points.
+            The stresses at the n points, on all ranks.
 
         Raises:
             InputError: the layer is unknown, or a point lies outside it.
@@ -89,13 +90,15 @@ class StressField:
         return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
-        """Return the projected stresses at k points in each of this rank's m cells, from the layer of the cell.
+        """Return the projected stresses at k points in each of the m cells that this rank owns.
+
+        Each cell gets the field of its own layer.
 
         Args:
-            reference: the points in the reference cell of the elements, shape (k, 2).
+            reference: the points, as coordinates in the reference triangle, shape (k, 2).
 
         Returns:
-            The stresses at the m k points, cell by cell; their attribute `points` is 0.
+            The stresses at the m k points, cell by cell. `Stress.points` is not computed: all its entries are 0.
         """
         recovery = self._recovery
         owned = len(own_cells(recovery.problem.forms.domain))
@@ -113,22 +116,30 @@ class StressField:
         Args:
             layer: name of a layer; optional if there is only one.
 
+        Returns:
+            The stresses, cell by cell, on all ranks.
+
         Raises:
             InputError: the layer is unknown, or there are several and `layer` is None.
         """
         return self._recovery.raw(self._state, self._recovery.layer(layer))
 
     def error(self, layer: str | None = None, exact: Callable | None = None) -> StressError:
-        """Estimate the error of the stresses at the quadrature points, per cell and in total; collective.
+        r"""Estimate the error of the stresses in each cell and in total (Zienkiewicz and Zhu 1987); collective.
 
-        The error is the difference between the computed stress and a smoother stress, from a fit to patches of cells
-        (see the module). The integrals are sums over the quadrature points. For a smooth solution the estimate tends to
-        the true error on refined meshes. At a loaded sharp corner it does not decrease.
+        The error of a cell is the L2 norm, over its reference volume, of the difference between a smoother Cauchy
+        stress and the computed one:
+
+        .. math::
+            e_K^2 = \int_K |\sigma^* - \sigma_h|^2 \, dV
+
+        The smoother stress follows from cubics that are fitted to patches of cells. For a smooth solution the estimate
+        tends to the true error on refined meshes. At a loaded sharp corner it does not decrease.
 
         Args:
             layer: name of a layer; default all.
-            exact: exact Cauchy stress, shape (n, 3, 3), as a function of reference positions, shape (n, 2). With it,
-                the true error is returned.
+            exact: function that returns the exact Cauchy stress, shape (n, 3, 3), at reference positions, shape (n, 2).
+                It takes the place of the smoother stress, so the true error is returned.
 
         Returns:
             The errors of the cells.
@@ -140,7 +151,10 @@ class StressField:
         return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """Return `StressError.mean` of the m cells that this rank owns, estimated, shape (m,), stress; collective."""
+        """Return the estimated root mean square error of the stress in each of this rank's m cells, shape (m,), stress.
+
+        Collective.
+        """
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
@@ -176,12 +190,12 @@ class StressField:
 
     @cached_property
     def _fitted(self) -> Fitted:
-        """Deformation gradient and stress fitted to the patches of all locally owned cells."""
+        """Computed and fitted stress in the cells that this rank owns."""
         return self._recovery.fit(self._state)
 
 
 class Stresses:
-    """Computes the `StressField` of states; forms and matrix are created once, at first use.
+    """Computes the `StressField` of states of one problem; forms and mass matrix are created at first use.
 
     Args:
         problem: the discretised problem.
@@ -195,21 +209,30 @@ class Stresses:
         self._located: dict[str, tuple[np.ndarray, LocatedPoints]] = {}
 
     def evaluate(self, state: Any) -> StressField:
-        """Return the stresses of a state; collective."""
+        """Return the stresses of a state; collective.
+
+        Raises:
+            InputError: the body is a membrane.
+        """
         if not self._ready:
             self._prepare()
             self._ready = True
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
-        """Return the cells of a layer that contain points; the last result is stored; collective.
+        """Return the cells of a layer that contain points; collective.
+
+        The last result for each layer is stored, and returned again for the same points.
 
         Args:
             points: reference positions (R, Z), shape (n, 2), length.
             layer: name of the layer.
 
         Returns:
-            The cells and the positions in them.
+            Those of the points that lie in cells of this rank, with their cells and positions in the reference cell.
+
+        Raises:
+            InputError: a point lies outside the layer.
         """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
@@ -237,13 +260,13 @@ class Stresses:
         F and S are projected on piecewise linear fields, one for each layer. Collective.
 
         Returns:
-            Entries of F and S, shape (nodes, layers, _COUNT), ghosts included.
+            The nonzero entries of F (`BLOCK`), then of S (`_S`), shape (nodes, layers, entries), ghost nodes included.
         """
         with self.problem.state_context(state):
             return self._projected()
 
     def _projected(self) -> np.ndarray:
-        """Return the nodal values of `project` for the present unknowns of the problem; collective."""
+        """Return the nodal values of F and S (`project`) for the present unknowns of the problem; collective."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -278,13 +301,14 @@ class Stresses:
         return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.evaluate(cubics, points)), cubics)
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest fitted principal stress at the corners of each of this rank's m cells.
+        """Return for each of this rank's m cells the largest fitted principal Cauchy stress at its corners.
 
         Args:
             fitted: result of `fit`.
 
         Returns:
-            The stresses, shape (m,), and the positions (R, Z) of the corners, shape (m, 2), length.
+            The stresses, shape (m,), and the reference positions (R, Z) of the corners at which they occur, shape
+            (m, 2), length.
         """
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
@@ -294,7 +318,7 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Return True for each of this rank's m cells that lies in a layer, shape (m,).
+        """Return a mask of the cells that this rank owns, shape (m,): True if a cell lies in a layer.
 
         Args:
             name: name of the layer; None: all layers.
@@ -306,15 +330,15 @@ class Stresses:
         return np.isin(owned, self.cells[self.layer(name)]) if name is not None else np.ones(len(owned), dtype=bool)
 
     def _owned(self, layer: str) -> np.ndarray:
-        """Return the numbers of the locally owned cells of a layer."""
+        """Return the local numbers of the cells of a layer that this rank owns, shape (m,)."""
         return self.cells[layer][self.cells[layer] < len(own_cells(self.problem.forms.domain))]
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return F, S and volumes at the q quadrature points of each of this rank's m cells of a layer in a state.
 
         Returns:
-            Reference positions (R, Z), shape (m, q, 2), length. Entries of F and S, shape (m, q, _COUNT). Reference
-            volumes of the points, shape (m, q), length^3, in plane strain length^2.
+            Reference positions (R, Z), shape (m, q, 2), length. Nonzero entries of F, then of S, shape
+            (m, q, entries). Reference volumes (quadrature weights), shape (m, q), length^3, in plane strain length^2.
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -395,7 +419,7 @@ class Stresses:
         self._solver.setErrorIfNotConverged(True)
 
     def _idle(self) -> list:
-        """Return boundary conditions that set the nodal values of each layer's field outside this layer to 0."""
+        """Return Dirichlet conditions that set the field of each layer to 0 at the nodes outside this layer."""
         n = len(self.cells)
         if n == 1:
             return []
@@ -413,7 +437,7 @@ def _cauchy(values: np.ndarray) -> np.ndarray:
     """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
 
     Args:
-        values: entries of F (`BLOCK`), then of S (`_S`), shape (m, q, _COUNT).
+        values: nonzero entries of F (`BLOCK`), then of S (`_S`), shape (m, q, entries).
     """
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
@@ -424,7 +448,7 @@ def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
 
     Args:
         points: reference positions (R, Z), shape (n, 2), length.
-        values: entries of F (`BLOCK`), then of S (`_S`), shape (n, _COUNT).
+        values: nonzero entries of F (`BLOCK`), then of S (`_S`), shape (n, entries).
     """
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):

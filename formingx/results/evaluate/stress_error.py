@@ -20,7 +20,7 @@ class StressError(NamedTuple):
     stress. Volumes belong to the reference configuration and to the whole ring, in plane strain to unit depth.
 
     Attributes:
-        points: reference positions (R, Z) of the middles of the cells, shape (n, 2), length.
+        points: mean reference position (R, Z) of the quadrature points of each cell, shape (n, 2), length.
         volume: volumes of the cells, shape (n,), length^3.
         cells: root of the integral of |sigma* - sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
         stress: root of the integral of |sigma_h|^2 over each cell, shape (n,), stress * volume^(1/2).
@@ -43,27 +43,29 @@ class StressError(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """Relative error of the stress, between 0 and 1; 0 without stress.
+        r"""Relative error of the stress over all cells, between 0 and 1; 0 without stress.
 
-        It is `total` over the root of the integral of |sigma_h|^2 + |sigma* - sigma_h|^2.
+        .. math::
+            \eta = \left(\frac{\int |\sigma^* - \sigma_h|^2 \, dV}
+            {\int |\sigma_h|^2 + |\sigma^* - \sigma_h|^2 \, dV}\right)^{1/2}
         """
         scale = np.hypot(np.linalg.norm(self.stress), self.total)
         return float(self.total / scale) if scale > 0 else 0.0
 
 
 class StressPeak(NamedTuple):
-    """Largest principal Cauchy stress, and the cell in which the estimated error allows the largest one.
+    """Largest principal Cauchy stress of a state, and the largest one that the estimated errors allow in any cell.
 
-    The error of a cell is the largest |sigma* - sigma_h| at its quadrature points (Frobenius norm; sigma_h: computed,
-    sigma*: fitted stress).
+    The error of a cell is the largest |sigma* - sigma_h| at its quadrature points. |.| is the Frobenius norm, sigma_h
+    the computed and sigma* the fitted Cauchy stress.
 
     Attributes:
         value: largest fitted principal stress at a corner of a cell, stress.
         point: reference position (R, Z) of this corner, shape (2,), length.
-        error: largest error of the cells at this corner, stress.
-        doubtful: largest principal stress in the cell where principal stress plus error is largest, stress.
-        doubtful_point: reference position (R, Z) of the corner of this cell at which it occurs, shape (2,), length.
-        doubtful_error: error of this cell, stress.
+        error: largest error of the cells that have this corner, stress.
+        doubtful: largest principal stress of the cell in which the sum of this stress and the error is largest, stress.
+        doubtful_point: reference position (R, Z) of the corner at which `doubtful` occurs, shape (2,), length.
+        doubtful_error: error of the cell of `doubtful`, stress.
     """
 
     value: float
@@ -78,8 +80,8 @@ class StressPeak(NamedTuple):
         """Return the stress peak among n cells.
 
         Args:
-            sigma: largest principal stress at the corners of each cell, shape (n,), stress.
-            corners: reference position (R, Z) of the corner at which it occurs, shape (n, 2), length.
+            sigma: largest fitted principal stress at the corners of each cell, shape (n,), stress.
+            corners: reference position (R, Z) of the corner of each cell at which it occurs, shape (n, 2), length.
             error: error of each cell, shape (n,), stress.
         """
         top, worst = int(np.argmax(sigma)), int(np.argmax(sigma + error))
@@ -113,7 +115,7 @@ class Fitted(NamedTuple):
 
     Attributes:
         points: reference positions (R, Z) of the quadrature points, shape (m, q, 2), length.
-        volume: reference volumes of the quadrature points, shape (m, q), length^3.
+        volume: reference volumes of the quadrature points (quadrature weights), shape (m, q), length^3.
         raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
         smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.
         cubics: coefficients of the cubics fitted to the k entries of F and S (`Patches`), shape (m, 10, k).
@@ -129,8 +131,8 @@ class Fitted(NamedTuple):
         """Return the errors of the stress in this rank's cells (`StressField.error`).
 
         Args:
-            exact: exact Cauchy stress, shape (n, 3, 3), as a function of reference positions, shape (n, 2); default
-                the fitted stress.
+            exact: function that returns the exact Cauchy stress, shape (n, 3, 3), at reference positions, shape (n, 2);
+                default the fitted stress.
 
         Raises:
             InputError: `exact` is not a function, or returns another shape.

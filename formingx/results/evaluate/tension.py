@@ -41,15 +41,15 @@ class Resultant(NamedTuple):
 
 
 class Tension:
-    r"""Computes the principal stress resultants of a membrane, forces per deformed length.
+    r"""Computes the principal stress resultants of an incompressible membrane, forces per deformed length.
 
-    A layer of reference thickness h has the meridional stretch l1, the hoop stretch l2, the stretch l3 of the thickness
-    and the energy density W:
+    A layer has the reference thickness h, the meridional stretch l1, the hoop stretch l2, the stretch l3 of its
+    thickness, and the energy density W per reference volume. Its resultants N1 and N2 are
 
     .. math::
-        P = \partial W / \partial F, \qquad N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33})
+        N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33}), \qquad P = \partial W / \partial F
 
-    The resultants of all layers are added up.
+    The resultants of all layers are added.
 
     Args:
         problem: discretised problem of a scene whose model is a `Membrane`.
@@ -69,7 +69,10 @@ class Tension:
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def smallest(self, state: Any) -> Resultant:
-        """Return the smallest resultant in a state; in plane strain only resultants in the section; collective."""
+        """Return the smallest resultant in a state; collective.
+
+        In plane strain only the resultants in the section are examined, not those out of plane.
+        """
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
@@ -79,8 +82,8 @@ class Tension:
         """Return the hoop resultants along a membrane in a state, from the axis to the rim; collective.
 
         Returns:
-            Reference positions (R, Z) of n points, shape (n, 2), length; hoop forces per reference length of the
-            section, shape (n,), stress length.
+            Reference positions (R, Z) of n points, ordered by R, shape (n, 2), length; hoop forces per reference length
+            of the section, positive in tension, shape (n,), stress length.
         """
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
@@ -124,7 +127,7 @@ def findings(first: tuple[int, Resultant] | None) -> list[Finding]:
     """Return a finding on the first compression of a membrane in a list; empty without compression.
 
     Args:
-        first: result of `first_compression`.
+        first: number of the state and its smallest resultant (`first_compression`), or None.
     """
     if first is None:
         return []

@@ -20,7 +20,10 @@ _MAX_VOLUME_RATIO = 2.0
 
 
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
-    """Return a finding in a list if the elements do not keep their volumes in a state; else an empty list.
+    """Return a finding in a list if the root mean square of J - 1 exceeds 0.005 in a state; else an empty list.
+
+    The finding is a warning above 0.02, else a note. It is a note as well if only the corners of clamped faces
+    contribute to the error.
 
     Args:
         error: root mean square of J - 1 over the body.
@@ -50,7 +53,7 @@ def away_from_clamps(path: Any) -> float | None:
         path: the computed `Path`.
 
     Returns:
-        The error, or None without clamped faces.
+        The root mean square, or None without clamped faces.
     """
     faces, reach = _clamped(path)
     return path.problem.volume_error_away(path.last, faces, reach) if len(faces) else None
@@ -73,9 +76,9 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def extreme_ratio(path: Any) -> list[Finding]:
-    """Return a finding in a list if J is above 2 or below 1/2 at a point of the last state; else an empty list.
+    """Return a finding in a list if J is not between 1/2 and 2 at all points of the last state; else an empty list.
 
-    Collective.
+    It is a warning for J <= 0 away from clamped faces, else a note. Collective.
 
     Args:
         path: the computed `Path`.

@@ -24,8 +24,8 @@ class Wall(ColumnTable):
 
     Attributes:
         profile: reference and deformed positions of opposite points on both faces.
-        layers: {name of a layer: its fraction of the wall, shape (n,)}, from the bottom up. The fractions are measured
-            along the material line from a bottom point to the opposite top point.
+        layers: {name of a layer: its fraction of the wall, 0 to 1, shape (n,)}, from the bottom up. The fractions are
+            measured along the material line from a bottom point to the opposite top point.
         comm: MPI communicator of the run.
     """
 
@@ -35,7 +35,7 @@ class Wall(ColumnTable):
 
     @property
     def reference_radius(self) -> np.ndarray:
-        """Reference radius R, shape (n,), length."""
+        """Reference radius R of the nodes, shape (n,), length."""
         return self.profile.reference_radius
 
     @property
@@ -55,7 +55,10 @@ class Wall(ColumnTable):
 
     @property
     def height(self) -> np.ndarray:
-        """Axial distance of the middle line from the pole, shape (n,), length; without a pole from its lowest point."""
+        """Axial distance of the middle line from the pole, never negative, shape (n,), length.
+
+        Without a pole it is the distance from the lowest point of the middle line.
+        """
         return np.abs(self.z - self.z[0]) if abs(self.r[0]) <= 1e-9 * np.ptp(self.r) else self.z - self.z.min()
 
     @cached_property
@@ -76,9 +79,9 @@ class Wall(ColumnTable):
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}
 
     def at_height(self, height: float) -> float:
-        """Return the wall at a height, interpolated linearly between nodes, length.
+        """Return the wall thickness at a height, interpolated linearly between nodes, length.
 
-        If the middle line passes the height several times, the smallest wall is returned.
+        If the middle line passes the height several times, the smallest thickness is returned.
 
         Args:
             height: height of the middle line (`Wall.height`), length.
@@ -107,7 +110,11 @@ class Walls:
         self._lines: tuple[list[str], Any] | None = None
 
     def evaluate(self, state: Any) -> Wall:
-        """Return the wall in a state; collective."""
+        """Return the wall in a state; collective.
+
+        Raises:
+            InputError: the body is not a sheet, or its layers do not lie above each other.
+        """
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}
@@ -125,14 +132,17 @@ class Walls:
 
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
-    """Return the points at which the lines from bottom to top points of a sheet cross the k interfaces of its layers.
+    """Return the points at which straight lines across a sheet cross the k interfaces of its layers.
+
+    Each line goes from a bottom point to the opposite top point, in the reference configuration.
 
     Args:
         mesh: the mesh.
         profile: outline of the sheet with n pairs of opposite points.
 
     Returns:
-        Names of the layers from the bottom up, and the reference positions of the crossings, shape (k, n, 2), length.
+        Names of the k + 1 layers from the bottom up, and the reference positions of the crossings, interface by
+        interface, shape (k, n, 2), length.
 
     Raises:
         InputError: the layers do not lie above each other.

@@ -54,7 +54,7 @@ class _Reaction(NamedTuple):
 
 
 class EnergyBalance:
-    """Energy balance of the states of one problem, for the whole part.
+    """Energy balance of the states of one problem, for the whole part also if a half or a quarter is modelled.
 
     Args:
         segment: the `Segment` with the problem and its states.
@@ -73,7 +73,12 @@ class EnergyBalance:
         self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
-        """Return {entry: energy added from the previous state to each state, shape (states,)}."""
+        """Return the energies that are added between successive states; collective.
+
+        Returns:
+            {entry: energy added from the previous state to each state, shape (states,)}, stress length^3; in plane
+            strain stress length^2. The first value is 0.
+        """
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._step_energies(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
@@ -86,13 +91,13 @@ class EnergyBalance:
 
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _MAX_HALVINGS) -> dict[str, float]:
-        """Return the energies of a step, computed with further states between its ends.
+        """Return the energies of a step, computed with further states between its ends; collective.
 
         Args:
             a: state at the start of the step.
             b: state at its end.
             estimate: {entry: energy added in the step}, computed without further states.
-            small: change of the sum of energies below which halving ends.
+            small: change of the sum of the energies up to which a half is not halved again, stress length^3.
             times: largest number of halvings.
 
         Returns:
@@ -110,7 +115,7 @@ class EnergyBalance:
     def _middle(self, a: Any, b: Any) -> Any:
         """Return a state near the middle of the step from state a to state b, or None if none is found; collective.
 
-        It is solved for from a, with its history variables.
+        It is solved for with the history variables of a, which are then advanced to it.
         """
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
@@ -239,9 +244,9 @@ class EnergyBalance:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the numbers of the displacement unknowns of a contact face, locally owned, shape (n, 2).
+        """Return the numbers of the locally owned displacement unknowns at the n nodes of a contact face, shape (n, 2).
 
-        If several contacts share the face, only the unknowns of the closed points are returned.
+        If several contacts share the face, only the nodes that touch the tool of this contact are returned.
 
         Args:
             contact: the `FaceContact`.
@@ -255,7 +260,7 @@ class EnergyBalance:
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _at_ramp_edge(self, state: Any) -> bool:
-        """Return True if a contact point lies at the outer edge of the contact ramp, where the tool begins to resist.
+        """Return True if a contact point lies near the outer edge of the contact ramp, where contact forces begin.
 
         Collective.
         """
@@ -267,7 +272,7 @@ class EnergyBalance:
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy that friction dissipates on the body as modelled in the step from state a to state b.
 
-        It is the mean traction times the inelastic slip, summed over the areas of the closed points.
+        It is the sum over all contact points of area, mean tangential traction, and increment of the inelastic slip.
         """
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
@@ -283,9 +288,9 @@ class EnergyBalance:
         return lost
 
     def _heat(self, a: Any, b: Any) -> float:
-        """Return the stored energy that the change of temperature adds in the step from state a to state b.
+        """Return the energy that the change of temperature stores in the body as modelled, from state a to state b.
 
-        The displacements are constant: those of a and those of b, with equal weights (trapezoidal rule).
+        It is the mean of two changes at constant displacements: at those of a, and at those of b.
         """
         cold, warm = a.history_variables[-1], b.history_variables[-1]        # the temperature is last
 
@@ -295,12 +300,12 @@ class EnergyBalance:
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:
-        """Return the energy stored in the body as modelled in a state."""
+        """Return the energy stored in the body as modelled and its elastic supports in a state; collective."""
         with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
-        """Return the energy stored in the contacts with adhesive tools in a state."""
+        """Return the energy stored in the contacts with adhesive tools, on the body as modelled, in a state."""
         with self._problem.state_context(state) as p:
             return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.pulls)
 
@@ -310,7 +315,7 @@ class EnergyBalance:
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """Return the energies of a step as gains of the body: external work, and losses with a minus sign.
+    """Return the energies of a step as gains of the body: work on the body is positive, a loss negative.
 
     Args:
         row: {entry: energy added in the step}.
@@ -319,7 +324,7 @@ def _gains(row: dict[str, float]) -> list[float]:
 
 
 def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
-    """Return the unbalanced energy of a step from state a to state b: gains minus stored and dissipated energy.
+    """Return the unbalanced energy of the step from state a to b: gains minus changes of stored and dissipated energy.
 
     Args:
         row: {entry: energy added in the step}.
@@ -336,16 +341,18 @@ def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
 
 
 def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarray:
-    """Return the slip of n contact points that move along straight lines, while they touch the tool, shape (n,).
+    """Return the elastic slip of n contact points at the start of a step, plus their slip in the step.
+
+    The points move along straight lines. Only the part of the motion in which a point touches the tool counts.
 
     Args:
         law: the contact law.
-        x: positions relative to the tool at the start of the step, shape (n, 2).
-        history: history variables of the points at the start of the step.
-        end: positions relative to the tool at the end of the step, shape (n, 2).
+        x: positions relative to the tool at the start of the step, shape (n, 2), length.
+        history: `ContactHistory` of the points at the start of the step.
+        end: positions relative to the tool at the end of the step, shape (n, 2), length.
 
     Returns:
-        Slip so far, in the units of `history.slip`.
+        Slip along the tangent of the tool, shape (n,), length.
     """
     nearest, outer_edge = law.nearest(end), -law.theta
     touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
@@ -374,6 +381,15 @@ def work(path: Any) -> dict[str, np.ndarray]:
     """Return the energy balance of a run, and log a warning if it does not close (`Path.work`); collective.
 
     The warning is added to the findings of the path.
+
+    Args:
+        path: the computed `Path`.
+
+    Returns:
+        {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
+
+    Raises:
+        InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
     """
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
@@ -383,10 +399,10 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return a finding in a list if an energy balance is off by more than 0.5 % of its largest entry; else [].
+    """Return a warning in a list if more than 0.5 % of the largest entry of an energy balance is unbalanced; else [].
 
     Args:
-        balanced: result of `balance`.
+        balanced: {entry: energy up to each state}, the result of `balance`.
     """
     size = max(float(np.abs(values).max()) for values in balanced.values())
     unbalanced = np.abs(balanced["unbalanced"])
