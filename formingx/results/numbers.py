@@ -14,16 +14,16 @@ def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
 
     Args:
         point: the coordinates, length.
-        points: coordinates of points of the body, any shape, length.
+        points: coordinates of points of the body, any shape, length; their range is the scale of round-off.
 
     Returns:
-        The coordinates. Values below 1e-12 times the range of the numbers in `points` are set to 0.
+        The coordinates. Those with a magnitude of at most 1e-12 times that range are 0.
     """
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 class KeyNumbers:
-    """Base class of sets of numbers that print as a table, one row per number.
+    """Base class of sets of key numbers; as text, a set is a table with one row per number.
 
     Attributes:
         units: units of the printed values.
@@ -81,7 +81,7 @@ class PartNumbers(KeyNumbers):
 
     @property
     def weight_label(self) -> str:
-        """Label of the weight in the printed table; it says if lengths without a unit were taken for cm."""
+        """Label of the weight in the printed table; it says so if lengths have no unit and are taken for cm."""
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:

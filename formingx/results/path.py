@@ -59,7 +59,10 @@ class Path(States):
         return worst_first([*self.record.findings, *(findings_at("end", self) if self.states else [])])
 
     def profile(self, state: State | None = None) -> Profile:
-        """Return the deformed outline and the thickness of a sheet in a state (default: the last); collective.
+        """Return the deformed outline and the thickness of a sheet; collective.
+
+        Args:
+            state: a state of the path; default the last.
 
         Raises:
             InputError: the mesh has no two faces of a sheet, or the sheet is in three dimensions.
@@ -68,10 +71,16 @@ class Path(States):
         return self._view(self.segment(state)).profiles.evaluate(state)
 
     def stress(self, state: State | None = None) -> StressField:
-        """Return the stresses and stretches in a state (default: the last), layer by layer; collective.
+        """Return the stresses and stretches of a solid body, layer by layer; collective.
+
+        Args:
+            state: a state of the path; default the last.
+
+        Returns:
+            The stress field; its `at_points` gives the stresses at reference positions.
 
         Raises:
-            InputError: the body is a sheet in three dimensions.
+            InputError: the body is a membrane, or a sheet in three dimensions.
         """
         self.section_only("stress", "look at path.wall(): stretches")
         state = state or self.last
@@ -80,11 +89,12 @@ class Path(States):
     def to_csv(self, file: Any, units: Units | None = None) -> None:
         """Write a CSV file with one row per state (rank 0 writes).
 
-        The columns are the stage (of a process), the kind of state, the iterations and every output quantity.
+        The columns are the stage (of a process), the kind of state, the number of Newton iterations, and every output
+        quantity.
 
         Args:
             file: its name ends in .csv.
-            units: units for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]".
+            units: units for the header, as in "tool_force [N]"; in plane strain "tool_force [N/mm]"; default none.
 
         Raises:
             InputError: the name has another ending.
@@ -109,16 +119,16 @@ class Path(States):
         writer.end("", self.findings())
 
     def to_vtk(self, file: Any, states: Any = None) -> None:
-        """Write the fields of states for ParaView, one time step per state.
+        """Write displacements, stresses and other fields of states for ParaView, one time step per state.
 
-        The fields are listed in `formingx.results.files.fields`. State 3 of the path is written to run-3.vtu, beside
-        run.pvd, which lists the time steps. The time is the number of the state. States of a remeshed run have their
-        own meshes.
+        The module `formingx.results.files.fields` lists the fields. For the file run.pvd, state 3 of the path is
+        written to run-3.vtu; run.pvd lists the time steps. The time in ParaView is the number of the state. States of a
+        remeshed run have their own meshes.
 
         Args:
             file: its name ends in .pvd.
-            states: a state, several in order, or "all"; default the last. States solved for by `Path.state_at` are
-                numbered in the given order.
+            states: a state, a sequence of states, or "all"; default the last. States that `Path.state_at` solved for
+                are numbered in the given order.
 
         Raises:
             InputError: the name has another ending, or `states` has an entry that is not a `State`.
@@ -137,8 +147,8 @@ class Path(States):
         Args:
             file: its name ends in .gif or .mp4.
             frames: number of frames.
-            seconds: duration, s.
-            units: units for the labels.
+            seconds: duration without that last second, s.
+            units: units for the labels; default none.
 
         Returns:
             The file, which a notebook shows.
@@ -159,8 +169,8 @@ class Path(States):
         Args:
             file: its name ends in .html.
             title: heading of the page.
-            failure: the `ConvergenceError` that ended the run, if one did.
-            units: units for the labels.
+            failure: the `ConvergenceError` that ended the run, or None.
+            units: units of the script, for the labels; default none.
             density: density of the material for the weight of the part, g/cm3 (`Path.part`).
             trim: place at which the part is cut off (`Path.part`).
 
@@ -190,7 +200,12 @@ class Path(States):
         return plots.curve(self, y, x, axes, **style)
 
     def plot_convergence(self, axes: Axes | None = None) -> Any:
-        """Draw the relative correction in every Newton iteration (Song 1993, eq. 3.5.1), one line per state.
+        r"""Draw the relative correction of the unknowns x in every Newton iteration, one line per state.
+
+        It is the measure of convergence of Song 1993, eq. (3.5.1):
+
+        .. math::
+            |\Delta x| / |x|
 
         Args:
             axes: matplotlib axes; default new ones.
@@ -202,14 +217,15 @@ class Path(States):
         return plots.convergence(self, axes)
 
     def view3d(self, file: Any, state: State | None = None, grid: float | None = None) -> Picture:
-        """Draw the sheet in a state as a PNG file, coloured by thickness.
+        """Draw the deformed sheet as a PNG file, coloured by its wall thickness over the original thickness.
 
         An axisymmetric sheet is revolved about the axis, a sheet in plane strain is extruded.
 
         Args:
             file: its name ends in .png.
-            state: default the last.
-            grid: size of the squares printed on the flat sheet, length; for a sheet in three dimensions.
+            state: a state of the path; default the last.
+            grid: for a sheet in three dimensions: size of the squares of a grid that is printed on the flat sheet,
+                length; default no grid.
 
         Returns:
             The picture, which a notebook shows.
@@ -221,7 +237,10 @@ class Path(States):
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:
-        """Return the wall thickness of the part in a state (default: the last) as a table; collective.
+        """Return the wall thickness of the part as a table; collective.
+
+        Args:
+            state: a state of the path; default the last.
 
         Returns:
             A `Wall`, from the axis to the rim. In three dimensions a `SheetWall`, triangle by triangle. Both have
@@ -239,14 +258,14 @@ class Path(States):
         They belong to the whole part, also if a half or a quarter is modelled. In plane strain they are per unit depth.
 
         Args:
-            state: default the last.
+            state: a state of the path; default the last.
             density: density of the material, g/cm3, for the weight in grams. It refers to the reference configuration,
                 under `ThermalExpansion` to the temperature of zero thermal strain. Give `units`, too: lengths without a
                 unit count as cm.
             trim: radius at which the part is cut off, or ("height", h), length. The cut lies where the middle line
                 passes this radius or height for the last time on its way from the axis to the rim. In three dimensions
                 a z coordinate beyond which the part lies.
-            heights: heights at which the wall is given, too (`Wall.height`), length.
+            heights: heights (`Wall.height`) at which the wall is listed in `Part.walls`, length.
             units: units of the script.
 
         Returns:
@@ -258,26 +277,26 @@ class Path(States):
         return self._reader.part(state or self.last, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:
-        """Return the remaining gap in each corner of a tool, state by state.
+        """Return the remaining gap between the body and each corner of a tool, state by state; collective.
 
         Args:
-            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one.
+            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one tool.
 
         Returns:
             A `Filling`; its `pressure_at` gives the pressure at which a gap is reached.
 
         Raises:
-            InputError: there is no such tool, or it has no corner that the body must fill.
+            InputError: there is no such tool, it has no corner that the body must fill, or the run has several meshes.
         """
         from .evaluate.contact_face import contact_of
         return self._reader.filling(contact_of(self, tool, "filling")[0])
 
     def contact(self, tool: Any = None, state: State | None = None) -> Any:
-        """Return the contact pressure, friction and gap along the face that touches a tool.
+        """Return the contact pressure, friction and gap along the face that touches a tool; collective.
 
         Args:
-            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one.
-            state: default the last.
+            tool: name of the tool, the `Tool` or the `Contact`; may be left out if there is only one tool.
+            state: a state of the path; default the last.
 
         Returns:
             A `ContactTable`, with `to_csv` and `to_excel`.
@@ -291,14 +310,14 @@ class Path(States):
         return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).evaluate(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
-        """Return the temperature of material points in a state.
+        """Return the temperature of material points in a state; collective.
 
         Args:
             points: reference positions (R, Z), shape (n, 2), length.
-            state: default the last.
+            state: a state of the path; default the last.
 
         Returns:
-            Temperatures, shape (n,).
+            Temperatures, shape (n,), in the unit of the scene.
 
         Raises:
             InputError: the scene has no temperature, or a point lies outside the body.
@@ -310,9 +329,11 @@ class Path(States):
             return problem.temperature.at_points(problem.followed(as_points("Path.temperature: points", points)))
 
     def tool_forces(self) -> dict[str, np.ndarray]:
-        """Return the force on each whole tool in all states.
+        """Return the force of the body on each tool in all states.
 
-        A force is positive if it resists the travel of the tool. The force on a fixed tool is its Z component.
+        The force on a moving tool is taken along its travel, positive if it resists the travel. The force on a fixed
+        tool is taken along Z, positive if the body pushes the tool up. Forces belong to the whole tool, also if a half
+        or a quarter is modelled.
 
         Returns:
             {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.
@@ -321,9 +342,10 @@ class Path(States):
         return tool_forces(self)
 
     def work(self) -> dict[str, np.ndarray]:
-        """Return the energy balance of the whole part, state by state.
+        """Return the energy balance of the whole part, state by state; collective.
 
-        The images of a modelled half or quarter and their tools are included. The entries are:
+        The balance is: work + other energies added = stored + lost + unbalanced. It belongs to the whole part, also if
+        a half or a quarter is modelled. The entries are:
 
         Work of each load, each driven support and each moving tool, under the name of its column. The work of a fixed
         load is "pressure_on_bottom" or similar; a support without a name is "support".
@@ -334,8 +356,8 @@ class Path(States):
         Stored: "strain_energy" minus its first value. Lost: "dissipated_energy" and "damage_energy" of materials,
         "friction", "jumps" (in snap-through), and "bonds" to adhesive tools.
 
-        "unbalanced": work minus stored and lost energy, an error of the integrals and of the run. Above 0.5 % of the
-        largest entry a warning is logged and added to the `findings`.
+        "unbalanced": the rest, an error of the integrals and of the run. Above 0.5 % of the largest entry a warning is
+        logged and added to the `findings`.
 
         Returns:
             {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
@@ -352,7 +374,7 @@ class Path(States):
 
         Args:
             file: its name ends in .stl.
-            state: default the last.
+            state: a state of the path; default the last.
 
         Raises:
             InputError: the name has another ending, or the body is not a sheet.
@@ -369,11 +391,12 @@ class Path(States):
 
         Args:
             file: its name ends in .inp.
-            state: default the last.
+            state: a state of the path; default the last.
             parts: number of elements round the axis.
 
         Raises:
-            InputError: plane strain, fewer than 3 parts, or the mesh is not a sheet.
+            InputError: the name has another ending, the body is not an axisymmetric sheet, or `parts` is below 3.
+            OSError: the file cannot be written.
         """
         from .files.shells import to_inp
         self.section_only("to_inp", "use shell_model")
@@ -386,7 +409,7 @@ class Path(States):
 
         Args:
             file: its name ends in .glb.
-            state: default the last.
+            state: a state of the path; default the last.
             units: units of the script; glTF is in metres, and lengths without a unit count as metres.
 
         Raises:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Reader(Protocol):
-    """Interface of the class that evaluates the states of one path."""
+    """Interface of classes that evaluate the states of one path for one kinematics: section or three dimensions."""
 
     def wall(self, state: State) -> ColumnTable:
         """Return the wall thickness of the part in a state as a table, one row per point or triangle."""
@@ -41,13 +41,13 @@ class Reader(Protocol):
         """Return the part in a state as a closed surface of triangles.
 
         Returns:
-            Points, shape (n, 3), length; for each triangle the rows of its corners in the points, shape (m, 3); wall
+            Points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall
             over original thickness at the points, shape (n,).
         """
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
                trim: object) -> FilePath:
-        """Write the report of the run; for the arguments see `Path.report`."""
+        """Write the report of the run, and return its path; for the arguments see `Path.report`."""
 
 
 class SectionReader:
@@ -62,7 +62,7 @@ class SectionReader:
         self._axisymmetric = path.scene.kinematics.axisymmetric
 
     def wall(self, state: State) -> Wall:
-        """Return the wall thickness along the section of the part in a state."""
+        """Return the wall thickness along the section in a state."""
         return self._walls.evaluate(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:
@@ -89,7 +89,7 @@ class SectionReader:
         draw(self._path.profile(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the revolved or extruded section in a state (`Reader.solid`)."""
+        """Return the closed surface of the revolved or extruded section in a state, as `Reader.solid` describes it."""
         from .files.solid import coloured
         return coloured(self._path.profile(state), self._axisymmetric)
 

@@ -30,12 +30,17 @@ _ROUNDING_ERROR = 5e-6
 
 
 class _View:
-    """Objects that evaluate the states of one problem; for the arguments see `States`.
+    """Objects that evaluate the states of one problem.
+
+    Args:
+        problem: the discretised problem.
+        timed: True if the process time is a column.
+        columns: {name: quantity} of the user's columns.
 
     Attributes:
         columns: {name of a column: its quantity}.
-        profiles: evaluates the `Profile` of a state.
-        stresses: evaluates the `StressField` of a state.
+        profiles: computes the `Profile` of a state.
+        stresses: computes the `StressField` of a state.
         admissibility: checks whether a state is admissible.
     """
 
@@ -52,8 +57,8 @@ class States:
     Args:
         record: the solver's record of the run (`formingx.solve.record.Record`).
         timed: True if the process time is a column.
-        columns: {name: quantity} of further columns that the user asked for (`formingx.trace(record=)`).
-        other: path that shares the objects that evaluate its states, if it has the same columns; or None.
+        columns: {name: quantity} of further columns that the user asked for (`formingx.trace(record=)`); default none.
+        other: another path on the same problems, or None. If it has the same columns, its compiled forms are used.
 
     Attributes:
         record: the solver's record of the run.
@@ -71,7 +76,7 @@ class States:
 
     @property
     def segments(self) -> list[Segment]:
-        """Segments of the run, each with the problem on one mesh and its states; one unless the run was remeshed."""
+        """Segments of the run in order, each with the problem on one mesh and its states; one without remeshing."""
         return self.record.segments
 
     @property
@@ -111,24 +116,24 @@ class States:
 
     @property
     def columns(self) -> list[str]:
-        """Names of the output quantities (columns) that every state has.
+        """Names of the output quantities (columns) that both the first and the last state have.
 
-        A run that was continued from a checkpoint may add columns, which earlier states lack.
+        A run that was continued from a checkpoint may add columns. Earlier states lack them, so they are not named.
         """
         return [name for name in self.states[0].measures if name in self.last.measures] if self.states else []
 
     @property
     def limit_points(self) -> list[State]:
-        """States at which the control has a maximum or a minimum along the path."""
+        """States at which the load parameter (control) has a maximum or a minimum along the path."""
         return [state for state in self.states if state.kind == "limit point"]
 
     @property
     def branch_points(self) -> list[tuple[State, State]]:
         """Pairs of successive states between which the path has a branch point (bifurcation).
 
-        There the determinant of the tangent changes its sign without a limit point. So only axisymmetric modes (n = 0)
-        and only an odd number of them are found; `Path.stability` finds all. The list is empty for materials with
-        history variables.
+        There the determinant of the tangent stiffness changes its sign without a limit point. So only modes in the
+        section (axisymmetric, n = 0) and only an odd number of them are found; `Path.stability` finds all. The list is
+        empty for materials with history variables.
         """
         return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
 
@@ -148,10 +153,10 @@ class States:
         return self.record.last
 
     def met(self, target: Target) -> State | None:
-        """Return the state in which the run met a target, or None if no state met it.
+        """Return the state in which the run met one of its targets exactly, or None if no state met it.
 
         Args:
-            target: a target of the run (`until` or `intermediate`).
+            target: a target of the run (`until` or `intermediate`), or an equal one.
         """
         return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
 
@@ -160,7 +165,7 @@ class States:
 
         Args:
             measure: name of a column, or a quantity bound to the problem of the state (`Target.bind`).
-            state: a state of this path, or one that was solved for by `Path.state_at`.
+            state: a state of this path, or one that `Path.state_at` solved for.
 
         Raises:
             InputError: there is no such column.
@@ -177,8 +182,7 @@ class States:
 
         Args:
             stage: name of a stage; default any.
-            time: process time; default the end of the stage, or of the run. A state is solved for if none lies at this
-                time.
+            time: process time, for which a state is solved if none has it; default the end of the stage or run.
 
         Raises:
             InputError: there is no such stage, or it does not reach that time.
@@ -204,15 +208,16 @@ class States:
     def state_at(self, target: Target, after: State | None = None) -> State:
         """Return the first state of the path that meets a target.
 
-        The state is solved for between two states of the path, not interpolated; it is not added to the path. A target
-        beyond the last state by less than 5e-6 of its value, such as a rounded value, is accepted.
+        It is solved for between two states of the path, not interpolated, and is not added to the path. A target may
+        lie beyond the last state by 5e-6 of its value, such as a rounded value.
 
         Args:
             target: the target, for example `pressure(0.4)`.
             after: a state of the path; only the path beyond it is searched, for example beyond a limit point.
 
         Raises:
-            InputError: the path does not pass through that value, or `after` is not a state of the path.
+            InputError: the path does not pass through that value, the stage controls an output quantity in time, or
+                `after` is not a state of the path.
             ConvergenceError: two states enclose the value, but the solver did not converge between them.
         """
         if after is not None and after not in self.states:
@@ -254,14 +259,14 @@ class States:
             f"its values lie between {min(values):.9g} and {max(values):.9g}" if values else "it has one state there"))
 
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
-        """Return the state that meets a target between two successive states.
+        """Return the state that meets a target between two successive states, with its output quantities.
 
         Args:
             segment: the segment of both states.
-            left: the first state.
-            right: the second state.
+            left: the first of the two states.
+            right: the second of the two states.
             target: the target.
-            bound: the quantity of the target, bound to the problem.
+            bound: the quantity of the target, bound to the problem of the segment.
 
         Raises:
             InputError: the stage controls an output quantity, so it cannot be restarted between states.
@@ -277,9 +282,9 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
-        """Return the state that a run from the first state reaches at the target, with its history variables.
+        """Return the state that meets a target, from a run that starts at the first of two successive states.
 
-        The arguments are those of `_between`.
+        So it has the history variables of a run. The arguments are those of `_between`.
 
         Raises:
             InputError: the stage controls an output quantity, so it cannot be restarted between states.
@@ -306,9 +311,10 @@ class States:
         return record.last
 
     def interpolate(self, a: State, b: State, fraction: float) -> State:
-        """Return a state interpolated on the cubic path between two successive states, for drawing.
+        """Return a state interpolated between two successive states, for drawing; it is not in equilibrium.
 
-        It is not in equilibrium. Between two stages, the second state is returned.
+        Unknowns and control follow the cubic through both states and their tangents; the rest is copied from `b`. If
+        `b` begins another stage, it is returned unchanged.
 
         Args:
             a: a state of the path.
@@ -321,9 +327,9 @@ class States:
         return replace(b, x=x, control=control)
 
     def distance(self, a: State, b: State) -> float:
-        """Return the arc length from a state to the next one, measured along the tangent of the path, dimensionless.
+        """Return the distance from a state to the next one in the metric of arc length, dimensionless.
 
-        It is 0 between two stages.
+        The difference of both states is projected on the tangent of the path. Between two stages the distance is 0.
 
         Args:
             a: a state of the path.
@@ -332,17 +338,17 @@ class States:
         return self.segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
 
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
-        """Return the values of columns at points along a smooth curve through the states, for drawing.
+        """Return the values of columns at m points along a smooth curve through the states, for drawing.
 
-        Quantities that depend on displacements and control alone follow the cubic path between two states. Other
-        columns, such as forces and energies, follow a monotone cubic in arc length through their values.
+        Smooth functions of displacements and control, such as a height, are evaluated on the cubic path between two
+        states. Other columns, such as forces and energies, follow a monotone cubic in arc length through their values.
 
         Args:
             columns: names of columns.
             points: number of intervals from one state to the next.
 
         Returns:
-            A list with the values of each column, shape (m,).
+            For each column its values, shape (m,), in the units of the script.
 
         Raises:
             InputError: there is no such column.
@@ -356,9 +362,9 @@ class States:
         return list(np.array(rows).T)
 
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
-        """Return the values of columns along successive states of one stage, one row per point (`curve`).
+        """Return one row of values for each point of `curve` but the first, along successive states of one stage.
 
-        The point of the first state is left out.
+        The arguments are those of `curve`, and the segment of the states.
         """
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns
@@ -379,7 +385,7 @@ class States:
         return rows
 
     def describe(self, state: State) -> str:
-        """Return the main numbers of a state as one line of text, for messages."""
+        """Return the main numbers of a state as one line of text."""
         return self.record.describe(state)
 
     def _check(self, *names: str) -> None:
@@ -393,12 +399,12 @@ class States:
                 raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     def _measure(self, state: State) -> None:
-        """Compute the output quantities of a newly accepted state; the run calls this function."""
+        """Compute `State.measures` of a newly accepted state; the run calls this function (`RunHooks.on_state`)."""
         segment = self.segments[-1]
         self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
-        """Compute `State.measures` of the last of successive states of a segment."""
+        """Compute `State.measures` of the last of successive states of a segment, the dissipated energy included."""
         state = states[-1]
         state.measures = self._measures(segment, state)
         if "dissipated_power" in state.measures:
@@ -407,19 +413,19 @@ class States:
                 + dissipated_energy(segment, states, self._view(segment).columns["dissipated_power"]))
 
     def _measures(self, segment: Segment, state: State) -> dict[str, float]:
-        """Return {column: value} of a state, without the dissipated energy."""
+        """Return {column: value} of a state in the units of the script, without the dissipated energy."""
         columns = self._view(segment).columns
         with segment.problem.state_context(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
     def segment(self, state: State | None = None) -> Segment:
-        """Return the segment of the run on whose mesh a state lies; default the segment of the last state."""
+        """Return the segment of the run with the mesh of a state; default the mesh of the last state."""
         mesh = (state or self.last).setting.get("mesh", 0)
         return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
                     self.segments[-1])
 
     def same_mesh(self, state: State) -> Any:
-        """Return a path of the states on the mesh of a given state; the path itself if the run has one mesh."""
+        """Return a path of all states on the mesh of a given state; this path itself if the run has one mesh."""
         if len(self.segments) == 1:
             return self
         segment = self.segment(state)
@@ -429,7 +435,7 @@ class States:
 
     @property
     def admissibility(self) -> AdmissibilityCheck:
-        """Check of the states on the last mesh for admissibility."""
+        """Object that checks whether states on the last mesh are admissible."""
         return self._view(self.segments[-1]).admissibility
 
     def _view(self, segment: Segment) -> _View:

@@ -90,9 +90,7 @@ class StressField:
         return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
-        """Return the projected stresses at k points in each of the m cells that this rank owns.
-
-        Each cell gets the field of its own layer.
+        """Return the projected stresses of the cell's own layer at k points in each of the m cells that this rank owns.
 
         Args:
             reference: the points, as coordinates in the reference triangle, shape (k, 2).
@@ -151,10 +149,7 @@ class StressField:
         return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """Return the estimated root mean square error of the stress in each of this rank's m cells, shape (m,), stress.
-
-        Collective.
-        """
+        """Return `StressError.mean`, estimated, in the m cells that this rank owns, shape (m,), stress; collective."""
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
@@ -437,19 +432,14 @@ def _cauchy(values: np.ndarray) -> np.ndarray:
     """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
 
     Args:
-        values: nonzero entries of F (`BLOCK`), then of S (`_S`), shape (m, q, entries).
+        values: the k nonzero entries of F (`BLOCK`), then of S (`_S`), shape (m, q, k).
     """
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
-    """Return the `Stress` at points.
-
-    Args:
-        points: reference positions (R, Z), shape (n, 2), length.
-        values: nonzero entries of F (`BLOCK`), then of S (`_S`), shape (n, entries).
-    """
+    """Return the `Stress` at reference positions, shape (n, 2); values: entries as in `_cauchy`, shape (n, k)."""
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]

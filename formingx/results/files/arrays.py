@@ -14,8 +14,8 @@ def pack(data: Any) -> tuple[Any, bytes]:
         data: numbers, strings, lists, dictionaries and arrays, nested in any way.
 
     Returns:
-        The data with {"array": [position of its first byte, type, shape]} in place of each array, and the bytes of all
-        arrays in order, little-endian.
+        The data with {"array": [position of its first byte, type, shape]} in place of each array, and the little-endian
+        bytes of all arrays in order.
     """
     found: list[bytes] = []
     end = 0
@@ -43,7 +43,7 @@ def unpack(data: Any, content: bytes) -> Any:
         content: bytes of all arrays from `pack`.
 
     Raises:
-        ValueError: `data` and `content` do not belong together.
+        ValueError: an array has an unknown type, or lies outside `content`.
     """
     if isinstance(data, list):
         return [unpack(value, content) for value in data]

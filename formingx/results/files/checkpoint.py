@@ -57,8 +57,8 @@ class Checkpoint:
     """Writer of the checkpoint folder of one run. Creating it is collective.
 
     Args:
-        folder: name of the folder; it is created if it does not exist, otherwise its content is checked.
-        path: the `Path` of the run; it must begin with the states in the folder.
+        folder: name of the folder; it is created if it does not exist, otherwise its states are compared with the path.
+        path: the `Path` of the run. Its first states must be the states in the folder.
 
     Attributes:
         folder: the folder (`pathlib.Path`).
@@ -86,11 +86,11 @@ class Checkpoint:
                 done((self._n_written - first) / (len(path) - first))
 
     def end(self, failure: str, findings: Sequence[Finding]) -> None:
-        """Write error message and findings at the end of the run to end.json; collective.
+        """Write the file end.json at the end of the run: its error message and its findings; collective.
 
         Args:
-            failure: the error message, or "".
-            findings: the findings (`Path.findings`).
+            failure: message of the error that ended the run, or "".
+            findings: the findings on the run (`Path.findings`).
 
         Raises:
             OSError: the file cannot be written.
@@ -103,10 +103,10 @@ class Checkpoint:
     def _begin(self) -> int:
         """Create the folder, or check that its states belong to this run; collective.
 
-        Incomplete steps at the end of the folder are removed.
+        States of an unfinished last step are removed from the folder.
 
         Returns:
-            The number of states in the folder.
+            The number of states that remain in the folder.
 
         Raises:
             InputError: the folder holds another run, or other files.
@@ -146,7 +146,7 @@ class Checkpoint:
             state: the state.
 
         Raises:
-            OSError: the state cannot be written, or is there already.
+            OSError: the state cannot be written, or the folder contains it already.
         """
         segment = self._path.segment(state)
         problem = segment.problem
@@ -190,15 +190,18 @@ class Checkpoint:
 
 
 def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
-    """Return the record of the run in a checkpoint (`formingx.load`); collective.
+    """Return the solver's record of the run in a checkpoint (`formingx.load`); collective.
 
     Args:
         folder: folder of the checkpoint.
         scene: the scene of the run.
-        state: number of the last state to read; default all states of completed steps.
+        state: number of the last state to read, from 0; default the last state of the last completed step.
+
+    Returns:
+        The record with all states up to that one. Its problem has the unknowns of the last state.
 
     Raises:
-        InputError: there is no checkpoint, it is damaged, or it is of another scene.
+        InputError: there is no checkpoint, it is damaged, it belongs to another scene, or it has no such state.
     """
     folder = file_path("load: folder", folder)
     problem = Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
@@ -232,10 +235,11 @@ _mesh_loaders: list[Callable[[Problem, State, dict[str, Any]], Problem]] = []
 
 
 def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Problem]) -> None:
-    """Register the function that restores the problem on a new mesh of a remeshed run.
+    """Register the function that restores the problem on a new mesh of a remeshed run; it replaces an earlier one.
 
     Args:
-        loader: function of (problem, last state, data of the new mesh) that returns the new problem.
+        loader: function of (problem on the old mesh, last state on it, data of the new mesh from the checkpoint) that
+            returns the problem on the new mesh.
     """
     _mesh_loaders[:] = [loader]
 
@@ -244,8 +248,8 @@ def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Proble
     """Return the problem on the next mesh of a remeshed run.
 
     Args:
-        problem: the problem on the mesh before.
-        last: last state on the mesh before.
+        problem: the problem on the old mesh.
+        last: last state on the old mesh.
         data: the new mesh and the data transferred to it, from the checkpoint.
 
     Raises:
@@ -258,7 +262,15 @@ def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Proble
 
 
 def holds_states(folder: Any, comm: Any) -> bool:
-    """Return True if a folder is a checkpoint with at least one state; collective."""
+    """Return True if a folder is a checkpoint with at least one state; collective.
+
+    Args:
+        folder: name of the folder.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: a state is missing in the checkpoint.
+    """
     folder = file_path("checkpoint", folder)
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(complete_states(folder)))
 
@@ -348,8 +360,10 @@ def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> li
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
-    """Return {attribute of `Profile`: its value} in a state, for reports that are made without the `Scene`; None if
-    the body is no sheet."""
+    """Return the `Profile` of a state as {attribute: its value}, or None if the body is not a sheet.
+
+    Reports that are made from a checkpoint, without the `Scene`, draw it.
+    """
     try:
         profile = path.profile(state)
     except InputError:

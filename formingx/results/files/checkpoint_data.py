@@ -48,8 +48,8 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
         count: number of states to read.
 
     Returns:
-        Number of states in the checkpoint, the data of the last `count` of them, and the seconds since the last one was
-        written.
+        Number of states in the checkpoint; the data of the last `count` of them (`read_data`); time since the last one
+        was written, s.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -94,7 +94,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         folder: folder of the checkpoint.
 
     Returns:
-        The data of scene.json with the result of `ended` as entry "ended", and the data of each state.
+        The data of scene.json with the result of `ended` as entry "ended", and the data of each state (`read_data`).
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -145,7 +145,7 @@ def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
     Args:
         folder: folder of the checkpoint.
         about: data of its file scene.json.
-        scene: description of the scene (`description.describe`).
+        scene: description of the scene with which it is compared (`description.describe`).
 
     Raises:
         InputError: its format is unknown, it is damaged, or it belongs to another scene.
@@ -180,7 +180,7 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 
 
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
-    """Return the data of a state of a checkpoint, with its arrays.
+    """Return the data of a state of a checkpoint with its arrays, as a dictionary.
 
     Args:
         folder: folder of the checkpoint.

@@ -14,10 +14,10 @@ _LONGEST = 32_767  # largest number of characters in a cell of Excel
 
 
 class ColumnTable:
-    """Base class of tables with named columns; it prints its first and last rows.
+    """Base class of tables with named columns. As text, a table shows at most its first and last five rows.
 
     Attributes:
-        comm: MPI communicator; its rank 0 writes.
+        comm: MPI communicator; its rank 0 writes files.
     """
 
     comm: Any
@@ -32,7 +32,7 @@ class ColumnTable:
 
         Args:
             file: its name ends in .csv.
-            units: units for the header, as in "wall [mm]".
+            units: units for the header, as in "wall [mm]"; default none.
 
         Raises:
             InputError: the name has another ending.
@@ -45,10 +45,11 @@ class ColumnTable:
 
         Args:
             file: its name ends in .xlsx.
-            units: units for the header.
+            units: units for the header, as in "wall [mm]"; default none.
 
         Raises:
-            InputError: the name has another ending, openpyxl is not installed, or Excel does not accept a text.
+            InputError: the name has another ending, openpyxl is not installed, or a text has characters or a length
+                that Excel does not accept.
             OSError: the file cannot be written.
         """
         file = tabular.named("to_excel", file, ".xlsx")
@@ -91,7 +92,7 @@ class ColumnTable:
 
 
 def _words(column: Any) -> list[str]:
-    """Return the cells of a column as text; all numbers are rounded to the fifth digit of the largest number."""
+    """Return the cells of a column as text; numbers are rounded to the fifth digit of the largest one."""
     values = np.asarray(column)
     if values.dtype.kind != "f":
         return [str(v) for v in values]

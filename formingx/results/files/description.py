@@ -78,7 +78,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
     Args:
         a: JSON data.
         b: JSON data.
-        where: place of the values in the whole data, such as "loads[0].on".
+        where: place of the two values in the whole data, such as "loads[0].on"; "" for the whole data.
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
@@ -94,17 +94,17 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return weighted sums of fields over the sampled points of a layer; a change at any point changes the sum.
+    """Return weighted sums of fields over the sampled points of a layer; collective.
 
-    Collective.
+    The weights differ from point to point, so a change at any point changes the sum.
 
     Args:
         scene: the scene.
         layer: name of the layer.
-        fields: {name: function that returns the values at the points of a `Sample`}.
+        fields: {name of a field: function of a `Sample` that returns the values at its points}.
 
     Returns:
-        {name: sum}.
+        {name of a field: sum}.
     """
     sample = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[sample.cells])

@@ -41,7 +41,9 @@ _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1
 
 
 class Fields:
-    """Computes fields of the states of a path at the nodes of the cells that this rank owns.
+    """Computes fields such as displacement and stress, at the nodes of the cells that this rank owns.
+
+    Each cell has six nodes of its own: its corners, and the middles of its edges. A membrane in a section has three.
 
     Args:
         path: the computed `Path`, with the states of one mesh.
@@ -68,7 +70,10 @@ class Fields:
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
     def evaluate(self, state: Any) -> dict[str, np.ndarray]:
-        """Return the fields of a state; collective.
+        """Return the fields of a state that the module docstring lists; collective.
+
+        Args:
+            state: a state on the mesh of the path.
 
         Returns:
             {name of the field: values at the nodes of each cell, shape (cells, nodes, components)}.
@@ -107,7 +112,7 @@ class Fields:
         return {name: np.asarray(values).reshape(*shape, -1) for name, values in found.items()}
 
     def _eval(self, expression: Any) -> np.ndarray:
-        """Return the values of a compiled vector at the nodes of each cell, shape (cells, nodes, components)."""
+        """Return the values of a compiled vector expression at the nodes of cells, shape (cells, nodes, components)."""
         if not len(self._cells):
             return np.zeros((0, len(_NODES[self.dimension]), self._components))
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
@@ -129,12 +134,14 @@ class Fields:
 
 
 def to_vtk(path: Any, file: Any, states: Any = None) -> None:
-    """Write fields of states as VTU files, and a PVD file that lists their times (`Path.to_vtk`).
+    """Write fields of states as VTU files, and a PVD file that lists them (`Path.to_vtk`); rank 0 writes.
+
+    The state with the number 3 is written to NAME-3.vtu, beside NAME.pvd.
 
     Args:
         path: the computed `Path`.
-        file: its name ends in .pvd.
-        states: a state, several in order, or "all"; default the last.
+        file: name of the PVD file; it ends in .pvd.
+        states: a state, a sequence of states, or "all"; default the last state of the path.
 
     Raises:
         InputError: the name has another ending, or `states` has an entry that is not a `State`.
@@ -163,10 +170,10 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
-    """Return the content of a VTU file.
+    """Return the content of a VTU file, as text.
 
     Args:
-        points: positions of the nodes of each cell, shape (cells, nodes, components).
+        points: reference positions of the nodes of each cell, shape (cells, nodes, components), length.
         values: {name of a field: values at the nodes, shape (cells, nodes, components)}.
     """
     pyvista = figures.pyvista()
@@ -185,23 +192,20 @@ def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
 
 
 def _three(array: np.ndarray) -> np.ndarray:
-    """Return the vectors of an array, shape (..., c), as rows of three components, shape (n, 3).
-
-    Missing components are 0.
-    """
+    """Return the vectors of an array, shape (..., c), as rows of three components, shape (n, 3), filled with 0."""
     rows = array.reshape(-1, array.shape[-1])
     return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1])))
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
-    """Return the states to be written, with the numbers that are their times.
+    """Return the states to be written, with their numbers in the files.
 
-    A state of the path has its number there. A state solved for by `Path.state_at` has its position in `states`.
+    A state of the path has its number in the path. A state solved for by `Path.state_at` has its position in `states`.
     If these numbers do not increase, the states are numbered from 0.
 
     Args:
         path: the computed `Path`.
-        states: argument `states` of `to_vtk`.
+        states: a state, a sequence of states, or "all"; None: the last state of the path.
 
     Returns:
         Pairs (number, state).
@@ -230,16 +234,16 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
 
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the positions of m points between the n lines from bottom to top points of a sheet.
+    """Return the positions of m points of a sheet between the n lines across it, from bottom to opposite top points.
 
     Args:
-        points: the points, shape (m, 2), length.
+        points: the points, reference positions, shape (m, 2), length.
         bottom: bottom points, shape (n, 2), length.
         top: top points opposite them, shape (n, 2), length.
 
     Returns:
-        Number k of the last line before each point, shape (m,), and the position of the point between the lines k and
-        k + 1, 0 to 1, shape (m,).
+        Number k of the line before each point, shape (m,), and the position of the point between the lines k and k + 1,
+        0 to 1, shape (m,).
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     across = top - bottom

@@ -14,7 +14,7 @@ def progress(comm: Any, words: str) -> Iterator[Callable[[float], None]]:
         words: text before the bar.
 
     Yields:
-        Function to be called with the finished fraction, 0 to 1.
+        Function that moves the bar; the block calls it with the finished fraction, 0 to 1.
     """
     from tqdm import tqdm
     with tqdm(total=1.0, desc=words, delay=2, disable=comm.rank != 0, leave=False,

@@ -17,18 +17,18 @@ _EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
-    """Return the closed surface of a sheet as triangles.
+    """Return the closed surface of a deformed sheet as triangles.
 
-    An axisymmetric section is revolved about the axis. In plane strain it is extruded by its width.
+    An axisymmetric section is revolved about the z axis. A section in plane strain is extruded along y, by its width.
 
     Args:
         profile: the `Profile` of the section.
         axisymmetric: False in plane strain.
-        parts: number of strips round the axis.
+        parts: number of strips round the axis; not used in plane strain.
 
     Returns:
-        Points (x, y, z), shape (n, 3), length. For each triangle the rows of its corners in the points, shape (m, 3),
-        counter-clockwise seen from outside.
+        Points (x, y, z), shape (n, 3), length. For each triangle the row numbers of its three corners in the points,
+        shape (m, 3), counter-clockwise seen from outside.
     """
     line = np.vstack([refined(profile.bottom, _EDGE_PIECES), refined(profile.top, _EDGE_PIECES)[::-1]])  # edges are curved
     n = len(line)
@@ -56,14 +56,15 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
 
 
 def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the closed surface of a sheet with the wall over original thickness at its points.
+    """Return the closed surface of a deformed sheet, and the wall over original thickness at its points.
 
     Args:
         profile: the `Profile` of the section.
         axisymmetric: False in plane strain.
 
     Returns:
-        Points, shape (n, 3), and triangles, shape (m, 3), as `solid` returns them, and the ratios, shape (n,).
+        Points, shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall over original
+        thickness at the points, shape (n,).
     """
     points, triangles = solid(profile, axisymmetric)
     n = len(profile.bottom)
@@ -79,6 +80,10 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
         surface: points, triangles and wall ratios; the ratios are not used.
         file: its name ends in .stl.
         comm: MPI communicator.
+
+    Raises:
+        InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     file = tabular.named("to_stl", file, ".stl")
     tabular.on_root(comm, lambda: write_stl(*surface[:2], file))
@@ -91,7 +96,12 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
         surface: points, triangles and wall ratios.
         file: its name ends in .glb.
         comm: MPI communicator.
-        units: units of the script; a length without a unit counts as metre.
+        units: units of the script, in which the points are given. The file is in metres; without a unit, lengths count
+            as metres.
+
+    Raises:
+        InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")

@@ -23,23 +23,25 @@ _TARGET_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Status:
-    """Progress of a run at its last completed step.
+    """Status of a run, as its checkpoint shows it at the last completed step.
 
     Attributes:
         states: number of states in the checkpoint.
         stage: name of the present stage, or "".
         verdict: reason why the last state is inadmissible, or "" (`State.verdict`).
-        target: target of the stage: (column, its value at the target, its present value); None if no column holds it.
-        computing_time: computing time so far, s.
-        remaining_time: computing time to the end of the stage, estimated from the last steps, s; 0 if the target is
-            met. None if the last steps came no nearer to the target.
+        target: target of the stage: (column, its value at the target, its present value). None without a target, or if
+            the target is a value of no column.
+        computing_time: computing time up to the last completed step, s.
+        remaining_time: computing time to the end of the stage, extrapolated from the last 20 steps, s; 0 if the target
+            is met. None without a target, or if the last steps came no nearer to it.
         limits: {reason for a shorter or failed step: count}, over the whole run.
         age: time since the last state was written, s.
-        ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or was
-            killed.
+        ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or
+            was killed.
         just_begun: True if the stage has only one completed step.
-        moved: (column, value before, value after) of the column that changed most over the last steps, or None. It
-            shows progress while the target does not come nearer, such as the pole height after a pressure maximum.
+        moved: (column, earlier value, present value) of the column that changed most over the last steps; None if the
+            body does not move. It shows progress while the target does not come nearer, such as the pole height after
+            a pressure maximum.
     """
 
     states: int
@@ -56,7 +58,7 @@ class Status:
 
     @property
     def findings(self) -> list[Finding]:
-        """Warnings and serious findings on the last state and, if the run has ended, on the run."""
+        """Findings of severity "warning" and "serious" on the last state and, if the run has ended, on the run."""
         ended = [] if self.ended is None else without_notes(self.ended["findings"])
         state = [Finding("serious", "state", self.verdict)] if self.verdict else []
         return state + [finding for finding in ended if not (state and finding.about == "state")]
@@ -124,16 +126,16 @@ def of_folder(folder: Any) -> Status:
 
 
 def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
-    """Return the target of the stage that a step belongs to, as a column and its value.
+    """Return the target of a run or stage, as a column and its value.
 
     A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure".
 
     Args:
-        stepping: data on the step (`State.stepping`).
+        stepping: data with which the run continues (`State.stepping`), among them its target.
         measures: names of the columns.
 
     Returns:
-        (name of the column, value), or None without a target.
+        (name of the column, value), or None without a target. The name may be that of a quantity without a column.
     """
     if "until" not in stepping:
         return None
@@ -143,23 +145,23 @@ def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[s
 
 
 def _words(seconds: float) -> str:
-    """Return a duration, s, as text with two digits in days, h, min or s."""
+    """Return a duration as text with two digits, in days, h, min or s; `seconds` is in s."""
     size, unit = next(((s, u) for s, u in ((86400, "days"), (3600, "h"), (60, "min")) if seconds >= 2 * s), (1, "s"))
     return f"{seconds / size:.2g} {unit}"
 
 
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
-    """Yield the status now and after each new state, until the run ends.
+    """Yield the status of a run now and after each new state, until the run ends.
 
-    A folder that does not exist yet, is empty, or holds no state is waited for (`checkpoint_data.begun`).
+    If the folder is missing, empty, or without a state, the function waits for the first state.
 
     Args:
         folder: folder of the checkpoint.
         every: time between two readings of the folder, s.
-        patience: time without a new state after which watching ends, s.
+        patience: time without a new state after which watching ends, s; 0: yield the present status only.
 
     Raises:
-        InputError: the folder holds other files, is damaged, or holds no state in time.
+        InputError: the folder holds other files, is damaged, or has no state after the time `patience`.
     """
     every, patience = positive("watch: every", every), non_negative("watch: patience", patience)
     seen, since = -1, time.monotonic()

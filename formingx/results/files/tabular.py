@@ -16,12 +16,17 @@ from ...units import NONE, Units
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
     """Write a CSV file with one row per state (`Path.to_csv`; rank 0 writes).
 
-    The columns are the stage (in a process), the kind of the state, the iterations, and every column of the path.
+    The columns are the stage (in a process), the kind of the state, the number of Newton iterations, and every column
+    of the path.
 
     Args:
         path: the computed `Path`.
         file: its name ends in .csv.
         units: units for the header, such as "tool_force [N]"; in plane strain forces are per unit depth.
+
+    Raises:
+        InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
@@ -35,12 +40,16 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
     """Write a CSV file with one row per bottom point of a sheet (rank 0 writes).
 
     The columns are reference radius and arc length, deformed arc length, deformed positions of bottom and top point,
-    thickness, and thickness ratio.
+    thickness, and thickness ratio (`Profile`).
 
     Args:
-        profile: the `Profile`.
+        profile: the `Profile` of the sheet in a state.
         file: its name ends in .csv.
         comm: MPI communicator.
+
+    Raises:
+        InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
                "thickness", "thickness_ratio"]
@@ -50,7 +59,7 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """Write a CSV file with a header, and numbers with all their digits (rank 0 writes).
+    """Write a CSV file with a header row; numbers are written with all their digits (rank 0 writes).
 
     Args:
         file: its name ends in .csv.
@@ -60,6 +69,7 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
     Raises:
         InputError: the name has another ending.
+        OSError: the file cannot be written.
     """
     file = named("to_csv", file, ".csv")
 
@@ -74,15 +84,16 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
-    """Write key numbers as a JSON file.
+    """Write key numbers as a JSON file (rank 0 writes).
 
     Args:
         file: name of the file.
         summary: {name: number, text, list or dictionary}.
-        comm: MPI communicator; rank 0 writes.
+        comm: MPI communicator.
 
     Raises:
         ValueError: a number is nan or infinite.
+        OSError: the file cannot be written.
     """
     text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
     on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
@@ -100,11 +111,13 @@ def versions() -> dict[str, str]:
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     """Call a function on rank 0 alone, and return its result on all ranks; collective.
 
-    An OSError, ValueError or ImportError of the function is raised on all ranks.
-
     Args:
         comm: MPI communicator.
         action: function without arguments.
+
+    Raises:
+        OSError: the function raised it on rank 0. A ValueError or ImportError of the function is raised in the same
+            way, on all ranks.
     """
     result, error = None, None
     if comm.rank == 0:
