@@ -25,12 +25,13 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         path: the computed `Path`.
         file: its name ends in .gif or .mp4.
         frames: number of frames.
-        seconds: duration, s.
+        seconds: duration, s; the last frame is shown for one second more.
         units: units for the labels.
 
     Raises:
-        InputError: the name has another ending, ffmpeg is missing for an MP4, a number is not allowed, or the path has
-            one state only.
+        InputError: the name has another ending, ffmpeg is missing for an MP4, `frames` or `seconds` is not positive,
+            the body is not a sheet, or the path has one state only.
+        OSError: the file cannot be written.
     """
     file = files.named("animate", file, ".gif", ".mp4")
     if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
@@ -57,14 +58,14 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """Return the positions of frames that are evenly spaced over the progress of the process.
+    """Return the positions along a path of frames that are evenly spaced over the progress of the process.
 
     Args:
-        path: the computed `Path`.
+        path: the computed `Path` of a sheet.
         frames: number of frames.
 
     Returns:
-        For each frame a state, the next state, and the position between them, 0 to 1.
+        For each frame a state, the next state, and the position of the frame between them, 0 to 1.
     """
     profiles = [path.profile(state) for state in path.states]
     done = progress({c: path[c] for c in path.columns}, profiles)
@@ -108,8 +109,8 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     Args:
         shapes: `Profile` of the sheet in each frame.
         tools: placed tools in each frame (`Tooling.placed`).
-        now: for each frame the names (x, y) of the columns of the loading curve, and their values.
-        curves: {(x, y): values of both columns along the path, shapes (m,)}.
+        now: for each frame the names (x, y) of the columns of the loading curve, and their values in the frame.
+        curves: {(x, y): values of both columns along the path, shape (m,) each}.
         axisymmetric: False in plane strain.
         units: units for the labels.
     """
@@ -139,7 +140,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
         return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
 
     def width(names):
-        """Return the width that the labels of a loading curve leave for it, as a part of the figure."""
+        """Return the width of the axes of a loading curve beside their labels, as a fraction of the figure."""
         draw(shapes[0], ratios[0], tools[0], names, (curves[names][0][0], curves[names][1][0]))
         return loading.get_position().width
     width(min(curves, key=width))
@@ -153,7 +154,7 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], u
     Args:
         axes: matplotlib axes, which are cleared.
         names: names of the columns (x, y).
-        curve: values of both columns along the path, shapes (m,).
+        curve: values of both columns along the path, shape (m,) each.
         point: values of both columns in the frame.
         units: units for the labels.
     """

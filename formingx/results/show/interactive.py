@@ -22,7 +22,7 @@ STATIONS = 101
 
 @functools.cache
 def library() -> str:
-    """Return the source of plotly.js as `packed` text.
+    """Return the source of plotly.js, compressed and in base64 (`packed`).
 
     Raises:
         InputError: plotly is not installed.
@@ -40,19 +40,20 @@ def library() -> str:
 
 
 def packed(text: str) -> str:
-    """Return a text compressed by gzip and written in base64, which an HTML page can hold."""
+    """Return a text compressed by gzip and encoded in base64, so that an HTML page can hold it."""
     # level 6 takes twice the time to save 6 %
     return base64.b64encode(gzip.compress(text.encode(), 4, mtime=0)).decode()
 
 
 def data(records: list[Record], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
-    """Return all data that `report.js` draws, as JSON.
+    """Return all data that the script `report.js` of a page draws, as JSON text.
 
     Args:
         records: the runs.
         names: names of the runs.
         units: units for the labels.
-        extra: further entries of the data of each run, such as the "mesh" of a sheet in three dimensions.
+        extra: {name: value} of further entries in the data of each run, such as the "mesh" of a sheet in three
+            dimensions; default none.
     """
     runs = [_run(record, name, units) | (extra or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
@@ -62,7 +63,7 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
 
 
 def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
-    """Return the data of one run for `report.js`: stages, columns, tools and the sheet in each drawn state."""
+    """Return the data of one run for `report.js`: its stages; columns, tools and the sheet in each drawn state."""
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
               for a, b in record.stage_ranges]
@@ -78,7 +79,7 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
 
 
 def _sheet(record: Record, units: Units) -> dict[str, Any]:
-    """Return the outline of a sheet and the fields on it in each drawn state, at up to `STATIONS` points along it."""
+    """Return the outline of a sheet and the fields on it in each drawn state, at no more than 101 points along it."""
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
     fields: dict[str, list] = {}
@@ -143,14 +144,14 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
 
 
 def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Return the loading curves of a stage, of each quantity that changes in it.
+    """Return a loading curve for each travel and each pressure that changes in a stage.
 
     Args:
         record: the run.
         stage: slice of the states of the stage.
 
     Returns:
-        For each curve the names of the columns x and y, and their values.
+        For each curve the names of the columns x and y, and their values in the n states of the stage, shape (n,) each.
     """
     found, measures = [], record.measures
     for column, values in measures.items():
@@ -172,7 +173,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
 
 
 def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return charts of pressures, travels, tool forces and the temperature of the body over the process time."""
+    """Return charts of pressures, travels, tool forces and temperatures of the body over the process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
@@ -226,9 +227,9 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
 
 
 def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return two charts of the wall thickness in the last state, whole and of each layer: over height and arc length.
+    """Return two charts of the wall thickness in the last state: over the height, and over the arc length.
 
-    A chart is None if no run has a profile.
+    Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile.
     """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
@@ -266,12 +267,12 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
 
 
 def rounded(values: Any, each: bool = False) -> list:
-    """Return the numbers of an array as nested lists, rounded to few digits.
+    """Return the numbers of an array as nested lists, rounded to five digits (`DIGITS`).
 
     Args:
-        values: an array of one or more dimensions.
-        each: True for `DIGITS` significant digits of each number. False: all numbers of a row are rounded to the last
-            of these digits of the largest number.
+        values: an array of one or more dimensions; its rows run along the last one.
+        each: True: each number has five significant digits. False: the largest number of a row has five, and the other
+            numbers of the row are rounded to the same decimal place.
     """
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)

@@ -9,11 +9,11 @@ from typing import Any
 
 
 def page(title: str, body: list[str], tail: str = "") -> str:
-    """Return a whole HTML page.
+    """Return a whole HTML page with its style sheet.
 
     Args:
-        title: title of the window; the heading is part of the body.
-        body: elements of the page, as HTML.
+        title: title of the browser window; it is no heading of the page.
+        body: elements of the page in order, as HTML.
         tail: HTML after the elements, such as scripts.
     """
     style = resources.files(__package__).joinpath("report.css").read_text()
@@ -23,10 +23,10 @@ def page(title: str, body: list[str], tail: str = "") -> str:
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """Return an HTML table; columns of numbers are aligned right.
+    """Return a table as HTML; columns of numbers are aligned right.
 
     Args:
-        head: names of the columns; empty names: the table has no head.
+        head: name of each column, as text; if all names are empty, the table has no head.
         rows: the cells of each row, as text.
     """
     numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
@@ -49,20 +49,20 @@ def _is_number(text: str) -> bool:
 
 
 def details(title: str, content: str) -> str:
-    """Return a section of which the reader sees the title, and the content after a click.
+    """Return a collapsed section as HTML: a click on its title shows its content.
 
     Args:
-        title: title, as text.
+        title: the title, as text.
         content: the content, as HTML.
     """
     return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
 
 
 def figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    """Return a matplotlib figure as a PNG picture with a caption.
+    """Return a matplotlib figure with a caption as HTML; the figure is an embedded PNG picture.
 
     Args:
-        figure: the figure.
+        figure: the matplotlib figure.
         caption: text below it.
         kind: "wide", or "small" for less than the full width.
     """
@@ -72,7 +72,7 @@ def figure(figure: Any, caption: str, kind: str = "wide") -> str:
 
 
 def picture(png: bytes, caption: str, kind: str) -> str:
-    """Return a PNG picture with a caption.
+    """Return a PNG picture with a caption as HTML; the picture is embedded.
 
     Args:
         png: content of the PNG file.
@@ -85,10 +85,10 @@ def picture(png: bytes, caption: str, kind: str) -> str:
 
 
 def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
-    """Return a small figure (SVG) of lines over 1, 2, 3, ..., with a logarithmic vertical axis and a caption.
+    """Return a small figure of lines with a logarithmic vertical axis and a caption, as HTML with an SVG drawing.
 
     Args:
-        lines: positive values of each line; empty lines are left out.
+        lines: positive values of each line, drawn over 1, 2, 3, ...; empty lines are left out.
         x: label of the horizontal axis.
         y: label of the vertical axis.
         caption: text below the figure.
@@ -127,5 +127,10 @@ def lines(text: str) -> str:
 
 
 def number(value: float, scale: float = 0.0) -> str:
-    """Return a number as text with six significant digits; below 1e-9 of a scale it is 0, because of round-off."""
+    """Return a number as text with six significant digits.
+
+    Args:
+        value: the number.
+        scale: size of values without round-off; a number smaller than 1e-9 times this is shown as 0.
+    """
     return f"{0.0 if abs(value) < 1e-9 * scale else value:.6g}"

@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Picture(os.PathLike):
-    """Picture (.png, .gif) or animation (.mp4) in a file; a notebook shows the present content of the file.
+    """Picture (.png) or animation (.gif, .mp4) in a file; a notebook shows the present content of the file.
 
     Args:
         file: name of the file.

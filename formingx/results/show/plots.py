@@ -6,14 +6,14 @@ from ...figures import figure
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
-    """Draw column `y` over column `x` of a path.
+    """Draw one output quantity of a path over another (`Path.plot`).
 
-    States are dots on the smooth line of the path. Limit points are circled, states after jumps are diamonds.
+    States are dots on a smooth line. Limit points are circled; states after a snap-through are diamonds.
 
     Args:
         path: the computed `Path`.
-        y: name of a column.
-        x: name of a column.
+        y: name of the column on the vertical axis.
+        x: name of the column on the horizontal axis.
         axes: matplotlib axes; default new ones.
         style: keyword arguments of matplotlib's `plot`.
 
@@ -32,9 +32,12 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 
 
 def convergence(path: Any, axes: Any = None) -> Any:
-    """Draw the correction of the Newton iterations over their number, one line for each state.
+    r"""Draw the relative correction of the unknowns x over the number of the Newton iteration, one line for each state.
 
-    The correction is |dx|/|x| (Song 1993, eq. 3.5.1; figures 3.2 and 5.7 are of this kind).
+    It is the measure of convergence of Song 1993, eq. (3.5.1); figures 3.2 and 5.7 there are of this kind:
+
+    .. math::
+        |\Delta x| / |x|
 
     Args:
         path: the computed `Path`.
@@ -56,12 +59,12 @@ def convergence(path: Any, axes: Any = None) -> Any:
 def main_columns(columns: list[str]) -> tuple[str, str]:
     """Return the names (x, y) of the columns of the main loading curve.
 
-    They are the force of a tool over its travel, or else a pressure over the pole height. A run without both gives the
-    pole height over the process time, or its control, which is the first column, over the pole height. Where there is
+    With a travel, it is the force of the tool over its travel; with a pressure, the pressure over the pole height. Else
+    it is the pole height over the process time or, without time, the first column over the pole height. Where there is
     no pole height, another measure of the deformation takes its place.
 
     Args:
-        columns: names of all columns.
+        columns: names of all columns of the path, in their order.
     """
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
@@ -76,13 +79,13 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
-    """Draw the deformed sheet as coloured strips between its two faces.
+    """Draw the section of a deformed sheet as coloured strips between its two faces.
 
     Args:
         axes: matplotlib axes.
         profile: the `Profile` of the sheet at n nodes.
         scale: factors by which r and z are multiplied, such as (-1, 1) for the mirror image.
-        colours: colours (red, green, blue, opacity) at the nodes, 0 to 1, shape (n, 4).
+        colours: colours at the nodes, (red, green, blue, opacity) from 0 to 1, shape (n, 4).
     """
     import numpy as np
     from matplotlib.collections import PolyCollection
@@ -93,7 +96,9 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
-    """Return the lower and the upper corner (r, z) of a box around deformed sheets, with a margin, length.
+    """Return the lower left and the upper right corner (r, z) of a box around deformed sheets, length.
+
+    The box has a margin of 6 % of its larger side.
 
     Args:
         profiles: a `Profile` of each sheet.
@@ -109,12 +114,12 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """Draw the deformed sheet as an area between its two faces, in one colour.
+    """Draw the section of a deformed sheet as an area between its two faces, in one colour.
 
     Args:
         profile: the `Profile` of the sheet.
         axes: matplotlib axes; r points to the right.
-        scale: factor of all lengths.
+        scale: factor by which r and z are multiplied.
         style: keyword arguments of matplotlib's `fill`.
     """
     import numpy as np

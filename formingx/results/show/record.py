@@ -36,34 +36,35 @@ CONTROLS = "pressure", "travel", "displacement"
 
 @dataclass
 class Record:
-    """Data of a run with n states, without the discretised problem.
+    """Data of a run with n states for its report, without the discretised problem.
 
     Attributes:
-        summary: {part of the scene: one line of text}.
+        summary: {part of the scene, such as "mesh": one line of text}.
         versions: {program: version}.
         axisymmetric: False in plane strain and in three dimensions.
         kinds: kind of each state (`State.kind`).
         stages: name of the stage of each state, "" in a run without stages.
         measures: {column: values, shape (n,)}.
-        histories: for each state, rows (residual, correction, work) of the Newton iterations.
+        histories: for each state, rows (residual, correction, work) of the Newton iterations
+            (`formingx.solve.newton.Iteration`).
         profiles: for each state a `Profile`; None if the body is not a sheet, or if the state is not drawn (`frames`).
         counts: cost of the run: {"iterations": ..., "seconds": ..., ...} as in `formingx.solve.record.Counts`.
         until: target of the run (quantity, value), or None.
         tooling: the `Tooling` of the scene.
-        travels: for each state the travels of the tools (`Tooling.travels`), length.
+        travels: for each state the travel of each tool, length; None for an inactive tool (`Tooling.travels`).
         forces: {tool: force of the body on it, shape (n,)}, positive if it resists the travel. The force on a fixed
-            tool is its Z component.
+            tool is its Z component, positive if the body pushes the tool up.
         fields: for each drawn state {name: values at the m nodes of the profile, shape (m,)}. A record from a
             checkpoint has the temperature only.
-        layers: fractions of the wall that the layers take in the last state (`Wall.layers`).
-        script: file of the script, or "".
-        findings: findings of the run (`Path.findings`), which a checkpoint holds if the run has ended.
+        layers: {layer: its fraction of the wall in the last state, shape (m,)} (`Wall.layers`).
+        script: name of the file of the script, or "".
+        findings: findings on the run (`Path.findings`); a checkpoint holds them once the run has ended.
         failure: error message that ended the run, or "".
         verdicts: reason why each state is inadmissible, or "" (`State.verdict`).
         heat: {tool: (conductance of the contact, temperature of the tool as text)} for tools that conduct heat.
-        unit: unit of temperatures, or "".
+        unit: unit of temperatures, "C" or "K"; "" without heat transfer.
         space: True for a sheet in three dimensions.
-        planes: symmetry planes that cut the body.
+        planes: symmetry planes at which only a half or a quarter of the part is modelled.
         drawn: approximate number of drawn states.
     """
 
@@ -98,13 +99,13 @@ class Record:
         return not (self.axisymmetric or self.space)
 
     def control(self, state: int) -> str:
-        """Return the name of the column that is controlled in the stage of a state.
+        """Return the name of the column of the controlled quantity in the stage of a state.
 
-        It is the first pressure, travel or displacement that changes in the stage. A run in process time, and a stage
-        without a control, give the first column.
+        It is the first pressure, travel or displacement that changes in the stage. If none changes, or if the process
+        time advances in the run, it is the first of all columns.
 
         Args:
-            state: number of the state.
+            state: number of the state, from 0.
         """
         first, end = next(ends for ends in self.stage_ranges if state < ends[1])
         changes = [c for c, v in self.measures.items()
@@ -123,22 +124,25 @@ class Record:
 
     @property
     def stage_ranges(self) -> list[tuple[int, int]]:
-        """For each stage in order, the number of its first state and the number after its last state."""
+        """For each stage in order, the number of its first state, and 1 + the number of its last state."""
         ends = [k for k in range(1, len(self.stages)) if self.stages[k] != self.stages[k - 1]]
         return list(zip([0, *ends], [*ends, len(self.stages)]))
 
     @property
     def frames(self) -> list[int]:
-        """Numbers of the states that are drawn."""
+        """Numbers of the states that the report draws, in order."""
         return frames(self.progress, self.kinds, self.stages, self.drawn)
 
     @property
     def shown(self) -> list[int]:
-        """Numbers of the drawn states that have a profile."""
+        """Numbers of the states that the report draws and that have a profile, in order."""
         return [k for k in self.frames if self.profiles[k] is not None]
 
     def all_findings(self) -> list[Finding]:
-        """Return all findings on the run, the worst first: those of its checks, and those on its columns."""
+        """Return all findings on the run, the worst first.
+
+        They are the findings of its checks (`findings`), and those on the values of its columns in all states.
+        """
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
@@ -192,7 +196,7 @@ class Record:
         return found
 
     def _first(self, where: np.ndarray) -> str:
-        """Return the number, stage and control of the first state that satisfies a condition, as text.
+        """Return the text ", from state ... on" with number, stage and control of the first state under a condition.
 
         Args:
             where: True for the states that satisfy the condition, shape (n,).
@@ -207,7 +211,7 @@ class Record:
         return f"{words(column)} = {self.measures[column][state]:.5g}"
 
     def _volume_findings(self) -> list[Finding]:
-        """Return the findings on elements that do not keep their volumes, in a list."""
+        """Return the finding on the state in which the elements keep their volumes worst, in a list; else []."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > volume.BOUND))
@@ -234,7 +238,7 @@ class Record:
 
 
 def of_path(path: Any) -> Record:
-    """Return the record of a run from its `Path`; collective."""
+    """Return the data of a run for its report from its `Path`; collective."""
     from ...scene.summary import summary
     problem, states, n = path.problem, path.states, len(path)
     with shown_progress(problem.comm, f"report of {n} states") as done:
@@ -269,10 +273,12 @@ def of_path(path: Any) -> Record:
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> Record:
-    """Return the record of a run from its checkpoint (`formingx.results.files.checkpoint_data.contents`).
+    """Return the data of a run for its report from its checkpoint, without the scene.
+
+    Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
 
     Args:
-        about: data of the file scene.json, with the end of the run ("ended").
+        about: data of the file scene.json; its entry "ended" has the error message and the findings of the run.
         states: data of each state.
     """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
@@ -329,10 +335,10 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 
 
 def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: int = FRAMES) -> list[int]:
-    """Return the numbers of the states to be drawn; all states if they are few.
+    """Return the numbers of the states to be drawn, in order; all states if their number is at most `count`.
 
-    Ends of stages and limit points are included. Further states are spaced evenly over the mean of the progress of the
-    process and the fraction of the states.
+    Ends of stages and limit points are included. The other states are evenly spaced over the mean of two numbers: the
+    progress of the process, and the number of the state over that of the last one.
 
     Args:
         progressed: progress of the process in n states (`progress`), shape (n,).
@@ -350,13 +356,15 @@ def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: i
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    It is proportional to the process time in stages that take time. In other stages of the run, a change of a control
-    by its whole range counts as a quarter of the whole time. Without time, each step counts by its change of the
-    controls, over their ranges, and by the motion of the sheet, over the total motion.
+    In a run with process time, it is proportional to the time. In stages without time, a change of a control by its
+    whole range counts as a quarter of the total time.
+
+    In a run without time, a step counts as its change of the controls, over their ranges, plus the mean displacement of
+    the middle line of the sheet, over the sum of all steps.
 
     Args:
         measures: {column: values, shape (n,)}.
-        profiles: `Profile` of the sheet in each state; None if there is no profile.
+        profiles: `Profile` of the sheet in each state. If one is None, the displacement of the sheet does not count.
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
@@ -376,18 +384,18 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
 
 
 def words(name: str) -> str:
-    """Return the name of a column with spaces."""
+    """Return the name of a column with spaces in place of underscores."""
     return name.replace("_", " ")
 
 
 class _Fields:
-    """Evaluates stress, contact pressure and temperature of a sheet at the m nodes of its profile.
+    """Computes stress, contact pressure and temperature of a sheet at the m nodes of its profile.
 
-    At each node the larger stress and the mean temperature of both faces are taken.
+    At each node it takes the larger one of the stresses at both faces, and the mean of their temperatures.
 
     Args:
         path: the `Path`, with the states of one mesh.
-        profile: the `Profile` of the sheet.
+        profile: the `Profile` of the sheet, for the reference positions of its nodes.
     """
 
     def __init__(self, path: Any, profile: Profile):

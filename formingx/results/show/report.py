@@ -80,6 +80,11 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
 
     Returns:
         The path of the file.
+
+    Raises:
+        InputError: the name of the file has another ending, plotly is not installed, or a density or a trim is given
+            for a body that is not a sheet.
+        OSError: the file cannot be written.
     """
     records = [records] if isinstance(records, Record) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
@@ -168,7 +173,7 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 
 
 def _trouble(failure: Any, lead: str) -> list[str]:
-    """Return the error message of a failed run as elements of the page, with a picture of its last good state.
+    """Return the error message of a failed run as HTML elements, with a picture of its last admissible state.
 
     Args:
         failure: the `ConvergenceError`, its text, or "" or None without a failure.
@@ -183,7 +188,7 @@ def _trouble(failure: Any, lead: str) -> list[str]:
 
 
 def _details(record: Record, units: Units) -> list[str]:
-    """Return the sections below the curves: stages, tools, inputs, output quantities, convergence and states."""
+    """Return the page's sections below the curves: stages, tools, inputs, output quantities, convergence and states."""
     found = []
     if any(record.stages):
         found += ["<h2>Stages</h2>", _stages(record, units)]
@@ -238,7 +243,7 @@ def _versions(records: list[Record]) -> list[list[str]]:
 
 
 def _cards(record: Record, found: Part | None, units: Units) -> str:
-    """Return the main numbers of the part and of the run as large figures.
+    """Return the main numbers of the part and of the run as HTML, in large digits.
 
     Args:
         record: the run.
@@ -258,7 +263,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
 
 
 def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
-    """Return rows (name, value) of the force on each tool and of each pressure, where its magnitude is largest."""
+    """Return rows (name, value) of the value of largest magnitude of the force on each tool, and of each pressure."""
     found = [(f"largest force on {name}", force, units.force) for name, force in record.forces.items()]
     found += [(f"largest {words(c)}", v, units.unit_of(c)) for c, v in record.measures.items()
               if c.endswith("pressure")]
@@ -266,7 +271,7 @@ def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
 
 
 def _answers(records: list[Record], names: list[str], parts: list, units: Units) -> str:
-    """Return a table of the key numbers of each part, forces and pressures, with one column per run."""
+    """Return an HTML table of the key numbers of parts, forces and pressures, with one column per run."""
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
@@ -275,7 +280,7 @@ def _answers(records: list[Record], names: list[str], parts: list, units: Units)
 
 
 def _lead(record: Record, units: Units) -> str:
-    """Return sentences on the size of the run, the kinematics and the units."""
+    """Return sentences on the numbers of states and iterations of a run, on the kinematics and on the units."""
     counts = record.counts
     size = f"{len(record.kinds) - 1} states after the start"
     if counts:
@@ -361,7 +366,7 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
 
 
 def _convergence(record: Record) -> str:
-    """Return a figure with the corrections of all Newton iterations, one line per state; "" without iterations."""
+    """Return a figure of the relative corrections of Newton's method, one line per state; "" without iterations."""
     lines = [[row[1] for row in history if row[1] > 0] for history in record.histories]
     return page.logarithmic(lines, "Newton iteration", "correction |\u0394x|/|x|",
                             "Correction of every Newton iteration, one line per state.") if any(lines) else ""

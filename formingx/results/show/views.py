@@ -17,17 +17,18 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """Draw three quarters of an axisymmetric sheet as a PNG, coloured by its wall ratio (rank 0 draws).
+    """Draw three quarters of a deformed axisymmetric sheet as a PNG (rank 0 draws).
 
-    Of a sheet that is more than twice as high as wide, such as a parison, one half is drawn.
+    The colour is the wall over the original thickness. A sheet that is more than twice as high as wide, such as a
+    parison, is drawn as one half.
 
     Args:
         profile: the `Profile` of the section.
-        file: name of the picture, which ends in .png.
+        file: name of the picture; it ends in .png.
         comm: MPI communicator.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb.
+        InputError: the name has another ending, or there is neither a screen nor Xvfb.
     """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
@@ -37,17 +38,18 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
-    """Draw an extruded sheet in plane strain as a PNG, coloured by its wall ratio (rank 0 draws).
+    """Draw a deformed sheet in plane strain as a PNG, extruded to 1.5 times its width (rank 0 draws).
 
-    A half sheet, which begins at R = 0, is completed by its mirror image. The part is 1.5 times as long as wide.
+    The colour is the wall over the original thickness. A half sheet, which begins at r = 0, is completed by its mirror
+    image.
 
     Args:
         profile: the `Profile` of the section.
-        file: name of the picture, which ends in .png.
+        file: name of the picture; it ends in .png.
         comm: MPI communicator.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb.
+        InputError: the name has another ending, or there is neither a screen nor Xvfb.
     """
     low, high = _bounds(profile)
     if abs(low[0]) < 1e-6 * (high[0] - low[0]):
@@ -59,7 +61,7 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and the upper corner (r, z) of a box around the deformed sheet of a `Profile`, length."""
+    """Return the lower left and the upper right corner (r, z) of the box around a deformed sheet, length."""
     points = np.vstack([profile.bottom, profile.top])
     return points.min(0), points.max(0)
 
@@ -77,9 +79,10 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
     Args:
         profile: the `Profile` of the section.
-        stations: parameters of the successive positions of the section, such as angles, shape (m,).
-        place: function of (points (r, z) of the section, shape (n, 2), station) that returns their x, y and z.
-        camera: direction of view, (x, y, z).
+        stations: parameters of the m successive positions of the section, such as angles, shape (m,).
+        place: function of (points (r, z) of the section, shape (n, 2); parameter) that returns their coordinates x, y
+            and z, shape (n,) each.
+        camera: direction from the sheet to the camera, (x, y, z).
         file: name of the picture, which ends in .png.
         comm: MPI communicator.
 
@@ -91,7 +94,7 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
-    """Draw the surface of `_view` on this rank."""
+    """Draw the surface that a section sweeps out as a PNG on this rank; the arguments are those of `_view`."""
     pyvista = figures.pyvista()
 
     def swept(line, values):
@@ -121,7 +124,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """Write a PNG picture of the meshes that the block adds to the plotter.
+    """Write a PNG picture of the meshes that a `with` block adds to a plotter.
 
     Args:
         file: name of the picture.
@@ -148,10 +151,10 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 
 def shading(values: np.ndarray) -> dict[str, Any]:
-    """Return arguments of pyvista's `add_mesh` that colour a mesh by its array "ratio": limits, colour bar, light.
+    """Return arguments of pyvista's `add_mesh` that colour a mesh by its array "ratio", with a colour bar.
 
     Args:
-        values: the array, wall over original thickness, shape (n,).
+        values: the array, wall over original thickness, shape (n,); its range is that of the colours.
     """
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
@@ -183,9 +186,9 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """Provide a display within a block: the present one, or a virtual one (Xvfb) that ends with the block.
+    """Provide a display within a `with` block: the present one, or a virtual one (Xvfb) that ends with the block.
 
-    Debian's VTK aborts without a display.
+    Debian's VTK, with which pyvista draws, aborts without a display.
 
     Raises:
         InputError: there is neither a screen nor Xvfb.
