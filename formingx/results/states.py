@@ -182,7 +182,7 @@ class States:
 
         Args:
             stage: name of a stage; default any.
-            time: process time, for which a state is solved if none has it; default the end of the stage or run.
+            time: process time; default the end of the stage or run. If no state has this time, one is solved for.
 
         Raises:
             InputError: there is no such stage, or it does not reach that time.
@@ -200,8 +200,8 @@ class States:
         time = finite("Path.state: time", time)
         first, last = candidates[0].time, candidates[-1].time
         if not first <= time <= last:
-            raise InputError(f"Path.state: time = {time:g}: {f'stage {stage!r}' if stage else 'the run'} goes from"
-                             f" {first:g} to {last:g}")
+            where = f"stage {stage!r}" if stage else "the run"
+            raise InputError(f"Path.state: time = {time:g}: {where} goes from {first:g} to {last:g}")
         exact = next((state for state in candidates if state.time == time), None)
         return exact or self.state_at(process_time(time), after=candidates[0])
 
@@ -284,11 +284,7 @@ class States:
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
         """Return the state that meets a target, from a run that starts at the first of two successive states.
 
-        So it has the history variables of a run. The arguments are those of `_between`.
-
-        Raises:
-            InputError: the stage controls an output quantity, so it cannot be restarted between states.
-            ConvergenceError: the run does not reach the target.
+        So it has the history variables of a run. Arguments and errors are those of `_between`.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
@@ -425,7 +421,7 @@ class States:
                     self.segments[-1])
 
     def same_mesh(self, state: State) -> Any:
-        """Return a path of all states on the mesh of a given state; this path itself if the run has one mesh."""
+        """Return a path of the states on the mesh of a given state; this path itself if the run has one mesh."""
         if len(self.segments) == 1:
             return self
         segment = self.segment(state)

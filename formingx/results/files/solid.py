@@ -30,7 +30,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         Points (x, y, z), shape (n, 3), length. For each triangle the row numbers of its three corners in the points,
         shape (m, 3), counter-clockwise seen from outside.
     """
-    line = np.vstack([refined(profile.bottom, _EDGE_PIECES), refined(profile.top, _EDGE_PIECES)[::-1]])  # edges are curved
+    line = np.vstack([refined(face, _EDGE_PIECES)[::sense] for face, sense in ((profile.bottom, 1), (profile.top, -1))])
     n = len(line)
     on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
     if axisymmetric:
