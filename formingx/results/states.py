@@ -284,7 +284,7 @@ class States:
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
         """Return the state that meets a target, from a run that starts at the first of two successive states.
 
-        So it has the history variables of a run. Arguments and errors are those of `_between`.
+        So it has the history variables of a run. For arguments and errors see `_between`.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
@@ -360,7 +360,7 @@ class States:
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
         """Return one row of values for each point of `curve` but the first, along successive states of one stage.
 
-        The arguments are those of `curve`, and the segment of the states.
+        For the arguments see `curve`; `segment` is the segment of the states.
         """
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns

@@ -39,7 +39,7 @@ class Snap(NamedTuple):
 def largest(path: Any) -> Snap | None:
     """Return the snap-through of a path in which the wall changed most; collective.
 
-    Only problems with history variables are examined, such as those of friction and viscoelasticity. There the state
+    Only problems with history variables are examined, for example with friction or viscoelasticity. There the state
     after a snap-through depends on the motion to it.
 
     Args:

@@ -224,7 +224,7 @@ class Stresses:
             layer: name of the layer.
 
         Returns:
-            Those of the points that lie in cells of this rank, with their cells and positions in the reference cell.
+            The points that lie in cells of this rank, with their cells and positions in the reference cell.
 
         Raises:
             InputError: a point lies outside the layer.

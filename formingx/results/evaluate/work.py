@@ -290,7 +290,7 @@ class EnergyBalance:
     def _heat(self, a: Any, b: Any) -> float:
         """Return the energy that the change of temperature stores in the body as modelled, from state a to state b.
 
-        It is the mean of two changes at constant displacements: at those of a, and at those of b.
+        It is the mean of two changes at constant displacements, in the configurations of a and b.
         """
         cold, warm = a.history_variables[-1], b.history_variables[-1]        # the temperature is last
 

@@ -330,7 +330,7 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
 
     Args:
         space: function space of the other unknowns.
-        owned: unknowns that this rank owns; the last rank owns those that belong to no cell, at the end.
+        owned: unknowns that this rank owns; in the last rank, entries that belong to no cell follow.
     """
     return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 

@@ -135,7 +135,7 @@ def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[s
         measures: names of the columns.
 
     Returns:
-        (name of the column, value), or None without a target. The name may be that of a quantity without a column.
+        (name of the column, value), or None without a target. The quantity may have no column.
     """
     if "until" not in stepping:
         return None

@@ -337,8 +337,8 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: int = FRAMES) -> list[int]:
     """Return the numbers of the states to be drawn, in order; all states if their number is at most `count`.
 
-    Ends of stages and limit points are included. The other states are evenly spaced over the mean of two numbers: the
-    progress of the process, and the number of the state over that of the last one.
+    Ends of stages and limit points are included. The other states are evenly spaced over the mean of two fractions: the
+    progress of the process, and the number of the state over the number of states.
 
     Args:
         progressed: progress of the process in n states (`progress`), shape (n,).

@@ -94,7 +94,7 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
-    """Draw the surface that a section sweeps out as a PNG on this rank; the arguments are those of `_view`."""
+    """Draw the surface that a section sweeps out as a PNG on this rank; for the arguments see `_view`."""
     pyvista = figures.pyvista()
 
     def swept(line, values):
@@ -154,7 +154,7 @@ def shading(values: np.ndarray) -> dict[str, Any]:
     """Return arguments of pyvista's `add_mesh` that colour a mesh by its array "ratio", with a colour bar.
 
     Args:
-        values: the array, wall over original thickness, shape (n,); its range is that of the colours.
+        values: the array, wall over original thickness, shape (n,); the colours cover its range.
     """
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
