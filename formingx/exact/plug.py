@@ -16,8 +16,8 @@ over the face. There N1 is continuous across the edge, at R = r_p/l0.
 
 **Rounded edge with Coulomb friction** (neo-Hookean material). The flat of the plug carries no pressure. So the membrane
 has an equal biaxial stretch l0 there, and all of it that touches the edge and the side slides outwards. T are tensions
-per deformed length, s the arc length, phi the slope and kappa the curvature of the meridian (equilibrium: Song 1993,
-2.2; friction: 5.9):
+per deformed length, s the arc length, phi the slope and kappa the curvature of the meridian (equilibrium: Adkins
+and Rivlin 1952; friction: Song 1993, eq. 5.9):
 
 .. math:: T_1 = 2 c_{10} h_0 \left(\frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}\right), \qquad
           T_2 = 2 c_{10} h_0 \left(\frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}\right)
@@ -206,7 +206,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
               N = T_1 \kappa + T_2 \frac{\sin\phi}{r}, \qquad \kappa = \frac{1}{f + h/2}
 
     Here f is the fillet radius, h the deformed thickness and N the contact pressure on the middle surface
-    (equilibrium: Song 1993, section 2.2; friction: eq. 5.9).
+    (equilibrium: Adkins and Rivlin 1952; friction: Song 1993, eq. 5.9).
 
     Args:
         face_stretch: equibiaxial stretch under the flat face of the plug, above 1. It increases with the travel.
