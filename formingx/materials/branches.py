@@ -40,7 +40,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
         stretches: stretches in the loaded direction at these times, shape (n,). The first stretch is applied suddenly
             to a body in the reference configuration; a second stretch at the same time is a jump.
         between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
-        accuracy: relative accuracy of a time step; the error of a test is about a hundred times larger.
+        accuracy: relative tolerance of the integration, `rtol` of `scipy.integrate.solve_ivp`.
 
     Returns:
         Elastic strains w in the three principal directions, shape (n, branches, 3).

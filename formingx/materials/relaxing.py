@@ -272,7 +272,7 @@ class RelaxingMaterial(Relaxing):
             times: times, shape (n,), not descending.
             stretches: stretches l in the loaded direction at these times, shape (n,).
             between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
-            accuracy: relative accuracy of a time step of the integration.
+            accuracy: relative tolerance of the integration in time.
 
         Returns:
             Stress P over the modulus mu, dimensionless, shape (n, branches).
