@@ -51,7 +51,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
             nodes too.
         accuracy: "draft", "standard" or "fine", for the number of elements. Sheets that bend near the rim get more
             elements through the thickness. Thick layers get more, too, so that no element is taller than 1.5 times its
-            width. Films thinner than 1/400 of the radius get one element through each layer. Where a tool touches the
+            width. Films thinner than 1/400 of their radial extent get one element a layer. Where a tool touches the
             sheet, the `Scene` chooses other elements: short ones where the sheet reaches a fillet of the tool,
             and fewer through the thickness (docs/accuracy.md). A given `grading` or `concentrate` is kept.
         elements: (number along the radius, division of the layers), in place of `accuracy`. The division is a number of
