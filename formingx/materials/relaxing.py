@@ -385,7 +385,7 @@ class RelaxingMaterial(Relaxing):
 
     @staticmethod
     def _flow(w: np.ndarray) -> np.ndarray:
-        """Return the flow f(w) of `branches` for elastic logarithmic strains w, shape (branches, 3) each."""
+        """Return the flow law f(w) of branches (`branches.elastic_strains`) for strains w, shape (branches, 3)."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

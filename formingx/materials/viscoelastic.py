@@ -85,10 +85,12 @@ class Viscoelastic(RelaxingMaterial):
         return tuple(scale * g for g in grown)
 
     def _step_start(self, before, Cv, x):
-        r"""Return G (entries) and x' of a step, see `Viscoelastic`, from C_n (or None), Cv_n and x = dt/tau.
+        r"""Return G (entries) and x' of a step of second order, see `Viscoelastic`, from C_n, Cv_n and x = dt/tau.
 
         .. math:: G = C_{v,n} + \frac{x}{2} C_n, \qquad
                   x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
+
+        For a step of first order, without C_n, they are Cv_n and x.
         """
         if before is None:
             return Cv, x
