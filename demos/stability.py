@@ -41,7 +41,7 @@ def search(scene, targets, wanted, radius, length):
         path = fx.trace(scene, start=path, until=target, progress=False)
         new = [state for state in path.states if all(state is not one for one in seen)]
         for n, flipped in [kind for kind in wanted if kind not in found]:
-            losses = [one for one in path.stability([n], new).critical_points if one.flipped == flipped]
+            losses = [one for one in path.stability([n], new).critical_points if one.antisymmetric_about == flipped]
             best = max(losses, key=lambda one: purity(one, radius, length), default=None)
             if best is not None and purity(best, radius, length) > 0.7:
                 found[n, flipped] = best

@@ -35,7 +35,8 @@ def blow(elements, mould):
 
 def numbers(found):
     """Return the numbers of the summary, N and cm."""
-    summary = {"axisymmetric": {"largest_force_N": 100 * found.largest_force, "travel_cm": found.at_travel,
+    summary = {"axisymmetric": {"largest_force_N": 100 * found.largest_force,
+                                "travel_cm": found.travel_at_largest_force,
                                 "travel_reached_cm": float(found.travel.max()), "ended": found.ended}}
     for n in found.stability.numbers:
         if (buckling := found.buckling(n)) is not None:

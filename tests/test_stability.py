@@ -66,10 +66,10 @@ def test_rigid_motions_have_no_energy(material):
     with path.problem.state_context(path.last):
         for n, free in ((0, 1), (1, 1), (2, 0)):
             variation.fill(n)
-            assert len(variation.rigid) == free
+            assert len(variation.rigid_motions) == free
             variation._pin = lambda: None
             matrix = sparse(variation.fill(n))
-            for mode in variation.rigid:
+            for mode in variation.rigid_motions:
                 assert np.abs(matrix @ mode).max() < 1e-10 * abs(matrix).max()
             del variation._pin
 
@@ -182,7 +182,7 @@ def test_flipped_half_is_the_whole():
     found = half.stability([1, 2])
     b = [1 + 2 * loss.control / (np.pi / 0.2) for loss in found.critical_points]
     assert a == pytest.approx(sorted(b, reverse=True), abs=1e-7) and len(a) == 2
-    assert {loss.flipped for loss in found.critical_points} == {None, "bottom"}
+    assert {loss.antisymmetric_about for loss in found.critical_points} == {None, "bottom"}
 
 
 def test_ring_under_outer_pressure():
@@ -260,7 +260,7 @@ scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symme
 path = fx.trace(scene, until=fx.travel(-1.2), progress=False)
 found = path.stability(range(3))
 if MPI.COMM_WORLD.rank == 0:
-    print(json.dumps([[loss.number, loss.control, *loss.at] for loss in found.critical_points]))
+    print(json.dumps([[loss.number, loss.control, *loss.position] for loss in found.critical_points]))
 """
 
 
@@ -362,7 +362,7 @@ def test_hoop_resultants():
     path = fx.trace(scene, until=fx.travel(-0.2), progress=False)      # a stretch of 0.9
     found = path.hoop_resultants()
     assert found.resultant == pytest.approx(2 * (0.1 + 5 * 0.3) * (0.9 - 0.9**-5), rel=1e-8)
-    assert found.compressed.all() and found.least[0] == found.resultant.min()
+    assert found.compressed.all() and found.minimum[0] == found.resultant.min()
     assert np.ptp(path.hoop_resultants(path.states[0]).resultant) == 0
     path = fx.trace(treloar((40, 1), model=fx.Membrane()), until=fx.pole_stretch(3.0), progress=False)
     found = path.hoop_resultants()
@@ -393,7 +393,7 @@ def test_top_load_of_a_tube():
                         step=fx.StepControl(largest=0.1))
     assert found.largest_force > 0 and str(found).startswith("top load, elastic")
     for n in (1, 2):
-        pair, loss = found.buckling(n), found.of(n)
+        pair, loss = found.buckling(n), found.first_of(n)
         assert (pair is None) == (loss is None)
         if pair is not None:
             assert 0 < pair[1] <= 0.8

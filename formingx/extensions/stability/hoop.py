@@ -43,8 +43,8 @@ class HoopResultants(ColumnTable):
         return self.resultant < 0
 
     @property
-    def least(self) -> tuple[float, float]:
-        """Smallest resultant, and the reference radius of its point, length."""
+    def minimum(self) -> tuple[float, float]:
+        """Smallest resultant, force/length, and the reference radius of its point, length."""
         k = int(np.argmin(self.resultant))
         return float(self.resultant[k]), float(self.points[k, 0])
 

@@ -35,7 +35,7 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     instance("with_imperfection: mesh", mesh, Mesh, "a mesh")
     mode = instance("with_imperfection: mode", mode, CriticalPoint, "a CriticalPoint that Path.stability found")
     amplitude = finite("with_imperfection: amplitude", amplitude)
-    if mode.number or mode.flipped:
+    if mode.number or mode.antisymmetric_about:
         raise InputError(f"with_imperfection: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"
                          " plane: no mesh of the section can have it; give a mode of n = 0")
     grid = gathered(mesh)

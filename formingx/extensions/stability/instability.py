@@ -18,7 +18,7 @@ from ...results.show.picture import Picture
 from ...run_hooks import RunExtension
 from ...solve.record import Record
 from ...solve.state import State
-from .modes import Kind, Located, Modes
+from .modes import LocatedPoint, ModeClass, Modes
 
 
 @dataclass(eq=False, repr=False)
@@ -30,13 +30,13 @@ class CriticalPoint:
 
     Attributes:
         path: the computed `Path`.
-        found: the located point, a `formingx.extensions.stability.modes.Located`.
+        located: the located point, a `formingx.extensions.stability.modes.LocatedPoint`.
         number: circumferential wave number n; in plane strain the wave number k along the depth, 1/length.
-        flipped: name of the symmetry plane about which the mode is antisymmetric, or None.
+        antisymmetric_about: name of the symmetry plane about which the mode is antisymmetric, or None.
         left: last state of the path before the point.
         right: first state of the path behind the point.
         state: state at the point, with its output quantities `measures`.
-        gained: True if the mode becomes unstable, False if it becomes stable again.
+        becomes_unstable: True if the mode becomes unstable, False if it becomes stable again.
         control: value of the controlled quantity (pressure, travel, time), the user's units.
         driven: name of the controlled quantity.
         limit_point: True if the point is a limit point of the controlled quantity (n = 0). No branch begins there.
@@ -46,7 +46,7 @@ class CriticalPoint:
     """
 
     path: Any
-    found: Located
+    located: LocatedPoint
     control: float
     driven: str
     limit_point: bool
@@ -56,21 +56,21 @@ class CriticalPoint:
     @property
     def number(self) -> float:
         """Wave number of the mode: n round the axis; in plane strain k along the depth, 1/length."""
-        return self.found.kind.number
+        return self.located.kind.number
 
     @property
-    def flipped(self) -> str | None:
+    def antisymmetric_about(self) -> str | None:
         """Name of the symmetry plane about which the mode is antisymmetric, or None."""
-        return self.found.kind.flipped
+        return self.located.kind.antisymmetric_about
 
-    left = property(lambda self: self.found.left)
-    right = property(lambda self: self.found.right)
-    state = property(lambda self: self.found.state)
-    gained = property(lambda self: self.found.gained)
-    solved = property(lambda self: self.found.solved)
+    left = property(lambda self: self.located.left)
+    right = property(lambda self: self.located.right)
+    state = property(lambda self: self.located.state)
+    becomes_unstable = property(lambda self: self.located.becomes_unstable)
+    solved = property(lambda self: self.located.solved)
 
     @property
-    def at(self) -> tuple[float, ...]:
+    def position(self) -> tuple[float, ...]:
         """Reference position (R, Z) of the node with the largest displacement in the mode, length."""
         return without_round_off(self.points[np.argmax(np.linalg.norm(self.amplitudes, axis=1))], self.points)
 
@@ -90,17 +90,17 @@ class CriticalPoint:
         """
         if sense not in (1, -1):
             raise InputError(f"CriticalPoint.branch: sense = {sense!r}: must be 1 or -1")
-        if self.number or self.flipped or self.limit_point:
+        if self.number or self.antisymmetric_about or self.limit_point:
             why = "is a limit point, through which the path itself goes on" if self.limit_point else (
                 "varies round the body, or is antisymmetric about a mirror plane: its branch leaves this scene")
             raise InputError(f"CriticalPoint.branch: the mode {why}; branches of n = 0 can be followed")
         segment = self.path.segment(self.left)
         curve, problem = segment.curve, segment.problem
-        start = State(self.state.x.copy(), self.state.control, self.found.x, 0.0, kind="branch point",
+        start = State(self.state.x.copy(), self.state.control, self.located.x, 0.0, kind="branch point",
                       history_variables=self.left.history_variables, stage=self.left.stage,
                       setting=self.left.setting, time=self.state.time)
         zero = State(0 * start.x, 0.0, 0 * start.x, 0.0)
-        start.direction = sense * self.found.x / curve.moved(zero, State(self.found.x, 0.0, zero.x, 0.0))
+        start.direction = sense * self.located.x / curve.moved(zero, State(self.located.x, 0.0, zero.x, 0.0))
         record = Record(problem, curve)
         states = segment.states
         record.segments[-1].states += [*states[: states.index(self.left) + 1], start]
@@ -128,7 +128,7 @@ class CriticalPoint:
         return Picture(file)
 
     def __repr__(self) -> str:
-        return f"CriticalPoint(n={self.number:g}, {_shown(self)})"
+        return f"CriticalPoint(n={self.number:g}, {_description(self)})"
 
 
 class Stability:
@@ -143,7 +143,7 @@ class Stability:
         critical_points: points at which a mode becomes unstable or stable again, in order along the path.
     """
 
-    def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[Kind, list[int]],
+    def __init__(self, path: Any, numbers: list[float], states: list[State], counts: dict[ModeClass, list[int]],
                  critical_points: list[CriticalPoint]):
         self.path, self.numbers, self.states, self.critical_points = path, numbers, states, critical_points
         self.counts = {tuple(kind): np.array(found) for kind, found in counts.items()}
@@ -151,7 +151,7 @@ class Stability:
     @property
     def bifurcations(self) -> list[CriticalPoint]:
         """Critical points at which a mode becomes unstable, without limit points."""
-        return [point for point in self.critical_points if point.gained and not point.limit_point]
+        return [point for point in self.critical_points if point.becomes_unstable and not point.limit_point]
 
     @property
     def first(self) -> CriticalPoint | None:
@@ -178,25 +178,25 @@ class Stability:
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
-        lines += [f"  {unit} = {point.number:g}: {_shown(point)}" for point in self.critical_points]
+        lines += [f"  {unit} = {point.number:g}: {_description(point)}" for point in self.critical_points]
         return "\n".join(lines if len(lines) > 1 else [*lines, "  no mode is unstable"])
 
     __repr__ = __str__
 
 
-def _shown(point: CriticalPoint) -> str:
+def _description(point: CriticalPoint) -> str:
     """Return kind, control and position of a critical point as a line of text."""
     states = point.path.states
-    what = "limit point" if point.limit_point else "lost" if point.gained else "regained"
-    R, Z = point.at
+    what = "limit point" if point.limit_point else "lost" if point.becomes_unstable else "regained"
+    R, Z = point.position
     parts = [f"{what} at {point.driven} {point.control:.6g}",
              f"between states {states.index(point.left)} and {states.index(point.right)}",
              f"largest at R = {R:.4g}, Z = {Z:.4g}", "solved for" if point.solved else "interpolated"]
-    return ", ".join(parts + [f"antisymmetric about {point.flipped!r}"] * bool(point.flipped))
+    return ", ".join(parts + [f"antisymmetric about {point.antisymmetric_about!r}"] * bool(point.antisymmetric_about))
 
 
 class StabilityAnalysis:
-    """Number of unstable modes in the states of a path; stores the stiffness and mass matrices of each mesh.
+    """Stability analysis of the states of a path; keeps the matrix and the factors of each mesh for further calls.
 
     Args:
         path: the `Path`.
@@ -206,7 +206,7 @@ class StabilityAnalysis:
         self._path, self._modes = path, {}                              # type: ignore[var-annotated]
 
     def modes_of(self, segment: Any) -> Modes:
-        """Return the unstable modes of the problem of a segment, created at the first call.
+        """Return the object that computes the modes on the mesh of a segment, created at the first call.
 
         Args:
             segment: the part of the path on one mesh.
@@ -230,38 +230,38 @@ class StabilityAnalysis:
             Counts and critical points.
         """
         numbers = wave_numbers(self._path.problem.scene, modes)
-        chosen = _chosen(self._path, states)
-        counts: dict[Kind, list[int]] = {}
+        chosen = _selected_states(self._path, states)
+        counts: dict[ModeClass, list[int]] = {}
         critical_points: list[CriticalPoint] = []
-        known: dict[tuple[int, Kind], int] = {}
+        counted: dict[tuple[int, ModeClass], int] = {}
 
-        def count_at(state: State, kind: Kind) -> int:
+        def unstable_modes(state: State, kind: ModeClass) -> int:
             """Return the number of unstable modes in a state, computed once."""
             key = id(state), kind
-            if key not in known:
-                known[key] = self.modes_of(self._path.segment(state)).count(state, kind)
-            return known[key]
-        kinds = [Kind(n, flipped) for n in numbers
-                 for flipped in (None, *self.modes_of(self._path.segments[-1]).variation.mirrors)]
+            if key not in counted:
+                counted[key] = self.modes_of(self._path.segment(state)).count(state, kind)
+            return counted[key]
+        kinds = [ModeClass(n, plane) for n in numbers
+                 for plane in (None, *self.modes_of(self._path.segments[-1]).variation.mirrors)]
         for kind in kinds:
-            counts[kind] = [count_at(state, kind) for state in chosen]
+            counts[kind] = [unstable_modes(state, kind) for state in chosen]
             for a, b in zip(chosen, chosen[1:]):
-                critical_points += self._between(a, b, kind, count_at)
+                critical_points += self._between(a, b, kind, unstable_modes)
         order = self._path.states
         critical_points.sort(key=lambda point: (order.index(point.left),
                                                 abs(point.state.control - point.left.control)))
         return Stability(self._path, numbers, chosen, counts, critical_points)
 
-    def _between(self, a: State, b: State, kind: Kind, count_at: Any) -> list[CriticalPoint]:
+    def _between(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
         """Return the critical points of modes of one kind between two states, located between neighbours of the path.
 
         Args:
             a: the first state.
             b: the second state.
             kind: wave number and symmetry of the modes.
-            count_at: function of state and kind that returns the number of unstable modes.
+            unstable_modes: function of state and kind that returns the number of unstable modes.
         """
-        if count_at(a, kind) == count_at(b, kind):
+        if unstable_modes(a, kind) == unstable_modes(b, kind):
             return []
         segment = self._path.segment(a)
         states = [s for s in segment.states if s.kind != "limit point" or kind.number]
@@ -270,16 +270,16 @@ class StabilityAnalysis:
         i, j = states.index(a), states.index(b)
         if j > i + 1:
             middle = states[(i + j) // 2]
-            return self._between(a, middle, kind, count_at) + self._between(middle, b, kind, count_at)
+            return self._between(a, middle, kind, unstable_modes) + self._between(middle, b, kind, unstable_modes)
         if a.setting != b.setting:
             return []
-        low, high = sorted((count_at(a, kind), count_at(b, kind)))
-        expected = not kind.number and not kind.flipped and a.slope * b.slope < 0
+        low, high = sorted((unstable_modes(a, kind), unstable_modes(b, kind)))
+        expected = not kind.number and not kind.antisymmetric_about and a.slope * b.slope < 0
         found = [self.modes_of(segment).locate(a, b, kind, index) for index in range(low, high)]
         limits = [self._is_limit_point(segment, entry) for entry in found] if expected else [False] * len(found)
         return [self._critical_point(segment, entry, limit) for entry, limit in zip(found, limits, strict=True)]
 
-    def _is_limit_point(self, segment: Any, found: Located) -> bool:
+    def _is_limit_point(self, segment: Any, found: LocatedPoint) -> bool:
         """Return True if the mode of a located point is nearly parallel to the tangent of the path: a limit point."""
         x, direction = found.x, found.left.direction
         problem = segment.problem
@@ -290,8 +290,8 @@ class StabilityAnalysis:
             vector.destroy()
         return bool(cosine > 0.5)
 
-    def _critical_point(self, segment: Any, found: Located, limit: bool) -> CriticalPoint:
-        """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks and output quantities.
+    def _critical_point(self, segment: Any, found: LocatedPoint, limit: bool) -> CriticalPoint:
+        """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks.
 
         Args:
             segment: the part of the path on one mesh.
@@ -352,15 +352,15 @@ class InstabilityCondition(RunExtension):
             path: the `Path` that the run continues.
         """
         analysis, numbers = StabilityAnalysis(path), wave_numbers(path.problem.scene, self.modes)
-        first: dict[Kind, int] = {}
+        first: dict[ModeClass, int] = {}
 
         def examine() -> None:
-            """End the run if the last state has more unstable modes of a kind than the first state."""
+            """End the run if the last state has more unstable modes of a wave number than the first state."""
             state = path.last
             modes = analysis.modes_of(path.segment(state))
-            for kind in (Kind(n, flipped) for n in numbers for flipped in (None, *modes.variation.mirrors)):
+            for kind in (ModeClass(n, plane) for n in numbers for plane in (None, *modes.variation.mirrors)):
                 unstable = modes.count(state, kind)
-                if not (kind.number or kind.flipped):
+                if not (kind.number or kind.antisymmetric_about):
                     unstable -= state.slope * path.states[0].slope < 0      # a limit point is expected
                 if unstable > first.setdefault(kind, unstable):
                     path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
@@ -404,20 +404,20 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
         raise InputError(f"stability: modes = {modes!r}: must be several numbers of waves, such as range(9)") from None
-    axisymmetric, most = scene.kinematics.axisymmetric, _max_wave_number(scene)
+    axisymmetric, largest = scene.kinematics.axisymmetric, _max_wave_number(scene)
     for n in numbers:
         if n < 0 or axisymmetric and n != int(n):
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
                              * axisymmetric)
-        if n > most:
+        if n > largest:
             raise InputError(f"stability: modes: {n:g}: waves that are shorter than the shortest edge of an element"
-                             f" have no shape on this mesh: must be at most {most:.4g}")
+                             f" have no shape on this mesh: must be at most {largest:.4g}")
     if not numbers:
         raise InputError("stability: modes: must be at least one")
     return list(dict.fromkeys(numbers))
 
 
-def _chosen(path: Any, states: Any) -> list[State]:
+def _selected_states(path: Any, states: Any) -> list[State]:
     """Return the states to examine, in order along the path, without limit points unless they are given.
 
     Args:

@@ -21,28 +21,28 @@ from .second_variation import SecondVariation
 
 
 @dataclass(frozen=True)
-class Lanczos:
+class LanczosSettings:
     """Settings of the Lanczos method, which computes modes with the inverse of the second variation K.
 
     Attributes:
         steps: maximum number of steps, each a solve with the stored LU factors.
-        accurate: relative error of an eigenvalue at which the iteration ends.
-        exhausted: norm of the remainder of a new vector, over the largest eigenvalue of the inverse, that is round-off.
-            All modes are then found.
+        tolerance: relative error of an eigenvalue at which the iteration ends.
+        round_off: norm of a new Lanczos vector after orthogonalisation, over the largest eigenvalue of K^-1 M. A
+            smaller vector is round-off: all modes have been found.
     """
 
     steps: int = 80
-    accurate: float = 1e-10
-    exhausted: float = 1e-14
+    tolerance: float = 1e-10
+    round_off: float = 1e-14
 
 
 @dataclass(frozen=True)
-class Locating:
+class LocationSettings:
     """Settings for the location of a critical point between two states.
 
     Attributes:
         states: maximum number of states to solve for.
-        located: tolerance of the position of the point, relative to the distance of the two states.
+        tolerance: tolerance of the position of the point, relative to the distance of the two states.
         offset: distance on either side of the point at which the number of unstable modes is counted, relative as
             above.
         patience: number of steps without halving of the bracket after which it is bisected.
@@ -52,26 +52,26 @@ class Locating:
     """
 
     states: int = 60
-    located: float = 1e-8
+    tolerance: float = 1e-8
     offset: float = 1e-6
     patience: int = 3
     min_overlap: float = 0.7
     max_deviation: float = 0.1
 
 
-class Kind(NamedTuple):
+class ModeClass(NamedTuple):
     """Wave number and symmetry of a class of modes.
 
     Attributes:
         number: circumferential wave number n; in plane strain the wave number k along the depth, 1/length.
-        flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
+        antisymmetric_about: name of the symmetry plane about which the modes are antisymmetric, or None.
     """
 
     number: float
-    flipped: str | None = None
+    antisymmetric_about: str | None = None
 
 
-class Located(NamedTuple):
+class LocatedPoint(NamedTuple):
     """Critical point between two states, at which a mode becomes unstable or stable again.
 
     Attributes:
@@ -82,23 +82,23 @@ class Located(NamedTuple):
         fraction: position of the point between `left` (0) and `right` (1).
         mode: amplitudes (U, W, V) at the `nodes` of the `SecondVariation`, locally owned entries, shape (m, 3).
         x: U, W and pressures of the mode as unknowns of the problem, locally owned entries.
-        gained: True if the mode is unstable behind the point.
+        becomes_unstable: True if the mode is unstable behind the point.
         solved: True if `state` is a converged solution, False if it lies on the cubic between `left` and `right`.
     """
 
-    kind: Kind
+    kind: ModeClass
     left: State
     right: State
     state: State
     fraction: float
     mode: Array
     x: Array
-    gained: bool
+    becomes_unstable: bool
     solved: bool
 
 
-class _Sample(NamedTuple):
-    """Unstable modes, and modes nearest to the stability limit, of a state between two others.
+class _ModesOfState(NamedTuple):
+    """Number of unstable modes of a state, and its modes with eigenvalues nearest to 0.
 
     Attributes:
         fraction: position of the state between the two others, from 0 to 1.
@@ -116,7 +116,7 @@ class _Sample(NamedTuple):
 
 
 class Modes:
-    """Unstable modes of the states of a problem, and critical points between its states.
+    """Modes of the second variation in the states of a problem: their number, and critical points between two states.
 
     Args:
         curve: the `Curve` of the problem, which solves for states.
@@ -132,14 +132,14 @@ class Modes:
         InputError: a membrane, an elastic support, or a load without a second variation.
     """
 
-    def __init__(self, curve: Curve, lanczos: Lanczos | None = None, locating: Locating | None = None):
+    def __init__(self, curve: Curve, lanczos: LanczosSettings | None = None, locating: LocationSettings | None = None):
         self.curve, self.problem = curve, curve.problem
-        self._settings, self._locating = lanczos or Lanczos(), locating or Locating()
+        self._settings, self._locating = lanczos or LanczosSettings(), locating or LocationSettings()
         self.variation = SecondVariation(curve.problem)
         self._solver = DirectSolver(self.variation.matrix, True, inertia=True)
         self._in, self._out = self.variation.matrix.createVecs()
 
-    def count(self, state: State, kind: Kind) -> int:
+    def count(self, state: State, kind: ModeClass) -> int:
         """Return the number of unstable modes with a wave number and symmetry in a state.
 
         Args:
@@ -152,7 +152,7 @@ class Modes:
         with self.problem.state_context(state):
             return self._count(kind)
 
-    def _count(self, kind: Kind) -> int:
+    def _count(self, kind: ModeClass) -> int:
         """Return the number of unstable modes of a wave number and symmetry at the present state of the problem.
 
         Raises:
@@ -161,9 +161,9 @@ class Modes:
         self.variation.fill(*kind)
         if not self._solver.factorise():
             raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
-        return self._solver.negative_pivots() - self.variation.negative
+        return self._solver.negative_pivots() - self.variation.negative_pivots
 
-    def locate(self, a: State, b: State, kind: Kind, index: int) -> Located:
+    def locate(self, a: State, b: State, kind: ModeClass, index: int) -> LocatedPoint:
         """Locate the critical point between two states at which an eigenvalue of the second variation is 0.
 
         Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode. The
@@ -178,26 +178,26 @@ class Modes:
         Returns:
             The critical point.
         """
-        samples = [self._sample(0.0, a, kind, index), self._sample(1.0, b, kind, index)]
+        samples = [self._modes_of(0.0, a, kind, index), self._modes_of(1.0, b, kind, index)]
         (low, high), settings = samples, self._locating
-        gained, solved, shrunk = high.unstable > low.unstable, True, 0
+        becomes_unstable, solved, slow = high.unstable > low.unstable, True, 0
         while True:
-            values = self._track(samples, high if gained else low, index)
-            guess = _root(values, low.fraction, high.fraction) if shrunk < settings.patience else None
-            fraction, shrunk = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, shrunk)
+            values = self._track(samples, high if becomes_unstable else low, index)
+            guess = _root(values, low.fraction, high.fraction) if slow < settings.patience else None
+            fraction, slow = ((low.fraction + high.fraction) / 2, 0) if guess is None else (guess, slow)
             nearest = min(samples, key=lambda sample: abs(sample.fraction - fraction))
             width = high.fraction - low.fraction
             if width < 2 * settings.offset or len(samples) == settings.states:
                 break
-            if abs(nearest.fraction - fraction) < settings.located:     # the root may belong to another mode
+            if abs(nearest.fraction - fraction) < settings.tolerance:     # the root may belong to another mode
                 fraction = low.fraction + settings.offset if nearest is low else high.fraction - settings.offset
             try:
-                samples.append(new := self._sample(fraction, self._between(a, b, fraction), kind, index))
+                samples.append(new := self._modes_of(fraction, self._between(a, b, fraction), kind, index))
             except Failure:
                 solved = False
                 break
-            low, high = (low, new) if (new.unstable > index) is gained else (new, high)
-            shrunk = 0 if high.fraction - low.fraction < width / 2 else shrunk + 1
+            low, high = (low, new) if (new.unstable > index) is becomes_unstable else (new, high)
+            slow = 0 if high.fraction - low.fraction < width / 2 else slow + 1
         state, exact = nearest.state, width < 2 * settings.offset
         if exact:
             fraction = nearest.fraction
@@ -208,11 +208,11 @@ class Modes:
         with self.problem.state_context(nearest.state):
             self.variation.fill(*kind)
             x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._mode_of_index(nearest, index)
-            mode, plane = self.variation.amplitudes(x), self.variation.plane(x)
-        return Located(kind, a, b, state, fraction, mode, plane, gained, solved and exact)
+            mode, unknowns = self.variation.amplitudes(x), self.variation.problem_unknowns(x)
+        return LocatedPoint(kind, a, b, state, fraction, mode, unknowns, becomes_unstable, solved and exact)
 
-    def _sample(self, fraction: float, state: State, kind: Kind, index: int) -> _Sample:
-        """Return the number of unstable modes in a state, and the modes nearest to the stability limit.
+    def _modes_of(self, fraction: float, state: State, kind: ModeClass, index: int) -> _ModesOfState:
+        """Return the number of unstable modes in a state, and its modes with eigenvalues nearest to 0.
 
         Args:
             fraction: position of the state between two others, from 0 to 1.
@@ -222,9 +222,9 @@ class Modes:
         """
         with self.problem.state_context(state):
             count = self._count(kind)
-            return _Sample(fraction, state, count, *self._lanczos(4 + abs(count - index)))
+            return _ModesOfState(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
-    def _mode_of_index(self, sample: _Sample, index: int) -> Array:
+    def _mode_of_index(self, sample: _ModesOfState, index: int) -> Array:
         """Return the mode of eigenvalue number `index` (ascending, from 0) of a state, or the nearest one known.
 
         sample: eigenvalues and modes of the state.
@@ -233,11 +233,11 @@ class Modes:
         k = (negative[-1] + 1 if len(negative) else 0) + index - sample.unstable
         return sample.modes[min(max(k, 0), len(sample.modes) - 1)]
 
-    def _track(self, samples: list[_Sample], end: _Sample, index: int) -> list[tuple[float, float]]:
-        """Return (fraction, eigenvalue) of one mode in all sampled states in which it is found again.
+    def _track(self, samples: list[_ModesOfState], end: _ModesOfState, index: int) -> list[tuple[float, float]]:
+        """Return (fraction, eigenvalue) of one mode in all sampled states in which a mode has nearly the same shape.
 
         Args:
-            samples: eigenvalues and modes of states between two others.
+            samples: eigenvalues and modes of the ends of the step and of states in between.
             end: the end of the bracket at which the mode is unstable.
             index: number of the eigenvalue there, in ascending order.
         """
@@ -275,26 +275,26 @@ class Modes:
         number: number of eigenvalues.
         """
         variation = self.variation
-        out: list[Array] = []
-        for mode in variation.rigid:
-            out.append(self._normal(self._clean(mode, out)))
+        removed: list[Array] = []
+        for mode in variation.rigid_motions:
+            removed.append(self._normalised(self._orthogonalised(mode, removed)))
         rng = np.random.default_rng(0)
         first = self._in.getOwnershipRange()
         start = rng.standard_normal(self._in.getSize())[first[0]: first[1]]
-        basis = [self._normal(self._clean(self._invert(start), out))]
+        basis = [self._normalised(self._orthogonalised(self._solve(start), removed))]
         alpha: list[float] = []
         beta: list[float] = []
         while True:
-            w = self._invert(basis[-1])
+            w = self._solve(basis[-1])
             alpha.append(self._inner(w, basis[-1]))
-            w = self._clean(self._clean(w, out + basis), out + basis)
+            w = self._orthogonalised(self._orthogonalised(w, removed + basis), removed + basis)
             size = np.sqrt(max(self._inner(w, w), 0.0))
             T = np.diag(alpha) + np.diag(beta, 1) + np.diag(beta, -1)
             theta, vectors = np.linalg.eigh(T)
             best = np.argsort(-abs(theta))[:number]
             residuals = size * abs(vectors[-1, best])
-            accurate = len(alpha) >= number and np.all(residuals < self._settings.accurate * abs(theta[best]))
-            if accurate or len(alpha) == self._settings.steps or size < self._settings.exhausted * abs(theta).max():
+            converged = len(alpha) >= number and np.all(residuals < self._settings.tolerance * abs(theta[best]))
+            if converged or len(alpha) == self._settings.steps or size < self._settings.round_off * abs(theta).max():
                 break
             beta.append(size)
             basis.append(w / size)
@@ -302,7 +302,7 @@ class Modes:
         modes = vectors[:, best].T @ np.array(basis)
         return 1 / theta[best], modes
 
-    def _invert(self, x: Array) -> Array:
+    def _solve(self, x: Array) -> Array:
         """Return K^-1 M x for the second variation K and the lumped mass M, locally owned entries."""
         self._in.array_w[:] = self.variation.mass(x)
         self._solver.solve(self._in, self._out)
@@ -312,12 +312,12 @@ class Modes:
         """Return the scalar product x M y of two modes with the lumped mass M, over all ranks."""
         return float(self.problem.comm.allreduce(float(x @ self.variation.mass(y))))
 
-    def _normal(self, x: Array) -> Array:
+    def _normalised(self, x: Array) -> Array:
         """Return a mode x scaled to x M x = 1 with the lumped mass M."""
         return x / np.sqrt(self._inner(x, x))
 
-    def _clean(self, x: Array, others: list[Array]) -> Array:
-        """Return x without its components along other vectors, which are orthonormal in the lumped mass."""
+    def _orthogonalised(self, x: Array, others: list[Array]) -> Array:
+        """Return a mode x without its components along other modes, which are orthonormal in the lumped mass."""
         if not others:
             return x
         basis = np.array(others)

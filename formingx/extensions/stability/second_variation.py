@@ -69,9 +69,9 @@ class SecondVariation:
     Attributes:
         matrix: symmetric PETSc matrix for the modes of the last `fill`. One unknown of each free rigid motion is
             constrained. This leaves other modes unchanged and makes the matrix regular.
-        rigid: rigid motions that the supports and contacts leave free, each a mode of locally owned entries, shape
-            (n,).
-        negative: number of negative pivots of `matrix` in a stable state.
+        rigid_motions: rigid motions that the supports and contacts leave free, each a mode, shape (n,), locally owned
+            entries.
+        negative_pivots: number of negative pivots of `matrix` in a stable state.
         nodes: reference positions of the locally owned nodes, shape (m, 2), length.
         mirrors: names of the symmetry planes about which modes may be antisymmetric.
 
@@ -100,33 +100,33 @@ class SecondVariation:
         self.matrix = self._matrix.mat
         self._constrained = np.zeros(0, dtype=np.int32)
 
-    def fill(self, number: float, flipped: str | None = None) -> Any:
+    def fill(self, number: float, antisymmetric_about: str | None = None) -> Any:
         """Assemble `matrix` at the present state for the modes of a wave number and symmetry.
 
         Args:
             number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
-            flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
+            antisymmetric_about: name of the symmetry plane about which the modes are antisymmetric, or None.
 
         Returns:
             `matrix` with new values.
         """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._m.value = number, m
-        self._constrained = self._find_constrained(number, flipped)
-        own = self._constrained[self._constrained < self._own]
+        self._constrained = self._find_constrained(number, antisymmetric_about)
+        owned = self._constrained[self._constrained < self._owned]
         inactive, rows = problem.setting.inactive, []
         for item_number, row, u in self._means:
             rows.append((row - m * u) * (item_number not in inactive))
-            rows[-1][own] = 0
+            rows[-1][owned] = 0
         self._matrix.constrain([fem.dirichletbc(fem.Function(self.space), self._constrained)], rows)
         self._rows = rows
-        self.negative = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
+        self.negative_pivots = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
         fields = problem.x.array_r[: problem.n_owned]
         blocks = [self._contact_stiffness(contact, fields, m) for contact in problem.present]
         guided = [self._guided_stiffness(fields, m)] if self._axisymmetric else []
         self._matrix.fill([*blocks, *guided])
-        self.rigid = self._find_rigid()
-        self._pin()
+        self.rigid_motions = self._find_rigid()
+        self._constrain_rigid()
         return self.matrix
 
     def mass(self, x: np.ndarray) -> np.ndarray:
@@ -142,7 +142,7 @@ class SecondVariation:
         m, out = self._m.value, np.zeros_like(x)
         round_axis = self._lumped * (x[V] - m * x[U])
         out[V], out[W], out[U] = round_axis, self._lumped * x[W], self._lumped * x[U] - m * round_axis
-        out[self._constrained[self._constrained < self._own]] = 0
+        out[self._constrained[self._constrained < self._owned]] = 0
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
@@ -157,8 +157,8 @@ class SecondVariation:
         U, W, V = self._unknowns[~self._bubble].T
         return np.column_stack([x[U], x[W], x[V] - self._m.value * x[U]])
 
-    def plane(self, x: np.ndarray) -> np.ndarray:
-        """Return the radial and axial amplitudes and the pressures of a mode as unknowns of the problem.
+    def problem_unknowns(self, x: np.ndarray) -> np.ndarray:
+        """Return the amplitudes U and W and the pressures of a mode in the order of the unknowns of the problem.
 
         Args:
             x: mode, locally owned entries, shape (n,).
@@ -175,12 +175,12 @@ class SecondVariation:
 
         They are modes of unit Euclidean norm, locally owned entries.
         """
-        kinematics, own = self.problem.scene.kinematics, self._constrained[self._constrained < self._own]
+        kinematics, owned = self.problem.scene.kinematics, self._constrained[self._constrained < self._owned]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
             return []
-        penalty = [self.comm.allreduce(R[:, own] @ R[:, own].T)]
-        penalty += [np.outer(v, v) for v in (self.comm.allreduce(R[:, : self._own] @ row) for row in self._rows)]
+        penalty = [self.comm.allreduce(R[:, owned] @ R[:, owned].T)]
+        penalty += [np.outer(v, v) for v in (self.comm.allreduce(R[:, : self._owned] @ row) for row in self._rows)]
         size, vectors = np.linalg.eigh(sum(penalty))
         free = [vector @ R for s, vector in zip(size, vectors.T) if s < 1e-14]
         return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
@@ -197,19 +197,18 @@ class SecondVariation:
             vector.destroy()
         return bool(forces < _FREE_MOTION_FORCE * single)
 
-    def _pin(self) -> None:
-        """Constrain in `matrix` one unknown of each free rigid motion, the largest after those before are constrained.
-        """
-        first, rest = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid]
+    def _constrain_rigid(self) -> None:
+        """Constrain one unknown of each free rigid motion in `matrix`: its largest, the earlier motions eliminated."""
+        first, remaining = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid_motions]
         rows = []
-        while rest:
-            mode = rest.pop(0)
+        while remaining:
+            mode = remaining.pop(0)
             largest = int(np.argmax(abs(mode))) if len(mode) else 0
             parts = self.comm.allgather((float(abs(mode).max(initial=0.0)), first + largest,
-                                         [float(entry[largest]) if len(mode) else 0.0 for entry in [mode, *rest]]))
-            _, row, (most, *others) = max(parts, key=lambda part: part[0])
+                                         [float(entry[largest]) if len(mode) else 0.0 for entry in [mode, *remaining]]))
+            _, row, (pivot, *others) = max(parts, key=lambda part: part[0])
             rows.append(row)
-            rest = [entry - other / most * mode for entry, other in zip(rest, others, strict=True)]
+            remaining = [entry - other / pivot * mode for entry, other in zip(remaining, others, strict=True)]
         if rows:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
@@ -233,16 +232,15 @@ class SecondVariation:
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
-            """Return the deformation gradient, changed by a mode within its blocks or across them (UFL, shape (3, 3)).
-            """
+            """Return F plus the entries of H in the blocks of F (section, hoop) or outside (UFL, shape (3, 3))."""
             return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])
-        now, change = ufl.split(forms.w)[1:], ufl.split(h)[1:]
-        then = [p + q for p, q in zip(now, change, strict=True)]
+        pressures_now, change = ufl.split(forms.w)[1:], ufl.split(h)[1:]
+        pressures_changed = [p + q for p, q in zip(pressures_now, change, strict=True)]
         scale, energy = forms.constant(1 / (forms.stress * forms.volume)), 0
         for _, names in forms.bodies:
-            for F_changed, pressures in ((changed(True), then), (changed(False), now)):
+            for F_changed, pressures in ((changed(True), pressures_changed), (changed(False), pressures_now)):
                 for density, metadata in forms.elastic_densities(names, F_changed, pressures):
                     energy += forms.weighted(scale * density, names, metadata)
         form = ufl.replace(ufl.derivative(ufl.derivative(energy, h, v), h, w), {h: ufl.zero(h.ufl_shape)})
@@ -254,11 +252,10 @@ class SecondVariation:
         return form
 
     def _number_unknowns(self) -> None:
-        """Set the nodes, the unknowns (U, W, V) of each node, and the unknown of the mode for each one of the problem.
-        """
+        """Set the nodes, their unknowns (U, W, V), and the map from unknowns of the problem to unknowns of a mode."""
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
-        self._own, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
+        self._owned, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
         ours = old.dofmap.index_map
         self._to_mode = np.zeros(ours.size_local + ours.num_ghosts, dtype=np.int32)
         components = range(forms.scene.kinematics.components)
@@ -281,7 +278,7 @@ class SecondVariation:
             X[np.asarray(numbers), i] = place.x.array
         on_axis = self._axisymmetric & (X[all_U, 0] < 1e-9 * forms.length) & ~bubble
         self._axis = np.column_stack([all_U, all_W, all_V])[on_axis]
-        own = all_U < self._own
+        own = all_U < self._owned
         self._unknowns = np.column_stack([all_U, all_W, all_V])[own]
         self._old, self._bubble, self._X = np.column_stack(old_lists)[own], bubble[own], X[all_U[own]]
         self.nodes = self._X[~self._bubble]
@@ -311,7 +308,7 @@ class SecondVariation:
         return fem.locate_dofs_geometrical((space, space.collapse()[0]),
                                            lambda X: np.hypot(X[0] - point[0], X[1] - point[1]) < near)[0]
 
-    def _find_constrained(self, number: float, flipped: str | None) -> np.ndarray:
+    def _find_constrained(self, number: float, antisymmetric_about: str | None) -> np.ndarray:
         """Return the local numbers of the constrained unknowns of modes, with ghosts.
 
         A boundary or node that is constrained in r and in z is also constrained round the axis. Examples are a clamped
@@ -319,27 +316,27 @@ class SecondVariation:
 
         Args:
             number: circumferential wave number; in plane strain the wave number along the depth.
-            flipped: name of the symmetry plane about which the modes are antisymmetric, or None.
+            antisymmetric_about: name of the symmetry plane about which the modes are antisymmetric, or None.
         """
-        problem, constrained, places = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
+        problem, constrained, supports = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
             items = [] if i in problem.setting.inactive else self._forms.constraints(scene_item)
             for item in items:
                 if isinstance(item, Constrained):
-                    if isinstance(scene_item, Symmetry) and scene_item.mirror and scene_item.on == flipped:
+                    if isinstance(scene_item, Symmetry) and scene_item.mirror and scene_item.on == antisymmetric_about:
                         constrained += [self._dofs(c, item) for c in (1 - item.component, 2)]
                     else:
                         constrained.append(self._dofs(item.component, item))
-                        places[item.component].append(item)
+                        supports[item.component].append(item)
         empty = np.zeros(0, dtype=np.int32)
         facets = [np.concatenate([empty, *(self._forms.mesh.facets_of(item.on) for item in found
-                                          if item.on is not None)]) for found in places.values()]
+                                          if item.on is not None)]) for found in supports.values()]
         both = np.intersect1d(*facets).astype(np.int32)
-        gripped = [fem.locate_dofs_topological(self.space.sub(0).sub(2), 1, both)]
-        gripped += [self._dofs(2, item) for item in places[0] if item.on is None
-                    and any(item.point == other.point for other in places[1])]
+        fixed_round_axis = [fem.locate_dofs_topological(self.space.sub(0).sub(2), 1, both)]
+        fixed_round_axis += [self._dofs(2, item) for item in supports[0] if item.on is None
+                    and any(item.point == other.point for other in supports[1])]
         marks = np.zeros(len(self._V_of), dtype=bool)
-        marks[np.concatenate(constrained + gripped)] = True
+        marks[np.concatenate(constrained + fixed_round_axis)] = True
         U, W, V = self._axis.T
         fixed = marks[V]
         marks[V] = True
@@ -359,19 +356,19 @@ class SecondVariation:
             means = {item.component: item for item in forms.constraints(scene_item)
                      if not isinstance(item, Constrained)}
             for item in means.values():
-                row = np.zeros(self._own)
+                row = np.zeros(self._owned)
                 row[self._to_mode[:n]] = problem.assemble(forms.compile(forms.mean_row(item)))
-                yield number, row, np.zeros(self._own)
+                yield number, row, np.zeros(self._owned)
                 if item.component == 0 and 1 in means:
-                    round_axis = np.zeros(self._own)
-                    round_axis[self._V_of[: self._own][row != 0]] = row[row != 0]
+                    round_axis = np.zeros(self._owned)
+                    round_axis[self._V_of[: self._owned][row != 0]] = row[row != 0]
                     yield number, round_axis, row
 
     def _contact_stiffness(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (unknowns, stiffness matrices) of the points of a contact, for `ExtendedMatrix.fill`.
+        """Return the unknowns, shape (n, k), and stiffness matrices, shape (n, k, k), of the n points of a contact.
 
         Args:
-            contact: the contact of the problem.
+            contact: the contact face of the problem.
             fields: locally owned unknowns of the problem.
             m: 1 for modes of one wave round the axis, whose third unknown is V + U; else 0.
         """
@@ -388,7 +385,7 @@ class SecondVariation:
         return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
 
     def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (unknowns, stiffness matrices) of nodes with a constrained radius that are free round the axis.
+        """Return unknowns, shape (n, 3), and stiffness, shape (n, 3, 3), of nodes that are fixed in r alone.
 
         The outward force f on such a node acts along a circle: its second variation by a hoop displacement V is -f
         V^2/r.

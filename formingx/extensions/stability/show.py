@@ -37,13 +37,13 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     from ...forms.probes import probe
     lines = []
     for name in mesh.boundaries:
-        at = mesh.line_of(name)
-        if point.path.problem.scene.kinematics.axisymmetric and at[:, 0].max() < 1e-9 * np.ptp(mesh.nodes_of(name)):
+        points = mesh.line_of(name)
+        if point.path.problem.scene.kinematics.axisymmetric and points[:, 0].max() < 1e-9 * np.ptp(mesh.nodes_of(name)):
             continue
         with segment.problem.state_context(state) as problem:
-            moved = at + probe(problem, at).displacement(problem.x)
-        away = np.linalg.norm(at[:, None] - point.points[None], axis=2)
-        lines.append((moved, point.amplitudes[np.argmin(away, axis=1)]))
+            moved = points + probe(problem, points).displacement(problem.x)
+        distances = np.linalg.norm(points[:, None] - point.points[None], axis=2)
+        lines.append((moved, point.amplitudes[np.argmin(distances, axis=1)]))
     return lines
 
 
@@ -73,8 +73,8 @@ def _draw(point: Any, lines: list, file: Any, scale: float) -> None:
             place = ((r * np.cos(turn) - v * np.sin(turn), r * np.sin(turn) + v * np.cos(turn), z) if axisymmetric
                      else (r, turn + v, z))
             surface = pyvista.StructuredGrid(*(np.ascontiguousarray(c)[..., None] for c in place))
-            most = U if np.abs(U).max() >= 0.3 * np.abs(W).max() else W
-            surface["mode"] = (most * np.cos(phase) / size).ravel(order="F")
+            largest = U if np.abs(U).max() >= 0.3 * np.abs(W).max() else W
+            surface["mode"] = (largest * np.cos(phase) / size).ravel(order="F")
             plotter.add_mesh(surface, scalars="mode", cmap="coolwarm", clim=(-1, 1), smooth_shading=True,
                              show_scalar_bar=False, ambient=0.4, diffuse=0.65, specular=0.2, split_sharp_edges=True)
         plotter.camera_position = [(2.0, -3.4, 1.2 if high > wide else 1.9), (0, 0, 0), (0, 0, 1)]

@@ -60,12 +60,12 @@ class TopLoad:
         return float(self.force.max())
 
     @property
-    def at_travel(self) -> float:
+    def travel_at_largest_force(self) -> float:
         """Travel of the neck at the largest force, length."""
         return float(self.travel[self.force.argmax()])
 
     @property
-    def peak(self) -> bool:
+    def passed_maximum(self) -> bool:
         """True if the force has its maximum before the last state; otherwise it may grow further."""
         return bool(self.force.argmax() < len(self.force) - 1)
 
@@ -74,7 +74,7 @@ class TopLoad:
         """First critical point at which a mode buckles, or None."""
         return self.stability.first
 
-    def of(self, number: float) -> CriticalPoint | None:
+    def first_of(self, number: float) -> CriticalPoint | None:
         """Return the first critical point at which a mode with a number of waves buckles.
 
         Args:
@@ -94,14 +94,14 @@ class TopLoad:
         Returns:
             Total force, force; travel, length, positive downwards. None if the body does not buckle so.
         """
-        point = self.of(number)
+        point = self.first_of(number)
         return None if point is None else (point.state.measures["support_force"], -point.control)
 
     @property
     def energy(self) -> float:
-        """Work of the force on the neck up to the first buckling, or else up to the largest force, length force."""
+        """Work of the force on the neck up to the first buckling, or else the largest force; force times length."""
         first = self.first
-        end = self.at_travel if first is None else -first.control
+        end = self.travel_at_largest_force if first is None else -first.control
         last = int(np.argmax(self.travel >= end * (1 - 1e-12)))
         x, F = self.travel[: last + 1].copy(), self.force[: last + 1].copy()
         if last and x[-1] > end:
@@ -116,9 +116,9 @@ class TopLoad:
         def pair(force: float, travel: float, between: str = ", ") -> str:
             """Return a force and a travel, as text."""
             return f"{text(force, 'force')}{between}travel {text(travel, 'travel', 4)}"
-        note = "" if self.peak else " (the last state: it may grow further)"
-        lines = ["top load, elastic:",
-                 f"  axisymmetric path: largest force {pair(self.largest_force, self.at_travel, ' at ')}{note}"]
+        note = "" if self.passed_maximum else " (the last state: it may grow further)"
+        largest = pair(self.largest_force, self.travel_at_largest_force, " at ")
+        lines = ["top load, elastic:", f"  axisymmetric path: largest force {largest}{note}"]
         for n in self.stability.numbers:
             if (found := self.buckling(n)) is not None:
                 lines.append(f"  n = {n:g}: buckles at force {pair(*found)}")
