@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
-from formingx.extensions.kbkz.integral import Integral
+from formingx.extensions.kbkz.integral import MemoryIntegral
 
 SPECTRUM = [(0.10, 0.01), (0.06, 0.1), (0.03, 1.0), (0.012, 10.0)]
 DAMPINGS = {"none": None, "psm": fx.PSM(alpha=10.0, beta=0.05), "wagner": fx.Wagner(alpha=0.1, beta=0.15),
@@ -47,15 +47,15 @@ def unimodular(rng, n):
 @pytest.mark.parametrize("name", DAMPINGS)
 def test_kernel_against_tensors_and_differences(name):
     rng, n = np.random.default_rng(3), 5
-    law = Integral(SPECTRUM, DAMPINGS[name], False, False)
+    law = MemoryIntegral(SPECTRUM, DAMPINGS[name], False, False)
     past, C = np.array([unimodular(rng, n) for _ in range(4)]), unimodular(rng, n)
     weights = law.weights(np.array([2.0, 1.1, 0.4, 0.0]))
-    assert law.after(weights, 0.0)[0].sum() == pytest.approx(sum(G for G, _ in SPECTRUM), rel=1e-12)
+    assert law.weights_after(weights, 0.0)[0].sum() == pytest.approx(sum(G for G, _ in SPECTRUM), rel=1e-12)
 
     def stress(C, step=0.3):
-        return law.stress(C, past, *law.after(weights, step))
+        return law.stress(C, past, *law.weights_after(weights, step))
     S, D, T = stress(C)
-    W = law.after(weights, 0.3)[0]
+    W = law.weights_after(weights, 0.3)[0]
 
     def tensor(e):
         return np.array([[e[0], e[2], 0], [e[2], e[1], 0], [0, 0, e[3]]])
@@ -200,12 +200,12 @@ def test_kbkz_demo_quick(tmp_path):
             for stretch, value in found[melt][mode]["rate_1"].items():
                 end = np.log(float(stretch))
 
-                def strained(age, end=end, k=k, damp=damp):
+                def damped_strain(age, end=end, k=k, damp=damp):
                     l = np.exp(min(age, end))                       # at the rate 1, from rest
                     B = np.array([l**2, l ** (2 * k), l ** (-2 - 2 * k)])
                     return (B[0] - B[2]) * damp(B.sum(), (1 / B).sum())
-                exact = sum(G * (np.exp(-end / tau) * strained(end) + quad(
-                    lambda x, tau=tau: np.exp(-x) * strained(x * tau), 0, min(end / tau, 40), limit=200)[0])
+                exact = sum(G * (np.exp(-end / tau) * damped_strain(end) + quad(
+                    lambda x, tau=tau: np.exp(-x) * damped_strain(x * tau), 0, min(end / tau, 40), limit=200)[0])
                     for G, tau in LDPE)
                 assert value == pytest.approx(exact, rel=2e-3), (melt, mode, stretch)
     for damping, pressures, thicknesses in (

@@ -1,4 +1,4 @@
-"""Integral constitutive laws of K-BKZ type."""
+"""MemoryIntegral constitutive laws of K-BKZ type."""
 
 from . import published
 

@@ -17,6 +17,9 @@ class Damping:
 
     It is 1 where I1 = tr B and I2 = tr B^-1 are both 3. With a term in I2 the stress h B has no potential: only
     functions of I1 alone have one.
+
+    Attributes:
+        bounds: {constant: (lowest, highest)} of the constants that `fit` varies, in the order of the arguments.
     """
 
     def __call__(self, I1: Any, I2: Any) -> Any:
@@ -36,7 +39,6 @@ class Damping:
         raise NotImplementedError
 
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({})
-    """{constant: (lowest, highest)} of the constants that `fit` varies, in the order of the arguments of the class."""
 
     @property
     def of_I1_alone(self) -> bool:

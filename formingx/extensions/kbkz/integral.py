@@ -19,14 +19,18 @@ import numpy as np
 from ...materials.tensors import cofactor, entries
 from .past_states import PastStates
 
-_COUNT = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
+_MULTIPLICITY = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
 """Number of times that each entry (11, 22, 12, 33) occurs in the tensor."""
 
 
-class Integral:
-    """Stress as a sum over the past states of a material with relaxation modes (G, tau).
+class MemoryIntegral:
+    r"""Stress as a sum over the past states of a material with relaxation modes (G, tau).
 
-    Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar is the isochoric part of C.
+    .. math:: S = \sum_k W_k \, h(I_1, I_2) \, \bar C_k^{-1}, \quad
+        I_1 = \bar C : \bar C_k^{-1}, \quad I_2 = \bar C^{-1} : \bar C_k
+
+    S is the second Piola-Kirchhoff stress up to a pressure, W_k the weight of past state k, h the damping function.
+    Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C.
 
     Args:
         spectrum: list of (G, tau), stress and time.
@@ -76,27 +80,27 @@ class Integral:
         w[1:] += young * (1 - mean)
         known = step[:-1] > 0                                   # a step before allows a parabola
         s = np.where(known, step[1:] / np.where(known, step[:-1], 1), np.inf)
-        ends, middle, first = (young[1:] * _bulge(step[1:]) * c for c in _parabola(s))
+        ends, middle, first = (young[1:] * _quadratic_weight(step[1:]) * c for c in _parabola_factors(s))
         w[2:] -= ends
         w[1:-1] += middle
         w[:-2] -= first
         return w
 
-    def after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
-              close: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the weights of K past states in the stress at the end of a step in reduced time.
+    def weights_after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
+                      allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the weights W of K past states in the stress at the end of a step in reduced time.
 
-        The step is exact if damping times inverse tensor of the past states is a parabola through the last states. So
-        it is of second order even for steps far longer than the relaxation times (`TransientNetwork`).
+        The step is exact if h Cbar_k^-1 is a parabola in time through the last two states and the end of the step. So
+        it is of second order even for steps far longer than the relaxation times (as in `TransientNetwork`).
 
         Args:
             weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
             step: length of the step in reduced time, a number or shape (n,).
-            before: reduced time between the last two states; 0: not known.
-            close: 1, or 0 where these two states differ much, shape (n,).
+            before: reduced time between the last two states; 0: not known, and no parabola is used.
+            allowed: 1, or 0 at points where these two states differ too much for a parabola, shape (n,).
 
         Returns:
-            Weights W and dW/dstep, shape (K, n or 1) each, stress and stress/time.
+            Weights W and dW/dstep, shape (K, n) or (K, 1) each, stress and stress/time.
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
@@ -108,17 +112,20 @@ class Integral:
         slope[-1] += np.sum(G / self.tau[:, None] * (_mean_decay_slope(y) + decay), axis=0)
         if len(W) > 1 and np.any(before):
             known = np.asarray(before) > 0
-            rate = np.where(known, close / np.where(known, before, 1), 0)
+            rate = np.where(known, allowed / np.where(known, before, 1), 0)
             shape = len(W), max(W.shape[1], np.size(rate))
             W, slope = np.broadcast_to(W, shape).copy(), np.broadcast_to(slope, shape).copy()
-            bulge, by_step = np.sum(G * _bulge(y), axis=0), np.sum(G / self.tau[:, None] * _bulge_slope(y), axis=0)
-            (_, middle, first), (middle_slope, first_slope) = _parabola(step * rate), _parabola_slopes(step * rate)
+            quadratic = np.sum(G * _quadratic_weight(y), axis=0)
+            by_step = np.sum(G / self.tau[:, None] * _quadratic_weight_slope(y), axis=0)
+            _, middle, first = _parabola_factors(step * rate)
+            middle_slope, first_slope = _parabola_factor_slopes(step * rate)
             for k, c, by_s in ((-1, middle, middle_slope), (-2, -first, -first_slope)):
-                W[k] += bulge * c
-                slope[k] += by_step * c + bulge * by_s * rate
+                W[k] += quadratic * c
+                slope[k] += by_step * c + quadratic * by_s * rate
         return W, slope
 
-    def damped(self, C: np.ndarray, past: np.ndarray, smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
+    def inverses_and_damping(self, C: np.ndarray, past: np.ndarray,
+                             smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
         """Return inverse tensors and damping of K past states at n points.
 
         Args:
@@ -133,8 +140,8 @@ class Integral:
         if self.damping is None:
             ones = np.ones((len(past), C.shape[1]))
             return inverse, ones, 0 * ones, 0 * ones
-        I1 = np.sum(_COUNT * inverse * C, axis=1)
-        I2 = np.sum(_COUNT * past * _inverse(C), axis=1)
+        I1 = np.sum(_MULTIPLICITY * inverse * C, axis=1)
+        I2 = np.sum(_MULTIPLICITY * past * _inverse(C), axis=1)
         h, h1, h2 = self.damping.derivatives(I1, I2)
         if smallest_h is not None:
             limited = h > smallest_h
@@ -155,24 +162,26 @@ class Integral:
         Returns:
             Stress S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
         """
-        inverse, h, h1, h2 = self.damped(C, past, smallest_h)
+        inverse, h, h1, h2 = self.inverses_and_damping(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
             return S, np.zeros((4, *S.shape)), T
         by_I2 = np.stack([C[3] * past[:, 1] + C[1] * past[:, 3], C[3] * past[:, 0] + C[0] * past[:, 3],
                           -2 * (C[3] * past[:, 2] + C[2] * past[:, 3]),
                           C[1] * past[:, 0] + C[0] * past[:, 1] - 2 * C[2] * past[:, 2]], axis=1)
-        slopes = (W * h1)[:, None] * _COUNT * inverse + (W * h2)[:, None] * by_I2
+        slopes = (W * h1)[:, None] * _MULTIPLICITY * inverse + (W * h2)[:, None] * by_I2
         return S, np.einsum("kin,kjn->ijn", inverse, slopes), T
 
     def potential(self, C: Any, coefficients: dict[str, Any], time_step: Any) -> Any:
-        """Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dCbar.
+        r"""Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dCbar.
 
-        S is the second Piola-Kirchhoff stress, Cbar = J^(-2/3) C.
+        .. math:: \tfrac12 (S_0 + T \Delta t) : \bar C + \tfrac14 \Delta \bar C : D : \Delta \bar C
+
+        S0, T = dS/dt, D = dS/dCbar and the Cbar from which its change counts are coefficients of the form.
 
         Args:
             C: entries 11, 22, 12, 33 of Cbar (UFL).
-            coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
+            coefficients: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
             time_step: length of the step (UFL scalar, time).
 
         Returns:
@@ -184,17 +193,15 @@ class Integral:
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
     def unsymmetric_work(self, C: Any, dC: Any, coefficients: dict[str, Any]) -> Any:
-        """Return the virtual work of the unsymmetric part of dS/dCbar, which `potential` lacks.
-
-        S is the second Piola-Kirchhoff stress, Cbar = J^(-2/3) C.
+        """Return the virtual work of the unsymmetric part of dS/dCbar, which has no potential (see `potential`).
 
         Args:
             C: entries 11, 22, 12, 33 of Cbar (UFL).
             dC: virtual changes of these entries (UFL).
-            coefficients: {name: coefficient of the form}, with the names of `Integral.coefficients`.
+            coefficients: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
 
         Returns:
-            Virtual work per volume (UFL, stress); 0 where the coefficients are exact.
+            Virtual work per reference volume (UFL, stress); 0 at the Cbar of the last refresh of the coefficients.
         """
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
@@ -216,44 +223,44 @@ def _mean_decay(x: np.ndarray) -> np.ndarray:
 
 
 def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of (1 - e^-x)/x."""
+    """Return the derivative of (1 - e^-x)/x by x."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = -1 / 2 + x / 3 - x**2 / 8 + x**3 / 30 - x**4 / 144
     return np.where(small, series, (np.exp(-y) * (1 + y) - 1) / y**2)
 
 
-def _parabola(s: Any) -> tuple[Any, Any, Any]:
-    """Return the factors of (-C^-1, C_n^-1, -C_n-1^-1) in the weight of a parabola through the last three states.
+def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
+    """Return the factors f, f (1 + s), f s of the three states that fix a parabola in time, with f = s/(1 + s).
 
-    C is the state at the end of the step, C_n the one at its start, C_n-1 the one before. The factors are f, f (1 + s)
-    and f s with f = s/(1 + s), reduced from s = 2 on and 0 from s = 4 on, where BDF2 is unstable.
+    They belong to the states at the end and at the start of the step, and at the start of the previous step. The first
+    and the last count negative. They decrease from s = 2 on and are 0 from s = 4 on, where BDF2 is unstable.
 
-    s: ratio of the step to the previous one.
+    s: ratio of the step to the previous one, dimensionless.
     """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
     return share / (1 + s), share, share * s / (1 + s)
 
 
-def _parabola_slopes(s: Any) -> tuple[Any, Any]:
-    """Return the derivatives by s of the last two results of `_parabola`."""
+def _parabola_factor_slopes(s: Any) -> tuple[Any, Any]:
+    """Return the derivatives of the last two results of `_parabola_factors` by the step ratio s."""
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
     return slope, slope * s / (1 + s) + share / (1 + s) ** 2
 
 
-def _bulge(x: np.ndarray) -> np.ndarray:
-    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of the quadratic part of a parabola over a step."""
+def _quadratic_weight(x: np.ndarray) -> np.ndarray:
+    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of the quadratic part over a step of x relaxation times."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
     return np.where(small, series, (y - 2 + (y + 2) * np.exp(-y)) / y**2)
 
 
-def _bulge_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of `_bulge`."""
+def _quadratic_weight_slope(x: np.ndarray) -> np.ndarray:
+    """Return the derivative of `_quadratic_weight` by x."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008
-    return np.where(small, series, (1 - (y + 1) * np.exp(-y)) / y**2 - 2 * _bulge(y) / y)
+    return np.where(small, series, (1 - (y + 1) * np.exp(-y)) / y**2 - 2 * _quadratic_weight(y) / y)

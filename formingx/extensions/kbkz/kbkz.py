@@ -25,7 +25,7 @@ from ...materials.material import Material
 from ...materials.relaxation import Relaxing, checked_pairs, checked_shift
 from ...materials.tensors import inner, isochoric
 from .damping import Damping
-from .integral import Integral
+from .integral import MemoryIntegral
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PANEL_AGE_RATIO = 1.5
@@ -71,7 +71,7 @@ class KBKZ(Relaxing):
         if damping is not None:
             instance("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
         self.damping = damping
-        self.integral = Integral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
+        self.integral = MemoryIntegral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
                                                                   "True or False"), shift is not None)
         if shift is not None:
             self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
@@ -111,8 +111,8 @@ class KBKZ(Relaxing):
         Returns:
             Moduli, shape (n,) or (1,), stress.
         """
-        rest = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
-        return np.atleast_1d(sum(G for G, _ in self.spectrum) + rest)
+        equilibrium = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
+        return np.atleast_1d(sum(G for G, _ in self.spectrum) + equilibrium)
 
     def strain_energy(self, F, **constants):
         """Return the energy of the instantaneous response without damping, for moduli and stresses at F = I.
@@ -132,7 +132,7 @@ class KBKZ(Relaxing):
 
         Args:
             F: deformation gradient at the end of the step (UFL, shape (3, 3)).
-            internal: {name: coefficient of the form}, with the names of `Integral.coefficients`.
+            internal: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
             time_step: length of the step (UFL scalar, time).
             constants: values of the constants by name.
 
@@ -146,7 +146,7 @@ class KBKZ(Relaxing):
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
-            internal: {name: coefficient of the form}, with the names of `Integral.coefficients`.
+            internal: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
             constants: values of the constants by name.
 
         Returns:
@@ -183,10 +183,10 @@ class KBKZ(Relaxing):
             if mode == "biaxial":
                 return self._biaxial(l) * (l if true else 1.0)
             branches.checked(f"{self}: stress", mode, np.zeros(l.size), l.ravel(), between)
-            at_once = self._modulus(0.0) * self._strained(mode, l) / l
+            at_once = self._modulus(0.0) * self._damped_difference(mode, l) / l
             return (at_once + self._relaxed_stress(mode, l)) * (l if true else 1.0)
         t, l = branches.checked(f"{self}: stress", mode, times, stretches, between)
-        found = np.array([self._at(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
+        found = np.array([self._true_stress(mode, t[:n + 1], l[:n + 1], between) for n in range(len(t))]) / l
         return (found + self._relaxed_stress(mode, l)) * (l if true else 1.0)
 
     def shear(self, rate: float, times: ArrayLike) -> np.ndarray:
@@ -204,6 +204,9 @@ class KBKZ(Relaxing):
         Returns:
             Shear stress, shape (n,), stress.
 
+        Raises:
+            InputError: a rate that is not above 0, or times that are not finite.
+
         >>> melt = fx.KBKZ([(1000.0, 1.0)])                                    # viscosity 1000 Pa s
         >>> round(float(melt.shear(0.1, [50.0])[0]), 6)
         100.0
@@ -211,8 +214,8 @@ class KBKZ(Relaxing):
         rate, t = positive(f"{self}: shear: rate", rate), finite_array(f"{self}: shear: times", times)
         modulus, tau = np.array(self.spectrum).T
 
-        def strained(strain: np.ndarray) -> np.ndarray:
-            """Return h times the shear strain."""
+        def damped_strain(strain: np.ndarray) -> np.ndarray:
+            """Return the damping h times a shear strain, any shape."""
             return strain * (1.0 if self.damping is None else self.damping(3 + strain**2, 3 + strain**2))
         found = []
         for now in np.atleast_1d(t):
@@ -220,8 +223,8 @@ class KBKZ(Relaxing):
             half = np.diff(ends)[:, None] / 2
             age = ends[:-1, None] + half * (1 + _NODES)
             memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
-            found.append(np.sum(half * _WEIGHTS * memory * strained(rate * age))
-                         + self._modulus(now) * strained(rate * now))
+            found.append(np.sum(half * _WEIGHTS * memory * damped_strain(rate * age))
+                         + self._modulus(now) * damped_strain(rate * now))
         return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
@@ -233,7 +236,7 @@ class KBKZ(Relaxing):
         return self._modulus(0.0) * h * (squares[:2] - squares[2]) / l + self._relaxed_stress("biaxial", l)
 
     def rupture_stretch(self, mode: str) -> float:
-        """Return the sudden stretch with the largest true stress.
+        """Return the stretch at which the true stress after a sudden stretch is largest.
 
         A larger sudden stretch carries no more stress: a damped melt that is stretched faster than it relaxes thins
         without end.
@@ -243,15 +246,18 @@ class KBKZ(Relaxing):
 
         Returns:
             The stretch; infinity without a maximum up to 100.
+
+        Raises:
+            InputError: an unknown mode.
         """
         known(f"{self}: rupture_stretch: mode", mode, MODES)
         l = np.geomspace(1, 100, 4000)
-        stresses = self._modulus(0.0) * self._strained(mode, l) + self._relaxed_stress(mode, l) * l
+        stresses = self._modulus(0.0) * self._damped_difference(mode, l) + self._relaxed_stress(mode, l) * l
         falls = np.flatnonzero(stresses[1:] < stresses[:-1])
         return float(l[falls[0]]) if len(falls) else np.inf
 
-    def _at(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
-        """Return the true stress difference tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
+    def _true_stress(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
+        """Return the true stress tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
 
         Args:
             mode: "uniaxial", "pure_shear" or "equibiaxial".
@@ -261,16 +267,16 @@ class KBKZ(Relaxing):
         """
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
-        initial = self._modulus(now - times[0]) * self._strained(mode, last)
-        ends = self._ages(times, stretches)
+        initial = self._modulus(now - times[0]) * self._damped_difference(mode, last)
+        ends = self._panel_ends(times, stretches)
         half = np.diff(ends)[:, None] / 2
         age = ends[:-1, None] + half * (1 + _NODES)
         memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
         relative = last / _interpolated(now - age, times, stretches, between)
-        return float(initial + np.sum(half * _WEIGHTS * memory * self._strained(mode, relative)))
+        return float(initial + np.sum(half * _WEIGHTS * memory * self._damped_difference(mode, relative)))
 
-    def _ages(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return ends of the panels of the memory integral of a test, as ages before its last time, ascending from 0.
+    def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
+        """Return the ends of the quadrature panels of the memory integral, ages before the last time, from 0 upwards.
         """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
@@ -282,7 +288,7 @@ class KBKZ(Relaxing):
         found = np.unique(np.concatenate(ages))
         return found[found <= whole]
 
-    def _strained(self, mode: str, stretch: np.ndarray) -> np.ndarray:
+    def _damped_difference(self, mode: str, stretch: np.ndarray) -> np.ndarray:
         """Return h (B_11 - B_33) after a sudden stretch in a mode, of the shape of `stretch`."""
         square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
         difference = square[..., 0] - square[..., 2]

@@ -25,7 +25,7 @@ In a fine run of a thousand states the errors add up to 3e-4 of the stress (with
 """
 
 
-class Past(NamedTuple):
+class PastState(NamedTuple):
     """Past state of a material at n quadrature points of the cells of this rank.
 
     Attributes:
@@ -47,7 +47,7 @@ class StoredStates(NamedTuple):
     """
 
     time: float
-    states: tuple[Past, ...]
+    states: tuple[PastState, ...]
     smallest_h: np.ndarray | None
 
 
@@ -82,11 +82,12 @@ class PastStates:
 
     def start(self) -> None:
         """Store the undeformed state at time 0 as the only past state."""
-        rest = Past(np.zeros(self._n) if self._aT else 0.0, np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1))
-        self.put(StoredStates(0.0, (rest,), np.ones((1, self._n)) if self._law.irreversible else None))
+        C = np.repeat(np.array(IDENTITY)[:, None], self._n, axis=1)
+        undeformed = PastState(np.zeros(self._n) if self._aT else 0.0, C)
+        self.put(StoredStates(0.0, (undeformed,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """Forget the last step, so that the next one is integrated without a parabola through it."""
+        """Discard the length of the last step, so that the next step is integrated without a parabola through it."""
         self._before = 0.0
         self._refreshed = None
 
@@ -108,17 +109,17 @@ class PastStates:
         times = np.array([state.reduced_time for state in variables.states])
         self._past = np.array([state.C for state in variables.states])
         self._weights = self._law.weights(times[-1] - times)
-        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # with C, how the body moves
-        self._close = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
+        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # with C, the rate of the motion
+        self._parabola_allowed = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
         self._refreshed = None
 
     @np.errstate(over="ignore", invalid="ignore")                   # of a guess far back in time: no state
     def refresh(self) -> None:
-        """Update the coefficients of the stress in the forms to the present fields and time."""
-        C, step, rate = self._now()
+        """Linearise the stress at the present fields and time: update its coefficients in the forms."""
+        C, step, rate = self._present()
         if self._refreshed and np.array_equal(self._refreshed[0], C) and np.array_equal(self._refreshed[1], step):
             return
-        W, slope = self._law.after(self._weights, step, self._before, self._close)
+        W, slope = self._law.weights_after(self._weights, step, self._before, self._parabola_allowed)
         S, D, T = self._law.stress(C, self._past, W, slope, self._stored.smallest_h)
         count = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
         T = T * rate
@@ -136,18 +137,18 @@ class PastStates:
             control: load parameter (control) of the state, dimensionless.
             start: state at the start of the step, or None.
         """
-        (C, step, _), variables = self._now(), self._stored
-        states = [*variables.states, Past(variables.states[-1].reduced_time + step, C)]
+        (C, step, _), variables = self._present(), self._stored
+        states = [*variables.states, PastState(variables.states[-1].reduced_time + step, C)]
         smallest_h = variables.smallest_h
         if smallest_h is not None:
-            h = self._law.damped(C, self._past, smallest_h)[1]
+            h = self._law.inverses_and_damping(C, self._past, smallest_h)[1]
             smallest_h = np.concatenate([h, np.ones((1, self._n))])
         time = self._forms.time_at(control)
         if time == variables.time and len(states) > 2 and np.array_equal(states[-2].reduced_time,
                                                                       states[-3].reduced_time):
             chosen = [*range(len(states) - 2), len(states) - 1]             # between two jumps at one instant
         else:
-            chosen = self._needed(states, C, smallest_h)
+            chosen = self._indices_to_keep(states, C, smallest_h)
         self.put(StoredStates(time, tuple(states[k] for k in chosen),
                               None if smallest_h is None else smallest_h[chosen]))
 
@@ -171,7 +172,7 @@ class PastStates:
 
         def fitted(values: np.ndarray) -> np.ndarray:
             return interpolation.fitted(values.T).T
-        states = tuple(Past(fitted(s.reduced_time) if self._aT else s.reduced_time,
+        states = tuple(PastState(fitted(s.reduced_time) if self._aT else s.reduced_time,
                             fitted_tensors(interpolation, s.C.T, *F).T) for s in variables.states)
         smallest_h = None if variables.smallest_h is None else fitted(variables.smallest_h)
         return StoredStates(variables.time, states, smallest_h)
@@ -184,8 +185,8 @@ class PastStates:
         found = where.eval(self._forms.domain, self._own) if len(self._own) else np.zeros(0)
         return found.reshape(-1, X.ufl_shape[0])
 
-    def _needed(self, states: list[Past], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
-        """Return the numbers of the past states to keep: all that their neighbours do not interpolate; collective.
+    def _indices_to_keep(self, states: list[PastState], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
+        """Return the indices of the past states that cannot be interpolated from their neighbours; collective.
 
         Args:
             states: K past states, the last of them the present one.
@@ -195,8 +196,8 @@ class PastStates:
         if len(states) < 5:
             return list(range(len(states)))
         times, past = np.array([s.reduced_time for s in states]), np.array([s.C for s in states])
-        inverse, h, _, _ = self._law.damped(C, past, smallest_h)
-        W = self._law.after(self._law.weights(times[-1] - times), 0.0)[0]
+        inverse, h, _, _ = self._law.inverses_and_damping(C, past, smallest_h)
+        W = self._law.weights_after(self._law.weights(times[-1] - times), 0.0)[0]
         g = h[:, None] * inverse                                            # of the stress of a state, (K, 4, n)
         times = times.reshape(len(states), -1)
         length = times[2:] - times[:-2]
@@ -216,8 +217,8 @@ class PastStates:
                 chosen.append(k)
         return [*chosen, len(states) - 1]
 
-    def _now(self) -> tuple[np.ndarray, Any, Any]:
-        """Return Cbar = J^(-2/3) C, shape (4, n), and the reduced time since the last state and per process time."""
+    def _present(self) -> tuple[np.ndarray, Any, Any]:
+        """Return the present Cbar, shape (4, n), the reduced time since the last state, and its rate."""
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
         if not len(self._own):
@@ -232,13 +233,13 @@ class PastStates:
         """Material with these past states."""
         return self._terms.material
 
-    def thinnest(self) -> tuple[float, np.ndarray]:
+    def smallest_stretch(self) -> tuple[float, np.ndarray]:
         """Return the smallest principal stretch of the present fields; collective.
 
         Returns:
             The stretch; reference position of its point, shape (coordinates,), length.
         """
-        C = self._now()[0]
+        C = self._present()[0]
         half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
         squares = np.minimum(half - apart, C[3])
         k = int(np.argmin(squares)) if len(squares) else 0
@@ -292,7 +293,7 @@ class PastStates:
         def own(values: np.ndarray) -> np.ndarray:
             """Return the values of the cells of this rank, shape (..., n), from the values of all cells."""
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)
-        states = tuple(Past(own(time)[0] if self._aT else float(time), own(C)) for time, C in found)
+        states = tuple(PastState(own(time)[0] if self._aT else float(time), own(C)) for time, C in found)
         smallest_h = own(np.array(data["least"], float)) if "least" in data else None
         return StoredStates(float(data["time"]), states, smallest_h)
 

@@ -14,13 +14,13 @@ from .past_states import PastStates
 
 @register("scene")
 def ruptures(body: Any) -> Iterator[Finding]:
-    """Find draws of a sheet beyond the equibiaxial `rupture_stretch` of a material.
+    """Find processes that stretch a sheet beyond the equibiaxial `rupture_stretch` of its material.
 
     Args:
         body: the examined `formingx.checks.sizes.Body`.
 
     Yields:
-        A warning for each such material and each cause of the stretch.
+        A warning for each layer and each load, target or tool that causes such a stretch.
     """
     for name, material in body.scene.materials.items():
         limit = material.base.rupture_stretch("equibiaxial")
@@ -42,7 +42,7 @@ def thins(failure: Any) -> Iterator[Finding]:
         failure: the failed run, with its `problem` and its `last` state.
 
     Yields:
-        A finding for the place of largest equibiaxial stretch beyond `rupture_stretch`.
+        A finding with the thinnest point, if its equibiaxial stretch exceeds `rupture_stretch`.
     """
     if failure.last is None:
         return
@@ -50,7 +50,7 @@ def thins(failure: Any) -> Iterator[Finding]:
     with problem.state_context(failure.last):
         for past in (history for history in problem.materials if isinstance(history, PastStates)):
             limit = past.material.base.rupture_stretch("equibiaxial")
-            smallest, point = past.thinnest()
+            smallest, point = past.smallest_stretch()
             if (stretch := smallest**-0.5) > max(limit, drawn[0] if drawn else 0.0):
                 drawn = stretch, limit, place(problem.scene.mesh, point[:COORDINATES])
     if drawn is not None:
