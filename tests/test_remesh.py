@@ -125,14 +125,14 @@ def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
     """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
     import gmsh
 
-    from formingx.extensions.remeshing.remeshed import remeshed
+    from formingx.extensions.remeshing.outline_mesh import mesh_of_outline
     corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     ends = np.roll(corners, -1, axis=0)
     edges = np.stack([corners, ends, (corners + ends) / 2], axis=1)
     names = [frozenset({name}) for name in ("bottom", "rim", "top", "axis")]
 
     def counts():
-        found = (remeshed(edges, names, corners[1:2], 0.3, 0.1, "sheet", True, MPI.COMM_SELF),
+        found = (mesh_of_outline(edges, names, corners[1:2], 0.3, 0.1, "sheet", True, MPI.COMM_SELF),
                  fx.mesh.sheet(fx.mesh.rectangle(2.0, 1.0), size=0.2, comm=MPI.COMM_SELF),
                  fx.mesh.sheet(fx.mesh.rectangle(2.0, 1.0), size=lambda x, y: 0.2 + 0.1 * x * x, comm=MPI.COMM_SELF))
         return [mesh.domain.topology.index_map(2).size_local for mesh in found]

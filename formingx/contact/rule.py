@@ -171,7 +171,7 @@ class Lobatto(_Nodes):
         """
         if self._brought is None:
             return self.lengths
-        first, (a, b, _) = self._brought.first_places(self.points), self.edges.T
+        first, (a, b, _) = self._brought.original_positions(self.points), self.edges.T
         ratio = np.linalg.norm(first[b] - first[a], axis=1) / np.linalg.norm(self.points[b] - self.points[a], axis=1)
         ends, count = np.repeat(ratio, 3), np.bincount(self.edges.ravel(), minlength=len(first))
         return self.lengths * np.bincount(self.edges.ravel(), ends, len(first)) / np.maximum(count, 1)

@@ -98,7 +98,7 @@ class MaterialTerms:
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.preformed
 
         def values(X: np.ndarray) -> np.ndarray:
-            R, Z = X[:2] if brought is None else brought.first_places(X[:2].T).T
+            R, Z = X[:2] if brought is None else brought.original_positions(X[:2].T).T
             return function(R, self.forms.mid(layer, R, Z))
         found.interpolate(values, self.cells)
         return found

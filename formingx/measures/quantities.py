@@ -157,7 +157,7 @@ class Sag(Quantity):
             space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
             order = np.argsort(numbers)
             nodes_at = dof_positions(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
-            self._earlier = (nodes_at - preformed.first_places(nodes_at))[:, -1] / forms.length
+            self._earlier = (nodes_at - preformed.original_positions(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:
         """Return the sag over the length scale, and the rank that owns the lowest node; `x`: unknowns. Collective."""

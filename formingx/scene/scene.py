@@ -385,7 +385,9 @@ class Scene:
         """
         known("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
-        return found if self.preformed is None else found._replace(points=self.preformed.first_places(found.points))
+        if self.preformed is None:
+            return found
+        return found._replace(points=self.preformed.original_positions(found.points))
 
     def shear_modulus(self, layer: str) -> float:
         """Return the small-strain shear modulus of a layer.

@@ -107,7 +107,7 @@ def to_msh(path: Path, file: Any, state: State | None = None) -> None:
 
 def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     """Return a mesh of the deformed body in a state, with new elements of edge length `size` inside its outline."""
-    from ..remeshing.remeshed import remeshed
+    from ..remeshing.outline_mesh import mesh_of_outline
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:
         raise InputError(f"Path.deformed_mesh: size = {size:g}: new elements are made of one layer, on one"
@@ -117,4 +117,5 @@ def _of_size(problem: Any, state: Any, size: float) -> Mesh:
     masks, order = {name: outline.mask(name) for name in mesh.boundaries}, outline.ordered("Path.deformed_mesh: size")
     names = [frozenset(name for name, mask in masks.items() if mask[k]) for k in order]
     (layer,), axisymmetric = mesh.layers, problem.scene.kinematics.axisymmetric
-    return remeshed(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric, mesh.comm)
+    return mesh_of_outline(edges[order], names, np.zeros((0, edges.shape[-1])), size, size, layer, axisymmetric,
+                           mesh.comm)

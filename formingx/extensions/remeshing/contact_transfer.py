@@ -59,8 +59,10 @@ class ContactState(NamedTuple):
         slip = 0.0 if face.history is None else np.abs(face.history.slip).max(initial=0.0) / face.thickness
         return cls(x, d, touches, traction, pairs, slip)
 
-    def moved_in(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return how far points of a new mesh must move out of the tool to be as deep as the old face beside them.
+    def outward_motion(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Return the distances by which points of a new mesh must move out of the tool.
+
+        They then have the same penetration as the old face beside them.
 
         Between two old points in contact the depth is interpolated. Elsewhere points in the tool move to its surface,
         or to the depth of an old neighbour in contact.
@@ -70,15 +72,15 @@ class ContactState(NamedTuple):
             d: signed distances of the new points from the tool, positive inside, shape (n,), length.
 
         Returns:
-            Motion against the normal into the tool, shape (n,), length.
+            Distances against the normal that points into the tool, shape (n,), length; negative: into the tool.
         """
-        pair, share = self._near(x)
+        pair, share = self._nearest_pairs(x)
         both = self.touches[pair]
         share = np.where(both.all(1), share, np.where(both[:, 0], 0.0, 1.0))
-        depth = np.where(both.any(1), _between(self.distance[pair], share), 0.0)
+        depth = np.where(both.any(1), _interpolated(self.distance[pair], share), 0.0)
         return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
 
-    def at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def tractions_at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Interpolate the tractions of the old face at points of a new one.
 
         Args:
@@ -87,13 +89,12 @@ class ContactState(NamedTuple):
         Returns:
             Pressure and friction, stress, and mask of the points between two old points in contact, shape (n,) each.
         """
-        pair, share = self._near(x)
-        found = _between(self.traction[pair], share[:, None])
+        pair, share = self._nearest_pairs(x)
+        found = _interpolated(self.traction[pair], share[:, None])
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
-    def _near(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest pair of old points for each position, shape (n, 2), and the position between them, 0 to 1.
-        """
+    def _nearest_pairs(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the nearest pair of old points to each position, shape (n, 2), and the place between them, 0 to 1."""
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         offset = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
@@ -115,7 +116,7 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)
-    pressure, friction, touches = old.at(x)
+    pressure, friction, touches = old.tractions_at(x)
     share = np.where(rule.has_area, rule.lumped / rule.area, 0.0)
     touches &= pressure > 0
     depth = law.depth(np.where(touches, pressure * share, 0.0))
@@ -134,6 +135,6 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
     face.put(FaceHistory(ContactHistory(x, distance, slip, x), newly_closed, np.ones(len(x))))
 
 
-def _between(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return values of pairs, shape (n, 2, ...), interpolated at a share of 0 to 1 from the first to the second."""
+def _interpolated(values: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Interpolate between the two values of each pair, shape (n, 2, ...); share: 0 at the first, 1 at the second."""
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

@@ -21,7 +21,7 @@ _OUTLINE_DISTANCE = 0.02
 """
 
 
-class FollowedProbe(Probe):
+class MaterialPointProbe(Probe):
     """Probe of the displacement of material points since the start of a remeshed run.
 
     Args:
@@ -39,11 +39,11 @@ class FollowedProbe(Probe):
         self.points, self.earlier_displacement = first, self.points - first
 
     def _read(self) -> np.ndarray:
-        """Return the displacement of the points since the start of the run for the present fields, shape (n, 2)."""
+        """Return the displacement of the points since the start of the run, shape (n, 2), length."""
         return super()._read() + self.earlier_displacement
 
 
-def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
+def original_positions(preformed: Any, points: np.ndarray) -> np.ndarray:
     """Return the positions on the first mesh of points of a new mesh.
 
     They are interpolated from the nodes of the old mesh, in the deformed body.
@@ -57,12 +57,12 @@ def first_places(preformed: Any, points: np.ndarray) -> np.ndarray:
     """
     old, state = preformed.before
     nodes = node_positions(old.forms.domain)
-    first = nodes if old.scene.preformed is None else first_places(old.scene.preformed, nodes)
+    first = nodes if old.scene.preformed is None else original_positions(old.scene.preformed, nodes)
     found = MovingLeastSquares(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
     return np.clip(found, first.min(0), first.max(0))
 
 
-def scene_on(mesh: Any, preformed: Any) -> Any:
+def scene_on_new_mesh(mesh: Any, preformed: Any) -> Any:
     """Return the scene of the old mesh on a new mesh of the deformed body, with the last temperature.
 
     Args:
@@ -97,11 +97,11 @@ def followed(problem: Any, points: np.ndarray) -> np.ndarray:
         return points
     old, state = problem.scene.preformed.before
     points = followed(old, points)
-    return _Onto(problem)(points + Probe(old, points).displacement_in(state))
+    return _OutlineProjection(problem)(points + Probe(old, points).displacement_in(state))
 
 
-class _Onto:
-    """Projection onto the outline of a mesh of points that lie outside or near it.
+class _OutlineProjection:
+    """Projection of points outside or near the outline of a mesh onto this outline.
 
     Args:
         problem: the `Problem` on the mesh.
@@ -124,15 +124,15 @@ class _Onto:
         s = part[:, None] / FINE_PIECES
         bend = 2 * (a + b - 2 * middle)
         for _ in range(4):                                   # Newton's method for the closest point on the parabola
-            slope, offset = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+            slope, offset = b - a + (2 * s - 1) * bend, _points_on_edges(a, b, middle, s) - x
             rate = (slope * slope + bend * 2 * offset).sum(1, keepdims=True)
             s = np.clip(s - (slope * offset).sum(1, keepdims=True) / rate, 0.0, 1.0)
-        slope, offset = b - a + (2 * s - 1) * bend, _on(a, b, middle, s) - x
+        slope, offset = b - a + (2 * s - 1) * bend, _points_on_edges(a, b, middle, s) - x
         outside = slope[:, 0] * offset[:, 1] - slope[:, 1] * offset[:, 0] > 0    # the body is to the left
-        put = outside | (np.linalg.norm(offset, axis=1) < self._near[edge])
-        return x + np.where(put[:, None], offset, 0.0)
+        projected = outside | (np.linalg.norm(offset, axis=1) < self._near[edge])
+        return x + np.where(projected[:, None], offset, 0.0)
 
 
-def _on(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return points at parameters s (0 to 1) of parabolic edges from a to b through `middle`, shape (n, 2)."""
+def _points_on_edges(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return points of parabolic edges from a to b through `middle`, shape (n, 2), at parameters s from 0 to 1."""
     return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

@@ -12,7 +12,7 @@ from ...mesh.grid import Grid, gathered, to_mesh
 from ...problem.problem import Problem
 from ...results.files.description import describe, differences
 from ...solve.state import State
-from .earlier_meshes import scene_on
+from .earlier_meshes import scene_on_new_mesh
 
 
 def save(problem: Any) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callabl
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
     mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
-    made = Problem(scene_on(mesh, preformed(**data["preformed"])._replace(before=before)))
+    made = Problem(scene_on_new_mesh(mesh, preformed(**data["preformed"])._replace(before=before)))
     for contact, shift in zip(made.contacts, data["shifts"], strict=True):
         if shift is not None:
             contact.shift_distances(np.array(shift))

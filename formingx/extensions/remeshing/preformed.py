@@ -19,7 +19,7 @@ import ufl
 from dolfinx import fem
 
 from ...forms.transfer import in_own_cells
-from .earlier_meshes import FollowedProbe, first_places, followed
+from .earlier_meshes import MaterialPointProbe, followed, original_positions
 from .files import save
 
 _QUADRATIC = basix.ufl.element("Lagrange", "triangle", 2)
@@ -32,7 +32,7 @@ _LOCAL_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0],
 """Local coordinates of the corners of a triangle, the midpoints of the edges opposite to them, and its centre."""
 
 _LATTICE = np.array([(i, j) for i in range(5) for j in range(5 - i)]) / 4
-"""Local coordinates of the points of a triangle at which `_flattened` and the search of cells sample it."""
+"""Local coordinates of the points of a triangle at which `_positive_definite` and the search of cells sample it."""
 
 _QUADRATURE_DEGREE = 12
 """Quadrature degree of means over new elements, which old edges cross."""
@@ -50,8 +50,8 @@ class Preformed(NamedTuple):
     Attributes:
         x: present positions of corners, midpoints and centres of the cells, shape (m, 7, 2), length.
         reference: positions of these points in the reference configuration of the old mesh, shape (m, 7, 2), length.
-        b: deformation at the start of the old mesh, at corners and midpoints, shape (m, 6, 6). The six entries are rr,
-            rz, zz and hoop entry of b, and cosine and sine of the rotation in the section.
+        b: b = F F^T/J at the start of the old mesh, at corners and midpoints, shape (m, 6, 6). The six entries are rr,
+            rz, zz and hoop entry of b, and cosine and sine of the rotation of F in the section.
         pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
         volume_stiffness: additional volume stiffness (`Model.volume_stiffness` times shear modulus) over the unit of
             stress of the problem.
@@ -85,7 +85,7 @@ class Preformed(NamedTuple):
         x, reference = np.split(both, 2, axis=2)
         b = np.tile([1.0, 0.0, 1.0, 1.0, 1.0, 0.0], (len(x), 6, 1))
         if forms.scene.preformed is not None:
-            b = forms.scene.preformed._carried(forms)[0]
+            b = forms.scene.preformed._projected_fields(forms)[0]
         scene = forms.scene
         stiffness = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
         return cls(x, reference, b, pressures, stiffness, (problem, state))
@@ -102,7 +102,7 @@ class Preformed(NamedTuple):
         """
         return followed(problem, points)
 
-    def probe(self, problem: Any, points: np.ndarray) -> FollowedProbe:
+    def probe(self, problem: Any, points: np.ndarray) -> MaterialPointProbe:
         """Return a probe of the displacement since the start of the run, at points of the first mesh.
 
         Args:
@@ -112,7 +112,7 @@ class Preformed(NamedTuple):
         Returns:
             The probe.
         """
-        return FollowedProbe(problem, points)
+        return MaterialPointProbe(problem, points)
 
     def save(self, problem: Any) -> dict[str, Any]:
         """Return the data of a checkpoint from which the problem on the new mesh can be made again.
@@ -125,7 +125,7 @@ class Preformed(NamedTuple):
         """
         return save(problem)
 
-    def first_places(self, points: np.ndarray) -> np.ndarray:
+    def original_positions(self, points: np.ndarray) -> np.ndarray:
         """Return the positions of points of the new mesh on the first mesh.
 
         Args:
@@ -134,7 +134,7 @@ class Preformed(NamedTuple):
         Returns:
             Positions on the first mesh, shape (n, 2), length.
         """
-        return first_places(self, points)
+        return original_positions(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
         """Return the deformation gradient from the start of the run to the new mesh, on the elements of the new mesh.
@@ -146,10 +146,10 @@ class Preformed(NamedTuple):
             F_old (UFL, shape (3, 3)) and its determinant det F_old (UFL scalar).
         """
         space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
-        field, values = fem.Function(space), self._carried(forms)[0]
+        field, values = fem.Function(space), self._projected_fields(forms)[0]
         field.x.array.reshape(-1, 6)[space.dofmap.list[: len(values)]] = values
         rr, rz, zz, hoop, along, turned = ufl.split(field)
-        V, c, s, area = _root(rr, rz, zz, along, turned, ufl.sqrt)
+        V, c, s, area = _left_stretch(rr, rz, zz, along, turned, ufl.sqrt)
         (a, b), (_, d) = V
         F = [[a * c + b * s, b * c - a * s, 0], [b * c + d * s, d * c - b * s, 0], [0, 0, ufl.sqrt(hoop)]]
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
@@ -164,53 +164,55 @@ class Preformed(NamedTuple):
             Locally owned entries of `Problem.x`, shape (n,).
         """
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
-        values, fitted = np.zeros(len(forms.w.x.array)), self._carried(forms)[1]
+        values, fitted = np.zeros(len(forms.w.x.array)), self._projected_fields(forms)[1]
         for k in range(fitted.shape[2]):
             values[forms.space.sub(1 + k).dofmap.list[: len(fitted)]] = fitted[..., k]
         x[: problem.n_owned] = values[: problem.n_owned]
         return x
 
-    def _carried(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the fields `b` and `pressures` on the cells of the new mesh, by least squares in each cell.
+    def _projected_fields(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return `b` and `pressures`, projected onto the cells of the new mesh by least squares in each cell.
 
         forms: the `Formulation` on the new mesh. Shapes of the results: (cells, 6, 6) and (cells, 3, fields).
         """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
-        at, weights = rule
+        xi, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
-        sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), at)
-        cells, places = self._located(np.concatenate(sampled)[:, :-1])
-        b, J = self._b(cells, places, forms.scene.kinematics.axisymmetric)
-        pressures = np.einsum("na,nak->nk", np.column_stack([1 - places.sum(1), places]), self.pressures[cells])
+        sampled = in_own_cells(forms.domain, ufl.as_vector([*forms.X, volume]), xi)
+        cells, coordinates = self._find_cells(np.concatenate(sampled)[:, :-1])
+        b, J = self._deformation_at(cells, coordinates, forms.scene.kinematics.axisymmetric)
+        linear = np.column_stack([1 - coordinates.sum(1), coordinates])
+        pressures = np.einsum("na,nak->nk", linear, self.pressures[cells])
         pressures += self.volume_stiffness * (J - 1)[:, None]
-        b, pressures = (values.reshape(len(sampled), len(at), -1) for values in (b, pressures))
+        b, pressures = (values.reshape(len(sampled), len(xi), -1) for values in (b, pressures))
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-            """Return the coefficients of the least-squares fit in each cell."""
+            """Return the nodal values of the least-squares fit of values at quadrature points, in each cell."""
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]
-        return (_flattened(nearest(b, _tabulated(_QUADRATIC, at)[0]), mean),
-                nearest(pressures, np.column_stack([1 - at.sum(1), at])))
+        return (_positive_definite(nearest(b, _tabulated(_QUADRATIC, xi)[0]), mean),
+                nearest(pressures, np.column_stack([1 - xi.sum(1), xi])))
 
-    def _b(self, cells: np.ndarray, places: np.ndarray, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation b = F F^T/J at points of the deformed old mesh, and J.
+    def _deformation_at(self, cells: np.ndarray, coordinates: np.ndarray,
+                        axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return the deformation b = F F^T/J at points of the deformed old mesh, and J since the start of that mesh.
 
         Args:
             cells: old cell of each point, shape (n,).
-            places: local coordinates of the points in their cells, shape (n, 2).
+            coordinates: local coordinates of the points in their cells, shape (n, 2).
             axisymmetric: True for a body of revolution.
 
         Returns:
             Six entries (see `Preformed.b`), shape (n, 6); J, shape (n,).
         """
-        x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, places, 1)
+        x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, coordinates, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))
         r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, reference))
         stretch = r / R if axisymmetric else np.ones(len(r))
-        rr, rz, zz, hoop, along, turned = np.einsum("na,nak->kn", _tabulated(_QUADRATIC, places)[0], self.b[cells])
-        V, c, s, _ = _root(rr, rz, zz, along, turned, np.sqrt)
+        rr, rz, zz, hoop, along, turned = np.einsum("na,nak->kn", _tabulated(_QUADRATIC, coordinates)[0], self.b[cells])
+        V, c, s, _ = _left_stretch(rr, rz, zz, along, turned, np.sqrt)
         F = grad @ np.moveaxis(np.array(V), 2, 0) @ np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
         in_plane = F @ F.transpose(0, 2, 1)
         turn = np.stack([F[:, 0, 0] + F[:, 1, 1], F[:, 1, 0] - F[:, 0, 1]])
@@ -218,7 +220,7 @@ class Preformed(NamedTuple):
         J = np.linalg.det(grad) * stretch
         return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
-    def _located(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _find_cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the old cells of points of the deformed body, shape (n,), and their local coordinates, shape (n, 2).
 
         Newton's method is used in the cells nearby. New edges cut corners of old ones: a point outside the body is
@@ -229,35 +231,36 @@ class Preformed(NamedTuple):
         tree = cKDTree(np.concatenate(_tabulated(_POSITIONS, inside)[0] @ self.x))
         rows = tree.query(points, _CANDIDATE_ELEMENTS)[1]
         cells, found = rows[:, 0] // len(inside), inside[rows[:, 0] % len(inside)]
-        least, size = np.full(len(points), -np.inf), np.ptp(points, axis=0).max()
+        depth, size = np.full(len(points), -np.inf), np.ptp(points, axis=0).max()
         for column in rows.T:
-            todo = np.flatnonzero(least < -1e-9)
-            c, at = column[todo] // len(inside), inside[column[todo] % len(inside)]
+            open_points = np.flatnonzero(depth < -1e-9)
+            c, xi = column[open_points] // len(inside), inside[column[open_points] % len(inside)]
             for _ in range(8):
-                shapes, *slopes = _tabulated(_POSITIONS, at, 1)
-                away = points[todo] - np.einsum("na,nai->ni", shapes, self.x[c])
+                shapes, *slopes = _tabulated(_POSITIONS, xi, 1)
+                offset = points[open_points] - np.einsum("na,nai->ni", shapes, self.x[c])
                 slope = np.einsum("dna,nai->nid", slopes, self.x[c])
                 slope[np.abs(np.linalg.det(slope)) < 1e-14 * size**2] = size * np.eye(2)
-                step = np.linalg.solve(slope, away[..., None])[..., 0]
-                at = np.clip(at + step * np.minimum(1, 0.5 / np.maximum(np.abs(step).max(1), 1e-300))[:, None], -1, 2)
-            within = np.where(np.linalg.norm(away, axis=1) < 1e-6 * size, np.minimum(at.min(1), 1 - at.sum(1)), -9.0)
-            better = within > least[todo]
-            for stored, new in ((least, within), (cells, c), (found, at)):
-                stored[todo[better]] = new[better]
+                step = np.linalg.solve(slope, offset[..., None])[..., 0]
+                xi = np.clip(xi + step * np.minimum(1, 0.5 / np.maximum(np.abs(step).max(1), 1e-300))[:, None], -1, 2)
+            within = np.where(np.linalg.norm(offset, axis=1) < 1e-6 * size, np.minimum(xi.min(1), 1 - xi.sum(1)), -9.0)
+            improved = within > depth[open_points]
+            for stored, new in ((depth, within), (cells, c), (found, xi)):
+                stored[open_points[improved]] = new[improved]
         area = np.maximum(np.column_stack([1 - found.sum(1), found]), 0)              # area coordinates
         return cells, area[:, 1:] / area.sum(1, keepdims=True)
 
 
-def _tabulated(element: Any, at: np.ndarray, derivatives: int = 0) -> np.ndarray:
-    """Return shape functions, or with `derivatives` = 1 also their slopes, at n points, shape (1 or 3, n, functions).
+def _tabulated(element: Any, xi: np.ndarray, derivatives: int = 0) -> np.ndarray:
+    """Return shape functions at n local points, and with `derivatives` = 1 their slopes, shape (1 or 3, n, functions).
     """
-    return np.asarray(element.tabulate(derivatives, at)) if len(at) else np.zeros((1 + 2 * derivatives, 0, element.dim))
+    return np.asarray(element.tabulate(derivatives, xi)) if len(xi) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 
 
-def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
-    """Return V with V^2 = b in the section, cosine and sine of the rotation, and det V.
+def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
+                  sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
+    """Return the left stretch V in the section (V^2 = b), cosine and sine of the rotation of F, and det V.
 
-    The first five arguments are entries of `Preformed.b`; for b = F F^T/J see there.
+    The first five arguments are the entries of `Preformed.b` without the hoop entry.
 
     Args:
         rr: entry of b.
@@ -273,7 +276,7 @@ def _root(rr: Any, rz: Any, zz: Any, along: Any, turned: Any, sqrt: Any) -> tupl
     return [[(rr + area) / trace, shear], [shear, (zz + area) / trace]], along / length, turned / length, area
 
 
-def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
+def _positive_definite(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     """Return quadratic fields of the six entries of `Preformed.b` that are positive definite everywhere in their cells.
 
     A rapid rotation within an element, as beside a corner, can make them indefinite. Such fields are moved towards
@@ -288,8 +291,7 @@ def _flattened(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     for k in range(12):
         rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ deviation, -1, 0)
         bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _MIN_DETERMINANT_RATIO)
-               | (hoop < _MIN_DETERMINANT_RATIO * mean[..., 3])
-               | (np.hypot(along, turned) < _MIN_DETERMINANT_RATIO)).any(1)
+               | (hoop < _MIN_DETERMINANT_RATIO * mean[..., 3]) | (np.hypot(along, turned) < _MIN_DETERMINANT_RATIO)).any(1)
         if not bad.any():
             break
         deviation[bad] *= 0.7 if k < 10 else 0.0

@@ -31,9 +31,9 @@ from ...solve.record import Record, Segment
 from ...solve.state import State
 from ...solve.stepping import StepControl
 from .contact_transfer import ContactState, transfer_contact
-from .earlier_meshes import scene_on
+from .earlier_meshes import scene_on_new_mesh
+from .outline_mesh import enclosed_volume, mesh_of_outline
 from .preformed import Preformed
-from .remeshed import enclosed, remeshed
 
 log = logging.getLogger("formingx")
 
@@ -151,7 +151,7 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
 
 
 def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
-            done: Callable[[], bool]) -> None:
+                        done: Callable[[], bool]) -> None:
     """Run to the end of a path on as many meshes as needed.
 
     Args:
@@ -175,7 +175,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
                 _start_new_mesh(path, remesh, tolerances)
                 failed = []
             except ConvergenceError as error:                # a mesh may succeed at the next state
-                crushed = _ratios(record, record.last)[0] < _MIN_VOLUME_MARGIN * remesh.volume_ratio[0]
+                crushed = _volume_ratios(record, record.last)[0] < _MIN_VOLUME_MARGIN * remesh.volume_ratio[0]
                 if crushed or len(failed) == _MAX_FAILURES or any(record.last is state for state in failed):
                     raise
                 failed.append(record.last)
@@ -184,7 +184,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
         try:
             part()
         except ConvergenceError as error:
-            low, high = _ratios(record, record.last) if record.states else (1.0, 1.0)
+            low, high = _volume_ratios(record, record.last) if record.states else (1.0, 1.0)
             if len(record.segments[-1].states) < _MIN_STATES or low > 1 - _VOLUME_CHANGE and high < 1 + _VOLUME_CHANGE:
                 raise                                        # the mesh is not the cause
             log.info("a new mesh, as no state was found: %s", error)
@@ -250,8 +250,8 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
             continue
         segment.problem.x.array_w[:] = start.x
         segment.problem.set_fields_and_control(start.x, start.control)
-        least, largest = segment.problem.admissible.volume_ratios()
-        found.append((min((least - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
+        smallest, largest = segment.problem.admissible.volume_ratios()
+        found.append((min((smallest - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
         if found[-1][0] > _GOOD_MARGIN:
             break
     if not found:
@@ -261,7 +261,7 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
     return segment, start
 
 
-def _ratios(record: Record, state: State) -> tuple[float, float]:
+def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
     """Return the smallest and the largest volume ratio J at the quadrature points in a state."""
     with record.problem.state_context(state) as problem:
         return problem.admissible.volume_ratios()
@@ -290,7 +290,7 @@ def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
     """Return True if J leaves its range in a state that is not the first on its mesh."""
     if state.kind in ("start", "remesh"):
         return False
-    low, high = _ratios(record, state)
+    low, high = _volume_ratios(record, state)
     return not (remesh.volume_ratio[0] <= low and high <= remesh.volume_ratio[1])
 
 
@@ -315,14 +315,14 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     order = outline.ordered("remesh")
     names = [frozenset(name for name, mask in masks.items() if mask[k]) for k in order]
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
-    volume = enclosed(edges[order], scene.kinematics.axisymmetric)
+    volume = enclosed_volume(edges[order], scene.kinematics.axisymmetric)
     on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
     edges = _without_pockets(edges[order], on_tools, _POCKET_DEPTH * sizes[1])
-    corners = _corners(edges, names, touched)
+    corners = _refined_points(edges, names, touched)
     layer, = scene.mesh.layers
-    mesh = remeshed(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
-                    lambda x, names: _outside(x, names, contacts))
-    new_scene = scene_on(mesh, Preformed.of(old, state))
+    mesh = mesh_of_outline(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
+                    lambda x, names: _moved_out_of_tools(x, names, contacts))
+    new_scene = scene_on_new_mesh(mesh, Preformed.of(old, state))
     problem = Problem(new_scene)
     problem.limit.one_by_one()
     setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
@@ -398,7 +398,8 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
     return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
 
 
-def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
+def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
+                        contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
     """Return new outline points moved out of the tools, to the depth of neighbouring contact points.
 
     New edges cut corners of the old outline, so points on them may lie in a tool.
@@ -411,11 +412,12 @@ def _outside(x: np.ndarray, names: frozenset[str], contacts: list[tuple[Any, Con
     for contact, before, travel in contacts:
         if contact.contact.on in names:
             near = contact.contact.tool.nearest(x - travel)
-            x = x - before.moved_in(x - travel, near.distance)[:, None] * near.normal
+            x = x - before.outward_motion(x - travel, near.distance)[:, None] * near.normal
     return x
 
 
-def _corners(edges: np.ndarray, names: list[frozenset[str]], touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
+def _refined_points(edges: np.ndarray, names: list[frozenset[str]],
+                    touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
     """Return the points of the outline that get small elements, shape (k, 2), length.
 
     These are the corners between two boundaries that have contacts, and the ends of contact areas.

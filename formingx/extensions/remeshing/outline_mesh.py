@@ -15,7 +15,7 @@ _SIZE_GROWTH = 0.3
 """Growth of the element size per distance from a corner."""
 
 
-def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
+def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.ndarray, size: float, corner: float,
              layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
     """Return a mesh of six-node triangles inside an outline, with second-order geometry along it; on one rank.
@@ -44,7 +44,7 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     ends, middles, named = [], [], []
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
         part = edges[np.arange(first, last) % len(edges)]
-        points, between = _along(part, corners, size, corner)
+        points, between = _nodes_along(part, corners, size, corner)
         boundary = names[first % len(edges)]
         ends += [outside(points[:1], boundary | names[first - 1]), outside(points[1:-1], boundary)]
         middles.append(outside(between, boundary))
@@ -66,8 +66,8 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
     except Exception as error:
         raise InputError(f"remesh: gmsh made no mesh of the body: {error}") from None
     points = np.asarray(coordinates).reshape(-1, 3)[:, :2]
-    place = {int(number): k for k, number in enumerate(numbers)}
-    cells = np.array([place[int(t)] for t in triangles]).reshape(-1, 3)
+    points_at = {int(number): k for k, number in enumerate(numbers)}
+    cells = np.array([points_at[int(t)] for t in triangles]).reshape(-1, 3)
     from scipy.spatial import cKDTree
     on_ring = np.asarray(cKDTree(points).query(ring)[1])
     curved = {tuple(sorted((int(on_ring[k]), int(on_ring[(k + 1) % n])))): middle[k] for k in range(n)}
@@ -90,13 +90,13 @@ def remeshed(edges: np.ndarray, names: Sequence[frozenset[str]], corners: np.nda
             boundaries[name].append([i, j, between_nodes(i, j)])
     new = np.stack([nodes[on_ring], nodes[np.roll(on_ring, -1)],
                     nodes[[between_nodes(int(i), int(j)) for i, j in zip(on_ring, np.roll(on_ring, -1))]]], 1)
-    share = (volume or enclosed(edges, axisymmetric)) / enclosed(new, axisymmetric)
+    share = (volume or enclosed_volume(edges, axisymmetric)) / enclosed_volume(new, axisymmetric)
     nodes[:, 0] *= np.sqrt(share) if axisymmetric else share
     return to_mesh(lambda: Grid(nodes, np.arange(1, len(nodes) + 1), {layer: six},
                                 {name: np.array(rows) for name, rows in boundaries.items()}), comm, "remesh")
 
 
-def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
+def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
     """Return the volume of revolution, or the area, inside a closed outline of parabolas; exact.
 
     Args:
@@ -107,15 +107,15 @@ def enclosed(edges: np.ndarray, axisymmetric: bool) -> float:
     Returns:
         Volume, length^3, or area, length^2.
     """
-    at, weights = np.polynomial.legendre.leggauss(4)
-    s = (1 + at) / 2
+    xi, weights = np.polynomial.legendre.leggauss(4)
+    s = (1 + xi) / 2
     shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
     slopes = np.column_stack([4 * s - 3, 4 * s - 1, 4 - 8 * s])
     r, dz = (shapes @ edges)[..., 0], (slopes @ edges)[..., 1]
     return float(((np.pi * r**2 if axisymmetric else r) * dz * weights / 2).sum())
 
 
-def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
+def _nodes_along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes of new elements along a line of edges: ends, shape (n + 1, 2), and midpoints, shape (n, 2).
 
     Args:
@@ -126,19 +126,19 @@ def _along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -
     """
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 
-    def place(t: np.ndarray) -> np.ndarray:
+    def points_at(t: np.ndarray) -> np.ndarray:
         """Return points of the line at parameters t, shape (n, 2)."""
         k = np.minimum(t.astype(int), len(edges) - 1)
         s = t - k
         shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
         return np.einsum("nk,nki->ni", shapes, edges[k])
-    x = place(parameter)
-    away = np.linalg.norm(x[:, None] - corners[None], axis=2).min(1) if len(corners) else np.full(len(x), np.inf)
-    h = np.minimum(size, corner + _SIZE_GROWTH * away)
+    x = points_at(parameter)
+    distance = np.linalg.norm(x[:, None] - corners[None], axis=2).min(1) if len(corners) else np.full(len(x), np.inf)
+    h = np.minimum(size, corner + _SIZE_GROWTH * distance)
     steps = np.linalg.norm(np.diff(x, axis=0), axis=1)
     number = np.concatenate([[0.0], np.cumsum(steps * (1 / h[1:] + 1 / h[:-1]) / 2)])
     n = max(int(np.ceil(number[-1] - 0.3)), 1)
     t = np.interp(number[-1] * np.arange(2 * n + 1) / (2 * n), number, parameter)
     t[0], t[-1] = 0.0, len(edges)
-    points = place(t)
+    points = points_at(t)
     return points[::2], points[1::2]
