@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.extensions.fits.tested import MeasuredRange, nearest_test, principal
+from formingx.extensions.fits.tested import MeasuredRange, nearest_test, principal_strains
 
 RUBBER = fx.NeoHookean(c10=0.2)
 
 
 def strain(mode, stretch):
     k = {"uniaxial": -0.5, "pure_shear": 0.0, "equibiaxial": 1.0}[mode]
-    return principal(np.array([[stretch], [stretch**k]]))
+    return principal_strains(np.array([[stretch], [stretch**k]]))
 
 
 def outside(tested, mode, stretch):
@@ -39,7 +39,7 @@ def test_between_two_modes_and_beyond_them():
     assert not outside(tested, "pure_shear", 2.0) and outside(tested, "pure_shear", 4.5)
     assert tested.distance(strain("pure_shear", 2.0))[0] == 0 and not tested.single_mode
     biaxial = MeasuredRange.from_stretches({"biaxial": np.array([[2.0, 3.0], [1.5, 1.0]])})
-    assert not biaxial.outside(principal(np.array([[1.5], [2.0]])))[0]                  # whatever the order
+    assert not biaxial.outside(principal_strains(np.array([[1.5], [2.0]])))[0]                  # whatever the order
 
 
 def blown(material, stretch=2.0, **more):

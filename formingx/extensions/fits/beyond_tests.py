@@ -16,20 +16,20 @@ from ...forms.transfer import isochoric_gradients
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from ...ranks import gathered
-from .tested import MeasuredRange, nearest_test, principal
+from .tested import MeasuredRange, nearest_test, principal_strains
 
 _MAX_UNTESTED_VOLUME = 0.005             # share of a layer's volume that may lie outside the tests without a warning
 
 
 @register("scene")
-def draws_beyond_tests(body: Any) -> Iterator[Finding]:
-    """Find constants that tests leave undetermined, and expected stretches beyond the tests.
+def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
+    """Find constants that tests of a single mode leave undetermined, and expected stretches beyond the tests.
 
     Args:
-        body: the examined body, whose `scene` has the materials.
+        body: the examined `formingx.checks.sizes.Body`, before its run.
 
     Yields:
-        A finding for each layer with such constants, and for each expected stretch beyond its tests.
+        A warning for each layer with such constants, and for each expected stretch beyond its tests.
     """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
@@ -38,21 +38,21 @@ def draws_beyond_tests(body: Any) -> Iterator[Finding]:
                           f" in another mode of deformation its stress is a guess",
                           "fit it to tests of another mode too, or choose a law with fewer constants")
         for what, stretch in expected_stretches(body):
-            strain = principal(np.array([[stretch], [stretch]]))
+            strain = principal_strains(np.array([[stretch], [stretch]]))
             if tested.outside(strain)[0]:
                 yield Finding("warning", about, f"{what} stretches it about {stretch:.3g}-fold in all directions;"
                               f" {_tests_of(tested, *strain[0])}", "use tests that reach so far")
 
 
 @register("end")
-def ends_beyond_tests(path: Any) -> Iterator[Finding]:
+def strains_beyond_tests(path: Any) -> Iterator[Finding]:
     """Find layers with a deformation in the last state that the tests of their material do not cover; collective.
 
     Args:
         path: the computed `Path`.
 
     Yields:
-        A finding for each layer of which 0.5 % of the volume or more is deformed beyond the tests.
+        A warning for each layer of which 0.5 % of the volume or more is deformed beyond the tests.
     """
     problem, scene = path.problem, path.problem.scene
     known = dict(_tested(scene))
@@ -66,19 +66,20 @@ def ends_beyond_tests(path: Any) -> Iterator[Finding]:
         share = float(volumes[outside].sum() / volumes.sum())
         if share < _MAX_UNTESTED_VOLUME:
             continue
-        far = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
-        largest, middle = strains[far]
-        where = place(scene.mesh, points[far]) if scene.kinematics.components == COORDINATES else tuple(points[far])
-        open_ = f"; they leave {', '.join(tested.undetermined)} open" if tested.undetermined else ""
+        furthest = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
+        largest, middle = strains[furthest]
+        point = points[furthest]
+        where = place(scene.mesh, point) if scene.kinematics.components == COORDINATES else tuple(point)
+        undetermined = f"; they leave {', '.join(tested.undetermined)} open" if tested.undetermined else ""
         yield Finding("warning", f"materials[{terms.names[0]!r}]",
                       f"{100 * share:.3g} % of it is deformed as in none of its tests, furthest at {where}, where it is"
                       f" stretched {np.exp(largest):.3g} and {np.exp(middle):.3g}-fold;"
-                      f" {_tests_of(tested, largest, middle)}{open_}: its stress there is extrapolated",
+                      f" {_tests_of(tested, largest, middle)}{undetermined}: its stress there is extrapolated",
                       "fit it to tests of this mode that reach so far")
 
 
 def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
-    """Return a text with the test that is nearest to a deformation, and its range of stretches.
+    """Return a text that names the test nearest to a deformation, with its range of stretches.
 
     Args:
         tested: tests of the material.
@@ -107,7 +108,7 @@ def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.n
 
     Returns:
         Largest and middle logarithmic strain, shape (n, 2); reference positions, shape (n, 2) or (n, 3), length;
-        reference volumes of the points, shape (n,).
+        reference volumes of the points (quadrature weights), shape (n,), length^3.
     """
     forms, cells = problem.forms, terms.own_cells
     F = isochoric_gradients(forms, cells, terms.places)

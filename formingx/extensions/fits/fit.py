@@ -14,8 +14,8 @@ from ...figures import Axes
 from ...materials.material import Material
 from ...materials.relaxing import RelaxingMaterial
 from ...values.intervals import t_intervals
-from .fit_in_time import TimedTest, fitted_in_time
-from .fit_plot import plotted
+from .fit_in_time import TimedTest, fit_timed_tests
+from .fit_plot import draw_fit
 from .measured import read_tests
 from .points import Points
 from .tested import MeasuredRange
@@ -28,7 +28,7 @@ _FIRST_EVALUATIONS = 20
 _LAST_EVALUATIONS = 400
 """Largest number of evaluations from each of the best three results, to refine them."""
 
-IN_TIME: list[tuple[type, Callable]] = [(RelaxingMaterial, fitted_in_time)]
+IN_TIME: list[tuple[type, Callable]] = [(RelaxingMaterial, fit_timed_tests)]
 """Classes of materials that are fitted to tests in time, each with the function that fits it."""
 
 
@@ -45,7 +45,8 @@ class Fit(NamedTuple):
         rms_total: root mean square of the misfit over the points of all tests, stress.
         deviations: {test: root mean square of the misfit over the measured stress}. Stresses below 2 % of the largest
             stress of the test count as these 2 %.
-        errors: {constant: standard error}; nan with no more points than constants, infinite without effect.
+        errors: {constant: standard error}; nan if there are no more points than constants, infinite for a constant
+            without effect on the stresses.
         undetermined: names of the constants whose standard error exceeds half of their value. This error is computed
             for a noise of 1 % of the stress, or for the misfit if that is larger.
         covariance: covariance of the constants, shape (p, p), in the order of `constants`.
@@ -81,24 +82,24 @@ class Fit(NamedTuple):
         return t_intervals(self.constants, self.errors, self.points, confidence)
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
-        """Draw measured and fitted nominal stresses over the stretch; of relaxation tests over the time.
+        """Draw measured and fitted nominal stresses over the stretch, for relaxation tests over the time.
 
         Args:
-            axes: matplotlib axes; a pair if only some of the tests are relaxation tests, these on the first. Default: a
-                new figure.
+            axes: matplotlib axes; a pair if only some tests are relaxation tests, which are drawn on the first.
+                Default: a new figure.
             unit: unit of stress, for the label.
             unit_of_time: unit of time, for the label.
 
         Returns:
             The matplotlib axes.
         """
-        return plotted(self.material, self.data, axes, unit, unit_of_time)
+        return draw_fit(self.material, self.data, axes, unit, unit_of_time)
 
     def __str__(self) -> str:
         parts = ", ".join(f"{mode} {value:.4g} ({100 * self.deviations[mode]:.2g} %)"
                           for mode, value in self.rms.items())
-        open_ = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
-        return f"{self.material}: rms {self.rms_total:.4g} ({parts}){open_}"
+        undetermined = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
+        return f"{self.material}: rms {self.rms_total:.4g} ({parts}){undetermined}"
 
     def __repr__(self) -> str:
         return str(self)
@@ -119,19 +120,21 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             `Hyperelastic` must be given as a material, and so must a `KBKZ` with a damping. Of this the damping is
             fitted, and the spectrum does not change (see `fit_spectrum`).
         data: {test: (stretches, nominal stresses)}, arrays of shape (n,), for any of "uniaxial", "pure_shear" (planar)
-            and "equibiaxial". For "biaxial" it is (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); a
-            stress that was not measured is nan. The constants get the unit of the stress, force over reference area.
-            For a material that relaxes: a list of `TimedTest`.
-            Or the name of a CSV file with the columns test, stretch and stress (nominal). They may be in any order if
-            the first line names them, else in this order. Units in brackets are checked, not converted. A file for a
-            relaxing material has a column with the time; each test begins where the time decreases. Its rows are as in
-            `TimedTest`; a stress that was not measured is left empty.
+            and "equibiaxial". For "biaxial": (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); nan
+            for a stress that was not measured. The constants get the unit of the stress, force over reference area.
+            For a relaxing material: a list of `TimedTest`.
+            Or the name of a CSV file with the columns test, stretch, stress (nominal), and for a relaxing material
+            time. The columns may be in any order if the first line names them, else in this order. Units in brackets
+            are checked, not converted. A test ends where its name changes or the time decreases. A stress that was not
+            measured is left empty in a test in time.
         terms: number of terms if `material` is the class `Ogden`, default 3. For a relaxing class it is the number of
             branches, default as many as the tests determine; the equilibrium is then neo-Hookean.
         relative: True: each misfit is divided by the measured stress, or by 2 % of the largest stress of the test if
             that is more. False: misfits in stress, every point with the same weight.
-        weights: {test: weight of the squared misfits of its points}; for tests in time, one number for each. Default 1.
-        within: lowest and highest stretch of the points that count; of biaxial tests both stretches must lie between.
+        weights: {test: weight of the squared misfits of its points}; for tests in time a list with the weight of each
+            test. Default: 1.
+        within: lowest and highest stretch of the points that count, or None for all. In biaxial tests both stretches
+            must lie in the range.
 
     Returns:
         Fitted material, with misfits and uncertainty of the constants.
@@ -148,20 +151,20 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
     """
     for kind, fitted in IN_TIME:
         if isinstance(material, kind) or isinstance(material, type) and issubclass(material, kind):
-            return _of_time(fitted, material, data, terms, relative, weights, within)
+            return _fit_timed(fitted, material, data, terms, relative, weights, within)
     points = Points(_tests(data) if isinstance(data, str | os.PathLike) else data, relative, weights, within)
-    best, found = _fitted(material, points, terms)
+    best, found = _fit_elastic(material, points, terms)
     misfit = points.stress(best.response, best.parameters.values()) - points.measured
     return _result(best, dict(best.parameters), points.parts, misfit, points.measured, found,
                    MeasuredRange.from_stretches(points.stretches_of, found.undetermined), points.data)
 
 
-def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
+def _fit_timed(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
              within: Any) -> Fit:
-    """Return the fit of a material to tests in time.
+    """Fit a relaxing material to tests in time, and return the result.
 
     Args:
-        fitted: function that fits materials of this class, see `IN_TIME`.
+        fitted: function that fits the constants of materials of this class, see `IN_TIME`.
         material: class, or material with initial constants.
         data: list of `TimedTest`, or the name of a CSV file.
         terms: see `fit`.
@@ -170,8 +173,9 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
         within: see `fit`.
     """
     tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
-    many = len(tests) if isinstance(tests, list | tuple) else 0
-    relaxing, constants, used, found = fitted(material, tests, terms, relative, numbered_weights(weights, many), within)
+    number = len(tests) if isinstance(tests, list | tuple) else 0
+    relaxing, constants, used, found = fitted(material, tests, terms, relative, numbered_weights(weights, number),
+                                              within)
     misfits, measured, parts, n = [], [], {}, 0
     stretches: dict[str, list] = {}
     rates = []
@@ -184,17 +188,17 @@ def _of_time(fitted: Callable, material: Any, data: Any, terms: int | None, rela
         stretches.setdefault(test.mode, []).append(test.stretches[given])
         steps = np.diff(test.times)
         rates.append(np.abs(np.diff(np.log(test.stretches)))[steps > 0] / steps[steps > 0])
-    moved = np.concatenate(rates)
-    moved = moved[moved > 0]
+    strain_rates = np.concatenate(rates)
+    strain_rates = strain_rates[strain_rates > 0]
     tested = MeasuredRange.from_stretches(
         {mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
-        (float(moved.min()), float(moved.max())) if len(moved) else None)
+        (float(strain_rates.min()), float(strain_rates.max())) if len(strain_rates) else None)
     return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, tests)
 
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
-    """Return the result of a fit.
+    """Return the `Fit` with the misfits of a fitted material, which gets a copy with the range of its tests.
 
     Args:
         material: material with the fitted constants.
@@ -206,15 +210,16 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
         tested: range of the tests.
         data: the tests, as they were given to `fit`.
     """
-    card = copy.copy(material)
-    card.tested = tested
+    fitted_material = copy.copy(material)
+    fitted_material.tested = tested
     deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), 0.02 * abs(measured[part]).max()))
                   for name, part in parts.items()}
-    return Fit(card, constants, {name: _rms(misfit[part]) for name, part in parts.items()}, _rms(misfit), deviations,
-               found.errors, found.undetermined, found.covariance, len(misfit), data)
+    rms = {name: _rms(misfit[part]) for name, part in parts.items()}
+    return Fit(fitted_material, constants, rms, _rms(misfit), deviations, found.errors, found.undetermined,
+               found.covariance, len(misfit), data)
 
 
-def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
+def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
     """Fit a material to tests without time; return it with the uncertainty of its constants.
 
     Args:
@@ -254,8 +259,8 @@ def _fitted(material: Any, points: Points, terms: int | None) -> tuple[Material,
         return trial[0]
 
     trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST_EVALUATIONS) for g in guesses), key=cost)
-    least, guess, x = min((refined(g, x, _LAST_EVALUATIONS) for _, g, x in trials[:3]), key=cost)
-    if not np.isfinite(least):
+    lowest_cost, guess, x = min((refined(g, x, _LAST_EVALUATIONS) for _, g, x in trials[:3]), key=cost)
+    if not np.isfinite(lowest_cost):
         raise InputError(f"fit: {guess} has no finite stress at some stretch of the data: start with constants whose"
                          f" limit lies beyond them")
     best = guess.with_constants(guess.constants_at(x))

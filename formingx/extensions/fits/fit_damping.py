@@ -82,7 +82,7 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
     return Spectrum(pairs, float(misfit / math.sqrt(2 * len(w))))
 
 
-def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
+def fit_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the damping function of a melt to tests in time; its spectrum does not change.
 
@@ -109,11 +109,11 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
         raise InputError(f"fit: terms = {terms!r}: {material} has its times already")
     used = checked_tests(tests, within)
     measured = [test.stress[np.isfinite(test.stress)] for test in used]
-    sizes, row = divisors(measured, relative, weights), np.concatenate(measured)
+    sizes, stresses = divisors(measured, relative, weights), np.concatenate(measured)
     law, names = type(material.damping), list(material.damping.bounds)
     low, high = np.array(list(material.damping.bounds.values())).T
-    if len(row) < len(names):
-        raise InputError(f"fit: {len(row)} points cannot fix the {len(names)} constants of {law.__name__}")
+    if len(stresses) < len(names):
+        raise InputError(f"fit: {len(stresses)} points cannot fix the {len(names)} constants of {law.__name__}")
 
     def with_damping(damping: Damping) -> KBKZ:
         """Return the melt with another damping; spectrum and equilibrium are unchanged."""
@@ -122,18 +122,18 @@ def fitted_damping(material: Any, tests: Any, terms: int | None, relative: bool,
     def stress(x: np.ndarray) -> np.ndarray:
         """Return the nominal stresses at all n measured points for constants x of the damping; nan beyond bounds."""
         if np.any(x < low) or np.any(x > high):
-            return np.full(len(row), np.nan)
-        card = with_damping(law(*map(float, x)))
-        return np.concatenate([card.stress(t.mode, t.stretches, times=t.times, between=t.between)[
+            return np.full(len(stresses), np.nan)
+        melt = with_damping(law(*map(float, x)))
+        return np.concatenate([melt.stress(t.mode, t.stretches, times=t.times, between=t.between)[
             np.isfinite(t.stress)] for t in used])
 
     start = np.array([getattr(material.damping, name) for name in names])
     starts = [start, *([np.where(high == 1, 1e-2, start)] if np.any(high == 1) else [])]
-    trials = [least_squares(lambda x: (stress(x) - row) / sizes, np.clip(x, low + 1e-9, high - 1e-9),
+    trials = [least_squares(lambda x: (stress(x) - stresses) / sizes, np.clip(x, low + 1e-9, high - 1e-9),
                             bounds=(low, high), x_scale="jac") for x in starts]
     best = min(trials, key=lambda trial: trial.cost).x
     found = dict(zip(names, map(float, best)))
-    return with_damping(law(**found)), found, used, uncertainty(stress, found, row, sizes)
+    return with_damping(law(**found)), found, used, uncertainty(stress, found, stresses, sizes)
 
 
-IN_TIME.append((KBKZ, fitted_damping))
+IN_TIME.append((KBKZ, fit_damping))

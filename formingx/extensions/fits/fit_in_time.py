@@ -90,7 +90,7 @@ class TimedTest(NamedTuple):
         return cls(mode, times, l, np.append(np.nan, stress), "strain")
 
 
-def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
+def fit_timed_tests(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
                    weights: list[float], within: Any
                    ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the constants of a relaxing material to tests in time.
@@ -110,18 +110,18 @@ def fitted_in_time(material: type[RelaxingMaterial] | RelaxingMaterial, tests: A
         InputError: wrong tests, fewer points than constants, no finite stress at some stretch, or `terms` for a
             material that has branches already.
     """
-    data = _Data(checked_tests(tests, within), material if isinstance(material, type) else type(material), relative,
-                 weights)
+    law = material if isinstance(material, type) else type(material)
+    data = _TimedData(checked_tests(tests, within), law, relative, weights)
     if isinstance(material, RelaxingMaterial):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r}: {material} has its branches already")
-        best = _refined(data, material, len(material.branches))
+        best = _fit_branches(data, material, len(material.branches))
     elif terms is not None:
-        best = _refined(data, _first(material), count("fit: terms", terms))
+        best = _fit_branches(data, _initial_material(material), count("fit: terms", terms))
     else:
-        best = _refined(data, _first(material), 1)
+        best = _fit_branches(data, _initial_material(material), 1)
         for n in range(2, 11):                  # a branch more while the misfit falls and the data determine all
-            larger = _refined(data, _first(material), n)
+            larger = _fit_branches(data, _initial_material(material), n)
             if larger[1] > 0.8 * best[1] or data.uncertainty(larger[0]).undetermined:
                 break
             best = larger
@@ -155,24 +155,24 @@ def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
     return found
 
 
-def _first(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
-    """Return a material of a class with a neo-Hookean equilibrium and one branch, with all constants 1."""
+def _initial_material(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
+    """Return the initial material of a class: a neo-Hookean equilibrium and one branch, with all constants 1."""
     return kind(NeoHookean(c10=1.0), [(1.0, 1.0)])
 
 
-class _Data:
+class _TimedData:
     """Measured stresses of all tests as one vector, and the stresses of a relaxing material at the same n points.
 
     Args:
         tests: the checked tests.
         law: class of the material.
-        relative: True for misfits over the measured stress, False for misfits in stress.
+        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
         weights: weight of each test.
 
     Attributes:
         tests: the checked tests.
         stress: measured nominal stresses, shape (n,).
-        scale: largest measured stress.
+        scale: largest absolute measured stress.
         sizes: stress by which each misfit is divided, shape (n,).
         log_tau: logarithms of the relaxation times at which the stress of a branch is computed, shape (k,).
         branch: spline over the logarithm of the relaxation time, which gives the stresses of a branch of unit modulus.
@@ -203,13 +203,13 @@ class _Data:
                 for t, m in zip(self.tests, measured)]
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
-    def relaxed(self, material: Material | None, constants: Any = None) -> np.ndarray:
-        """Return the nominal stresses of a hyperelastic material at all points, shape (n,).
+    def equilibrium_stress(self, material: Material | None, constants: Any = None) -> np.ndarray:
+        """Return the nominal stresses of the equilibrium material at all points, shape (n,).
 
         They are not finite beyond the limit of the material.
 
         Args:
-            material: the material, or None for no stress.
+            material: equilibrium of a relaxing material, or None for no stress.
             constants: other values of its constants, unchecked, or None for its own.
         """
         if material is None:
@@ -227,14 +227,14 @@ class _Data:
         n = len(constants) - 2 * len(material.branches)
         mu, tau = constants[n::2], constants[n + 1::2]
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
-        return self.relaxed(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
+        return self.equilibrium_stress(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
 
     def uncertainty(self, material: RelaxingMaterial) -> Uncertainty:
         """Return the uncertainty of the fitted constants of a relaxing material."""
         return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress, self.sizes)
 
 
-def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
+def _fit_branches(data: _TimedData, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
     """Fit the constants of a relaxing material with n branches to the tests.
 
     Args:
@@ -274,20 +274,20 @@ def _refined(data: _Data, material: RelaxingMaterial, n: int) -> tuple[RelaxingM
                          f" limit lies beyond them")
     cost, start, x = min(trials, key=lambda trial: trial[0])
     best = cast(RelaxingMaterial, start.with_constants(start.constants_at(x)))
-    constants = [] if (relaxed := best.equilibrium) is None else list(relaxed.parameters.values())
+    constants = [] if (equilibrium := best.equilibrium) is None else list(equilibrium.parameters.values())
     ordered = sorted(best.branches, key=lambda pair: pair[1])
     best = cast(RelaxingMaterial, best.with_constants([*constants, *np.ravel(ordered)]))
     return best, float(np.sqrt(2 * cost / len(data.stress)))
 
 
-def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
-    """Return materials with n branches from which a fit starts: two from the best spectrum, and the given material.
+def _guesses(data: _TimedData, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
+    """Return materials with n branches from which a fit starts; for the arguments see `_fit_branches`.
 
-    The given material counts only if it has n branches. For the arguments see `_refined`.
+    Two are made from the spectrum that fits best. The given material is the third if it has n branches.
     """
     from scipy.optimize import nnls
     equilibrium = material.equilibrium
-    shape = data.relaxed(equilibrium)[:, None] / data.sizes[:, None]
+    shape = data.equilibrium_stress(equilibrium)[:, None] / data.sizes[:, None]
     row = np.linspace(data.log_tau[0], data.log_tau[-1], len(data.log_tau) // 4)
     columns = np.hstack([shape, data.branch(row) / data.sizes[:, None]])
     weight, *spectrum = nnls(columns, data.stress / data.sizes)[0]
@@ -304,12 +304,12 @@ def _guesses(data: _Data, material: RelaxingMaterial, n: int) -> list[RelaxingMa
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """Return an equilibrium material with its shear modulus times a factor.
+    """Return a first guess of the equilibrium material with the shear modulus of a given one times a factor.
 
     Args:
         material: the material, or None.
         factor: factor of the shear modulus.
-        I1: largest first invariant of the tests, within the limit of the result.
+        I1: largest first invariant of C in the tests; it lies within the limit of the result.
 
     Returns:
         First guess of the same class, or the material itself if its class has none; None for None.
@@ -318,7 +318,7 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
         return None
     try:
         return type(material).guesses(factor * material.shear_modulus, I1, None)[0]
-    except InputError:                                          # it has no guess of its own
+    except InputError:                                          # the class has no first guess
         return material
 
 
@@ -339,7 +339,7 @@ def _checked(name: str, test: TimedTest) -> dict[str, Any]:
         raise InputError(f"{name}: stress = {test.stress!r}: must be numbers") from None
     if stress.shape != t.shape:
         raise InputError(f"{name}: stress has the shape {stress.shape}, times {t.shape}: must be the same")
-    if t[0] != 0 and l[0] != 1:                                 # when was it put on?
+    if t[0] != 0 and l[0] != 1:                                 # applied at an unknown time
         if np.ptp(l) > 0 or t[0] < 0:
             raise InputError(f"{name}: begins at time {t[0]:.6g} with a stretch of {l[0]:.6g}: since when? Begin with"
                              f" the time at which it was put on, the stress left empty (not a number)")

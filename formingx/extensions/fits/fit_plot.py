@@ -8,8 +8,8 @@ from ...errors import InputError
 from ...figures import figure
 
 
-def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
-    """Draw measured and fitted nominal stresses over the stretch; of relaxation tests over the time.
+def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
+    """Draw measured and fitted nominal stresses over the stretch, for relaxation tests over the time.
 
     Args:
         material: the fitted material.
@@ -33,9 +33,9 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
         raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for relaxation tests"
                          f" (held stretch), one for the others")
     if isinstance(data, dict):
-        _stretched(material, data, panels[0])
+        _draw_elastic(material, data, panels[0])
     else:
-        _timed(material, data, constant, panels)
+        _draw_timed(material, data, constant, panels)
     label = "nominal stress" + f" ({unit})" * bool(unit)
     for i, panel in enumerate(panels):
         in_time = any(constant) and i == 0
@@ -44,18 +44,18 @@ def plotted(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -
     return axes
 
 
-def _stretched(material: Any, data: dict, panel: Any) -> None:
+def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
     """Draw stresses of elastic tests over the stretch on matplotlib axes `panel`, with curves of the material."""
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
-            _biaxial(material, (l, *others, P), panel)
+            _draw_biaxial(material, (l, *others, P), panel)
             continue
         points, = panel.plot(l, P, "o", ms=4, label=mode.replace("_", " "))
         fine = np.linspace(min(1, np.min(l)), np.max(l), 200)
         panel.plot(fine, material.stress(mode, fine), color=points.get_color())
 
 
-def _biaxial(material: Any, columns: Any, panel: Any) -> None:
+def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
     """Draw stresses of a biaxial test over its first stretch, and the stresses of the material as crosses.
 
     Args:
@@ -70,7 +70,7 @@ def _biaxial(material: Any, columns: Any, panel: Any) -> None:
         panel.plot(l1, np.where(np.isfinite(P), found, np.nan), "x", ms=5, color=points.get_color())
 
 
-def _timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None:
+def _draw_timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None:
     """Draw stresses of tests in time, with curves of the material.
 
     Args:
@@ -79,13 +79,13 @@ def _timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None
         constant: True for each test at constant stretch: it is drawn over the logarithmic time, else over the stretch.
         panels: matplotlib axes; tests at constant stretch are drawn on the first, the others on the last.
     """
-    for i, (test, still) in enumerate(zip(tests, constant), 1):
-        panel = panels[0] if still else panels[-1]
+    for i, (test, is_relaxation) in enumerate(zip(tests, constant), 1):
+        panel = panels[0] if is_relaxation else panels[-1]
         t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
-        x, label = (t - t[0], f"stretch {l[0]:g}") if still else (l, _rate(t, l))
+        x, label = (t - t[0], f"stretch {l[0]:g}") if is_relaxation else (l, _rate(t, l))
         points, = panel.plot(x, test.stress, "o", ms=4, label=f"{i} {test.mode.replace('_', ' ')}, {label}")
         panel.plot(x, material.stress(test.mode, l, times=t, between=test.between), color=points.get_color())
-        if still:
+        if is_relaxation:
             panel.set_xscale("log")
 
 

@@ -46,7 +46,7 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
     columns = list(range(width)) if head is None else _columns(caller, head)
     points = [(_mode(f"{caller}, line {n}", row, width, columns), _numbers(f"{caller}, line {n}", row, columns))
               for n, row in body]
-    numbered = zip(_counted(points), points)
+    numbered = zip(_test_numbers(points), points)
     return [(group[0][1][0], np.array([numbers for _, (_, numbers) in group]).T)
             for group in (list(found) for _, found in itertools.groupby(numbered, key=lambda x: x[0]))]
 
@@ -109,8 +109,8 @@ def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
     return [float(cell or "nan") for cell in cells]
 
 
-def _counted(points: list[tuple[str, list[float]]]) -> list[int]:
-    """Return for each row of the file the number of its test; a test ends where its name changes or time decreases.
+def _test_numbers(points: list[tuple[str, list[float]]]) -> list[int]:
+    """Return the number of the test of each row; a test ends where its name changes or the time decreases.
 
     Args:
         points: (name of the test, [stretch, stress and, if there is one, time]) of each row.

@@ -12,7 +12,7 @@ from .weights import divisors, in_range, named_weights
 
 
 class Points:
-    """All m measured stresses of tests without time as one vector, checked.
+    """Measured stresses of tests without time, checked, as one vector of m numbers.
 
     A biaxial test has two stresses at each of its points, the other tests have one.
 
@@ -42,7 +42,7 @@ class Points:
         if all(np.all(l[0] == 1) and np.all(l[1] == 1) for l, _ in tests.values()):
             raise InputError("fit: data: every stretch is 1: nothing is strained")
         weight = named_weights(weights, list(tests))
-        kept = {mode: _kept(mode, l, P, within) for mode, (l, P) in tests.items()}
+        kept = {mode: _within_range(mode, l, P, within) for mode, (l, P) in tests.items()}
         stresses = [P[np.isfinite(P)] for _, P in kept.values()]
         largest = max((np.abs(P).max() for P in stresses if len(P)), default=0.0)
         if not any(len(P) for P in stresses):
@@ -98,8 +98,8 @@ class Points:
                                for k in range(len(self.parts))])
 
 
-def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return stretches and stresses of the k points of a test whose stretches lie in a range, shape (2, k) each.
+def _within_range(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stretches and stresses of the k points of a test that lie in a range, shape (2, k) each.
 
     Args:
         mode: name of the test; of "biaxial" both stretches must lie in the range.
@@ -111,7 +111,7 @@ def _kept(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndar
     return l[:, inside], P[:, inside]
 
 
-def strains(values: np.ndarray) -> str:
+def hint_if_strains(values: np.ndarray) -> str:
     """Return a hint for an error message if the given stretches of a test are probably strains.
 
     Args:
@@ -156,7 +156,7 @@ def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     missing = np.isnan(stresses).all(0) | np.isinf(stresses).any(0)
     for i in np.flatnonzero(missing | ~np.all(np.isfinite(at) & (at > 0), axis=0))[:1]:
         raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}, stress = {P[i]}: must be finite,"
-                         f" and the stretch greater than 0{strains(first)}")
+                         f" and the stretch greater than 0{hint_if_strains(first)}")
     for i in np.flatnonzero(np.any((at < 1e-3) | (at > 1e3), axis=0))[:1]:
         raise InputError(f"fit: data[{mode!r}], point {i}: stretch = {first[i]}: must be from 0.001 to 1000")
     return l, stresses

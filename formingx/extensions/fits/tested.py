@@ -28,8 +28,8 @@ class MeasuredRange:
     """Range of the tests to which the constants of a material were fitted.
 
     A deformation is described by its largest and its middle principal logarithmic strain. It counts as tested if these
-    lie in the convex hull of the tested strains, or outside it by at most 10 % of their norm. A deformation between two
-    tested modes therefore counts as tested.
+    lie in the convex hull of the tested strains and zero strain. A distance of up to 10 % of their norm, or 0.02, from
+    the hull is allowed. A deformation between two tested modes therefore counts as tested.
 
     Attributes:
         ranges: {test: (lowest, highest stretch)}; the test is "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
@@ -66,11 +66,11 @@ class MeasuredRange:
             if l.size == 0 or not np.all(l > 0):
                 raise InputError(f"tests: {mode}: stretches must be above 0")
             ranges[mode] = (float(l.min()), float(l.max()))
-            strains.append(principal(l.reshape(2, -1) if mode == "biaxial" else in_plane_stretches(mode, l.ravel())))
+            strains.append(principal_strains(l.reshape(2, -1) if mode == "biaxial" else along(mode, l.ravel())))
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:
-        """Return the distances of deformations from the tested ones.
+        """Return the distances of deformations from the tested range, in logarithmic strain.
 
         Args:
             strains: largest and middle logarithmic strain of m deformations, shape (m, 2).
@@ -155,7 +155,7 @@ def with_tests(material: Material, **stretches: Any) -> Material:
     return other
 
 
-def principal(stretches: Any) -> np.ndarray:
+def principal_strains(stretches: Any) -> np.ndarray:
     """Return the largest and the middle principal logarithmic strain of incompressible deformations.
 
     Args:
@@ -185,7 +185,7 @@ def nearest_test(largest: float, middle: float) -> str:
 def _hull(points: np.ndarray) -> np.ndarray:
     """Return the k corners of the convex hull of points, shape (n, 2), counter-clockwise, shape (k, 2).
 
-    Andrew's monotone chain algorithm is used.
+    It is computed by Andrew's monotone chain algorithm.
     """
     ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:

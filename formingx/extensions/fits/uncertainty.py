@@ -33,11 +33,12 @@ class Uncertainty(NamedTuple):
 def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndarray, sizes: np.ndarray) -> Uncertainty:
     r"""Return the uncertainty of a least-squares fit of stresses whose misfits are divided by given sizes.
 
-    .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}
+    .. math:: \mathrm{cov} = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{d_i} \frac{\partial P_i}{\partial c_j}, \quad
+        s^2 = \frac{1}{n - p} \sum_i \left(\frac{P_i - M_i}{d_i}\right)^2
 
-    J contains the derivatives of the scaled stresses by the constants at the optimum. s^2 is the sum of the squared
-    scaled misfits over the number of points minus constants (Seber and Wild 1989, chapter 5). A standard error is nan
-    if there are no more points than constants. It is infinite if doubling the constant changes no stress visibly.
+    with the computed stresses P, the measured ones M, their divisors d and the fitted constants c (Seber and Wild 1989,
+    chapter 5). A standard error is nan if there are no more points than constants. It is infinite if doubling the
+    constant changes no stress by more than 1e-6 of its divisor.
 
     Args:
         stress: function of the constants, shape (p,), that returns the stresses at all points, shape (n,); not finite
@@ -53,27 +54,28 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     first = stress(values)
     slopes = np.stack([_slope(stress, first, values, i, sizes) for i in range(len(values))], axis=1)
     lengths = np.linalg.norm(slopes, axis=0)
-    matter = lengths > 0
-    inverse = np.diag(np.where(matter, 0.0, np.inf)) if not matter.all() else np.zeros((len(values), len(values)))
-    if matter.any():
-        _, s, V = np.linalg.svd(slopes[:, matter] / lengths[matter], full_matrices=False)
-        half = (V / np.maximum(s, 1e-8)[:, None]) / lengths[matter]
-        inverse[np.ix_(matter, matter)] = half.T @ half
-    spread = np.sqrt(np.diag(inverse))
-    squares, excess = float(np.sum(((first - measured) / sizes) ** 2)), len(measured) - len(values)
-    error = math.sqrt(squares / excess) if excess > 0 else math.nan
+    effective = lengths > 0
+    inverse = np.diag(np.where(effective, 0.0, np.inf)) if not effective.all() else np.zeros((len(values), len(values)))
+    if effective.any():
+        _, s, V = np.linalg.svd(slopes[:, effective] / lengths[effective], full_matrices=False)
+        half = (V / np.maximum(s, 1e-8)[:, None]) / lengths[effective]
+        inverse[np.ix_(effective, effective)] = half.T @ half
+    unit_errors = np.sqrt(np.diag(inverse))
+    squares, freedom = float(np.sum(((first - measured) / sizes) ** 2)), len(measured) - len(values)
+    error = math.sqrt(squares / freedom) if freedom > 0 else math.nan
     noise = max(_ASSUMED_NOISE, math.sqrt(squares / len(measured)))
-    open_ = [name for name, value, each in zip(constants, values, spread)
-             if noise * each > _UNDETERMINED_ERROR * abs(value)]
+    undetermined = tuple(name for name, value, unit_error in zip(constants, values, unit_errors)
+                         if noise * unit_error > _UNDETERMINED_ERROR * abs(value))
     with np.errstate(invalid="ignore"):
         covariance = np.where(inverse == 0, 0.0, error**2 * inverse)
-    return Uncertainty({name: float(error * each) for name, each in zip(constants, spread)}, tuple(open_), covariance)
+    errors = {name: float(error * unit_error) for name, unit_error in zip(constants, unit_errors)}
+    return Uncertainty(errors, undetermined, covariance)
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
     """Return the derivative of the scaled stresses by one constant, by a difference quotient, shape (n,).
 
-    It is 0 if no step up to doubling the constant changes a stress visibly.
+    It is 0 if no step up to doubling the constant changes a scaled stress by more than 1e-6.
 
     Args:
         stress: function of the constants, shape (p,), that returns stresses, shape (n,).
