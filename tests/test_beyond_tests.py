@@ -51,12 +51,12 @@ def blown(material, stretch=2.0, **more):
 @pytest.mark.parametrize("more", [{}, {"model": fx.Membrane()}], ids=["solid", "membrane"])
 def test_a_run_says_how_much_of_the_body_leaves_the_tests(more):
     """The volume that is thinner than in the equibiaxial tests leaves them: its share by the profile of the wall."""
-    from formingx.extensions.fits.beyond_tests import ends_beyond_tests
+    from formingx.extensions.fits.beyond_tests import strains_beyond_tests
     covered = fx.with_tests(RUBBER, uniaxial=(1, 3), equibiaxial=(1, 2.6))
-    assert list(ends_beyond_tests(blown(covered, **more))) == []
+    assert list(strains_beyond_tests(blown(covered, **more))) == []
     short = fx.with_tests(RUBBER, uniaxial=(1, 4), equibiaxial=(1, 1.6))
     path = blown(short, **more)
-    finding, = ends_beyond_tests(path)
+    finding, = strains_beyond_tests(path)
     share = float(finding.text.split(" %")[0]) / 100
     profile = path.profile()
     R = np.linspace(0, 10, 400)
@@ -91,11 +91,11 @@ def test_a_card_says_so(tmp_path):
 
 
 def test_in_space():
-    from formingx.extensions.fits.beyond_tests import ends_beyond_tests
+    from formingx.extensions.fits.beyond_tests import strains_beyond_tests
     scene = fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(10.0, part="quarter"), size=4.0), thickness=0.2,
                      materials=fx.with_tests(RUBBER, uniaxial=(1, 3)), supports=[
                          fx.Clamped("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
                      loads=[fx.Pressure("bottom")])
     path = fx.trace(scene, until=fx.pressure(0.012), progress=False)
-    finding, = ends_beyond_tests(path)
+    finding, = strains_beyond_tests(path)
     assert "tension, which was not tested" in finding.text and "(R, Z)" not in finding.text

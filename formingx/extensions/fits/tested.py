@@ -66,7 +66,8 @@ class MeasuredRange:
             if l.size == 0 or not np.all(l > 0):
                 raise InputError(f"tests: {mode}: stretches must be above 0")
             ranges[mode] = (float(l.min()), float(l.max()))
-            strains.append(principal_strains(l.reshape(2, -1) if mode == "biaxial" else along(mode, l.ravel())))
+            in_plane = l.reshape(2, -1) if mode == "biaxial" else in_plane_stretches(mode, l.ravel())
+            strains.append(principal_strains(in_plane))
         return cls(ranges, np.concatenate(strains), undetermined, rates)
 
     def distance(self, strains: np.ndarray) -> np.ndarray:

@@ -291,7 +291,8 @@ def _positive_definite(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     for k in range(12):
         rr, rz, zz, hoop, along, turned = np.moveaxis(mean + shapes @ deviation, -1, 0)
         bad = ((rr <= 0) | ((rr * zz - rz**2) * mean[..., 3] < _MIN_DETERMINANT_RATIO)
-               | (hoop < _MIN_DETERMINANT_RATIO * mean[..., 3]) | (np.hypot(along, turned) < _MIN_DETERMINANT_RATIO)).any(1)
+               | (hoop < _MIN_DETERMINANT_RATIO * mean[..., 3])
+               | (np.hypot(along, turned) < _MIN_DETERMINANT_RATIO)).any(1)
         if not bad.any():
             break
         deviation[bad] *= 0.7 if k < 10 else 0.0
