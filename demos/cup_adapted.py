@@ -49,7 +49,7 @@ def main():
     runs = {"uniform": [form(disc(n), pressures) for n in uniform], "adapted": []}
     path = runs["uniform"][0]
     for share in shares:
-        path = form(fx.mesh.adapted(path, share=share), pressures)
+        path = form(fx.mesh.adapted(path, max_rotation=share), pressures)
         runs["adapted"].append(path)
     walls = {name: {columns(p): least_walls(p, pressures) for p in paths} for name, paths in runs.items()}
     truth, last = walls["uniform"][uniform[-1]], f"{pressures[-1]:g}"

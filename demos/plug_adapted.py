@@ -72,7 +72,7 @@ def run(case):
     mesh, columns = sheet(FIRST, mu), []
     for on_the_way in pilots:
         path, _ = push(mesh, mu, fillet, on_the_way)
-        mesh = fx.mesh.adapted(path, share=SHARE)
+        mesh = fx.mesh.adapted(path, max_rotation=SHARE)
         columns.append(len(path.problem.scene.mesh.columns.ends) - 1)
     path, end = push(mesh, mu, fillet, travels)
     n = len(mesh.columns.ends) - 1

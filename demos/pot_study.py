@@ -81,7 +81,7 @@ def main():
     path = pot(**found.best.values)
     path.report(args.out / "best.html", "The most even pot", units=UNITS, density=1.05, trim=TRIM)
     path.animate(args.out / "best.gif", frames=12 if args.quick else 60)
-    summarise(args.out, {"runs": len(found.runs), "failed": len(found.runs) - len(found.good), "seconds": seconds,
+    summarise(args.out, {"runs": len(found.runs), "failed": len(found.runs) - len(found.successful), "seconds": seconds,
                          "processor_seconds": spent, "workers": workers,
                          "best_of_the_design": {**design.values, **design.measures},
                          "best": {**found.best.values, **found.best.measures},

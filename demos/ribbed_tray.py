@@ -121,7 +121,8 @@ def main():
     path, names = None, [*(f"size_{size:g}" for size in sizes), *(f"adapted_{k + 1}" for k in range(more))]
     for name in names:
         size = name.removeprefix("size_")
-        path = form(fx.mesh.adapted(path, share=None, error=CHANGE) if size == name else flat(float(size)), mould)
+        sheet = fx.mesh.adapted(path, max_rotation=None, error=CHANGE) if size == name else flat(float(size))
+        path = form(sheet, mould)
         summary[name], part = numbers(path), path.part(density=DENSITY, trim=-0.5, units=UNITS)
         say(f"{name}: {summary[name]['triangles']} triangles, {path.counts.iterations} iterations,"
             f" {path.counts.failures} failures, {path.counts.seconds:.0f} s", str(part), "")

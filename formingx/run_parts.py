@@ -53,7 +53,7 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
     options = {} if adapt_mesh is True else dict(adapt_mesh)
     meshes = adaptation(caller)
     for name in options:
-        known(f"{caller}: adapt_mesh", name, ("share", "error"))
+        known(f"{caller}: adapt_mesh", name, ("max_rotation", "error"))
     meshes.check(scene.mesh)
     try:
         first = run(scene, None)

@@ -21,14 +21,14 @@ def disc(elements, **options):
 
 def test_pilot_puts_columns_on_the_edge():
     """The run on adapted columns: they fit the edge, others stay long; the force is that of a finer mesh."""
-    path = plugged(disc((20, 1)), adapt_mesh={"share": 0.5})
+    path = plugged(disc((20, 1)), adapt_mesh={"max_rotation": 0.5})
     ends = path.problem.scene.mesh.columns.ends
     sizes = np.diff(ends)
     assert path.pilot is not None and len(path.pilot.problem.scene.mesh.columns.ends) == 21
     assert 20 < len(sizes) < 45 and sizes.max() == pytest.approx(0.5, rel=0.15)
     assert 2.4 < ends[np.argmin(sizes)] < 4.0 and sizes.min() < 0.3
     assert np.all(sizes[1:] / sizes[:-1] < 1.4) and np.all(sizes[:-1] / sizes[1:] < 1.4)
-    shortest = np.diff(fx.mesh.adapted(path.pilot, share=1e-4).columns.ends).min()
+    shortest = np.diff(fx.mesh.adapted(path.pilot, max_rotation=1e-4).columns.ends).min()
     assert 0.5 / 8 / 1.2 < shortest < 0.5 / 8 * 1.01
     fine = plugged(disc((100, 1))).last.measures["tool_force"]
     pilot = path.pilot.last.measures["tool_force"]
@@ -43,7 +43,7 @@ def test_an_error_of_the_stress_is_met():
         return fx.trace(scene, until=fx.pole_height(6.0), progress=False)
     pilot = inflated(disc((8, 4)))
     first = pilot.stress().error().relative
-    mesh = fx.mesh.adapted(pilot, share=None, error=first / 3)
+    mesh = fx.mesh.adapted(pilot, max_rotation=None, error=first / 3)
     columns = len(mesh.columns.ends) - 1
     found, uniform = (inflated(m).stress().error().relative for m in (mesh, disc((columns, 4))))
     assert found < min(first / 2, uniform) and columns < 24
@@ -90,8 +90,8 @@ def test_present_area_holds_what_is_pressed_flat():
 
 def test_refusals():
     mesh = disc((4, 1))
-    with pytest.raises(fx.InputError, match="adapted: share = 0"):
-        fx.mesh.adapted(None, share=0)
+    with pytest.raises(fx.InputError, match="adapted: max_rotation = 0"):
+        fx.mesh.adapted(None, max_rotation=0)
     with pytest.raises(fx.InputError, match="must be what trace or Process.run gave back"):
         fx.mesh.adapted(None)
     with pytest.raises(fx.InputError, match="adapt_mesh 'sizes'"):

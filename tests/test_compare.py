@@ -26,7 +26,7 @@ def test_same_curve_other_points():
     """Two samplings of one curve differ only by the interpolation."""
     t = np.linspace(0, 12, 700)
     found = fx.compare(spiral(t), spiral(np.linspace(0.2, 11.8, 173)))
-    assert found.columns == ["pressure", "pole_height"] and found.beyond == 0
+    assert found.columns == ["pressure", "pole_height"] and found.points_beyond_ends == 0
     for d in found.differences.values():
         assert d.rms <= d.maximum < 1e-5 * d.range
         assert d.maximum < found.resolution[0] * d.range
@@ -59,7 +59,7 @@ def test_walls_are_compared_at_the_same_radius(factor):
         return 0.2 + np.exp(-8 * (r - 0.9) ** 2) + 0.3 * np.tanh(20 * (r - 0.5))
     r, s = np.linspace(0, 1, 160), np.linspace(1, 0, 57)
     found = fx.compare({"r": r, "wall": wall(r)}, {"r": s, "wall": factor * wall(s)})
-    assert found.along == "r" and found.beyond == 0 and "at the same r" in str(found)
+    assert found.along == "r" and found.points_beyond_ends == 0 and "at the same r" in str(found)
     d = found.differences["wall"]
     assert d.values == pytest.approx((factor - 1) * wall(s), abs=2e-4)
     slid = fx.compare({"r": r, "wall": wall(r)}, {"r": s[::-1], "wall": factor * wall(s[::-1])}, along="arc length")
@@ -79,7 +79,7 @@ def test_a_longer_curve_is_cut():
     t = np.linspace(0, 1, 41)
     longer = np.linspace(-0.5, 2, 51)
     found = fx.compare({"a": t, "b": t**2}, {"a": longer, "b": np.where(longer > 0, longer**2, 0)})
-    assert found.beyond == 30 and max(d.maximum for d in found.differences.values()) < 1e-4
+    assert found.points_beyond_ends == 30 and max(d.maximum for d in found.differences.values()) < 1e-4
 
 
 def test_limit_points_of_a_table():
@@ -125,7 +125,7 @@ def test_run_against_hand_coded_solver(tmp_path):
     states = follow(body, np.concatenate([2 * np.flatnonzero(R == 0), [2 * pin, 2 * pin + 1]]), row, heights)
     theirs = write(tmp_path / "theirs.csv", "H,p", [heights, [q for _, q in states]])
     found = fx.compare(path, theirs, columns={"pressure": "p", "pole_height": "H"})
-    assert found.beyond == 0
+    assert found.points_beyond_ends == 0
     for d in found.differences.values():
         assert d.maximum < 1e-4 * d.range
     (ours,), (other,) = found.limit_points

@@ -140,7 +140,7 @@ def test_triangles_as_a_pilot_run_asks_for():
     assert max(errors[1:]) < 4e-3 < errors[0] / 8
     assert len(path.wall().ratio) < 1.15 * len(even.wall().ratio) and path.counts.failures == 0
     assert path.problem.scene.mesh.boundaries.keys() == path.pilot.problem.scene.mesh.boundaries.keys()
-    assert len(fx.mesh.adapted(path.pilot, share=None, error=1e9).nodes_of("rim")) < 5       # nothing asks for more
+    assert len(fx.mesh.adapted(path.pilot, max_rotation=None, error=1e9).nodes_of("rim")) < 5
 
 
 def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):

@@ -11,7 +11,7 @@ from test_solidification import BASE, air, balance, block, draw
 
 import formingx as fx
 from formingx.extensions.heat import cooling
-from formingx.extensions.release.part import part_along
+from formingx.extensions.release.part import trimmed_mesh
 from formingx.forms.transfer import take_fields
 from formingx.problem.problem import Problem
 
@@ -37,7 +37,7 @@ def test_an_elastic_part_goes_back_to_rest(trim):
     assert part.before.height.max() > 0.05 and part.height < 1e-7 and part.flange_angle > 10
     F = part.path.stress().at_quadrature_points().deformation_gradient
     assert np.abs(F - np.eye(3)).max() < 1e-6
-    assert abs(part.trimmed - (trim or 1.0)) < 0.06 and part.diameter < 2.001
+    assert abs(part.trim_radius - (trim or 1.0)) < 0.06 and part.diameter < 2.001
 
 
 def test_a_relaxing_part_recovers_in_time(path):
@@ -57,7 +57,7 @@ def test_fields_of_a_part_are_those_of_the_whole(path):
     """Displacement, pressure, what the material remembers: to round-off."""
     source, mesh = path.problem, path.problem.scene.mesh
     line = np.column_stack([np.linspace(0, 1, 13), np.full(13, 0.05)])
-    here = Problem(fx.Scene(mesh=part_along(mesh, line, 9), materials=source.scene.materials,
+    here = Problem(fx.Scene(mesh=trimmed_mesh(mesh, line, 9), materials=source.scene.materials,
                             supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)]))
     take_fields(source, path.last, here)
     assert set(here.scene.mesh.boundaries) == set(mesh.boundaries)

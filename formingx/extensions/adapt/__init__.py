@@ -5,7 +5,7 @@ from typing import Any
 
 from ...mesh.mesh import Mesh
 from ...run_hooks import register_adaptation
-from .adapted import adapted, of_columns
+from .adapted import adapted, checked_columns
 
 
 class _Adaptation:
@@ -13,7 +13,7 @@ class _Adaptation:
 
     def check(self, mesh: Any) -> None:
         if mesh.domain.geometry.dim == 2:
-            of_columns(mesh)
+            checked_columns(mesh)
 
     def make(self, path: Any, options: Mapping[str, float]) -> Mesh:
         return adapted(path, **options)

@@ -10,7 +10,7 @@ from ...errors import InputError, positive
 from ...mesh.mesh import Columns, Mesh
 from ...mesh.sizes import GROWTH, ends_of_columns, moved_nodes, number_of_columns
 from .column_factors import column_factors
-from .sizes import wanted_sizes
+from .sizes import required_sizes
 
 _SHORTEST = 1 / 8
 """Smallest length of a new column over its length in the run: finer sizes are unreliable on coarse columns."""
@@ -22,7 +22,7 @@ _MAX_COLUMNS = 20_000
 """Largest number of columns of a new mesh."""
 
 
-def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = None) -> Mesh:
+def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | None = None) -> Mesh:
     """Return a new mesh of the body of a run, with columns of elements as fine as its states need. Collective.
 
     The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's and at
@@ -34,8 +34,8 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
 
     Args:
         path: a run on a coarse mesh (a pilot run); it may be incomplete.
-        share: largest rotation of the sheet along a column, radians. On a fillet of a tool it is the length of the
-            column over the fillet radius. In three dimensions it is the rotation between triangles. None: ignored.
+        max_rotation: largest rotation of the sheet along a column, radians. On a fillet of a tool it is the length of
+            the column over the fillet radius. In three dimensions it is the rotation between triangles. None: ignored.
         error: largest estimated relative error of the stress over the body (`StressError.relative`), shared by the
             columns as a second-order error. More columns do not help if too few elements lie through the sheet. In
             three dimensions it is the relative change of the wall between triangles. None: ignored.
@@ -52,26 +52,26 @@ def adapted(path: Any, *, share: float | None = 1 / 3, error: float | None = Non
     ...                  materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
     ...                  contacts=[fx.Contact("top", plug, direction=(0, -1))])
     >>> pilot = fx.trace(scene, until=fx.travel(3.0), progress=False)
-    >>> mesh = fx.mesh.adapted(pilot, share=0.5)
+    >>> mesh = fx.mesh.adapted(pilot, max_rotation=0.5)
     >>> 20 < len(mesh.columns.ends) < 40
     True
     """
-    share = None if share is None else positive("adapted: share", share)
+    max_rotation = None if max_rotation is None else positive("adapted: max_rotation", max_rotation)
     error = None if error is None else positive("adapted: error", error)
     if not hasattr(path, "problem"):
         raise InputError(f"adapted: path = {path!r}: must be what trace or Process.run gave back")
     mesh = path.problem.scene.mesh
     if path.problem.scene.kinematics.components == 3:
-        return _sheet(mesh, *wanted_sizes(path, share, error))
-    columns = of_columns(mesh)
-    factors = column_factors(path, share, error)
+        return _adapted_sheet(mesh, *required_sizes(path, max_rotation, error))
+    columns = checked_columns(mesh)
+    factors = column_factors(path, max_rotation, error)
     if not np.any(np.isfinite(factors)):
         raise InputError("adapted: the run gives no reason for other elements: nothing bends or touches a fillet, and"
                          " error is None: give error=0.02, or a run that goes further")
-    return columns.make(_ends(columns, factors))
+    return columns.make(_new_ends(columns, factors))
 
 
-def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
+def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     """Return a new mesh of a flat sheet with triangles of given sizes.
 
     Args:
@@ -95,7 +95,7 @@ def _sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     return mesh.of_size(size)
 
 
-def of_columns(mesh: Mesh) -> Columns:
+def checked_columns(mesh: Mesh) -> Columns:
     """Return the columns of elements along the sheet of a mesh.
 
     Args:
@@ -118,7 +118,7 @@ def of_columns(mesh: Mesh) -> Columns:
     return columns
 
 
-def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
+def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     """Return the ends of new columns along the sheet, as coordinates of `Columns`.
 
     Args:
@@ -140,6 +140,6 @@ def _ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     size = (requested + GROWTH * distance).min(1)
     number = number_of_columns(s, size)[-1]
     if number > _MAX_COLUMNS:
-        raise InputError(f"adapted: share and error ask for {number:.3g} elements along the sheet, at most"
-                         f" {_MAX_COLUMNS} are allowed: make share or error larger")
+        raise InputError(f"adapted: max_rotation and error ask for {number:.3g} elements along the sheet, at most"
+                         f" {_MAX_COLUMNS} are allowed: make max_rotation or error larger")
     return ends_of_columns(samples, s, size, np.union1d(columns.fixed, old[[0, -1]]))

@@ -25,32 +25,32 @@ _STRESS_ORDER = 2
 
 
 @method_of(Path)
-def column_factors(path: Any, share: float | None, error: float | None) -> np.ndarray:
+def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
     """Return the required over the present length of the n columns of a mesh, the smallest over all states.
 
     Args:
         path: the run.
-        share: largest rotation of the sheet along a column, radians, or length of a column over the radius of a fillet
-            that it touches; None: ignored.
+        max_rotation: largest rotation of the sheet along a column, radians, or length of a column over the radius of a
+            fillet that it touches; None: ignored.
         error: largest estimated relative error of the stress over the body; None: ignored.
 
     Returns:
         Factors, shape (n,); inf where no state demands a size.
     """
     path.section_only("column_factors", "use fx.mesh.adapted")
-    share, error = (value if value is None else positive(f"column_factors: {name}", value)
-                    for name, value in (("share", share), ("error", error)))
+    max_rotation, error = (value if value is None else positive(f"column_factors: {name}", value)
+                    for name, value in (("max_rotation", max_rotation), ("error", error)))
     columns = path.problem.scene.mesh.columns
     middles = columns.place((columns.ends[1:] + columns.ends[:-1]) / 2)
     factors = np.full(len(columns.ends) - 1, np.inf)
-    if share is not None and path.problem.scene.model.solid:
-        factors = np.minimum(factors, _in_bends(path, share, middles))
+    if max_rotation is not None and path.problem.scene.model.solid:
+        factors = np.minimum(factors, _factors_by_rotation(path, max_rotation, middles))
     if error is not None:
-        factors = np.minimum(factors, _by_stress(path, error, middles))
+        factors = np.minimum(factors, _factors_by_stress_error(path, error, middles))
     return factors
 
 
-def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
+def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
     """Return the number of the column nearest to each point, shape (m,).
 
     Args:
@@ -62,21 +62,21 @@ def _column_of(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
     return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
 
 
-def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
-    """Return the required over the present length of the n columns, so that they rotate by at most `share`, shape (n,).
+def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
+    """Return the required over the present length of the n columns for a largest rotation, shape (n,).
 
     The rotation of a column is that along the sheet, or on a fillet of a tool its length over the fillet radius.
 
     Args:
         path: the run.
-        share: largest rotation, radians.
+        max_rotation: largest rotation, radians.
         middles: positions of nodes in the middle of the columns, shape (rows, n, 2), length.
     """
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
     faces = [outline.mask(contact.contact.on) for contact in problem.contacts]
-    column = _column_of(outline.rest[:, 2], middles[[0, -1]])
+    column = _nearest_column(outline.rest[:, 2], middles[[0, -1]])
     begin = columns.place(columns.ends[:-1])[[0, -1]]
     sides = []                                               # edges column by column, mask of reversed ones
     for name, first in zip(columns.faces, begin):
@@ -87,7 +87,7 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
     for state in path.states:
         with problem.state_context(state):
             edges = outline.edges()
-        found = np.minimum(found, share / np.maximum(_turns(edges, sides), 1e-300))
+        found = np.minimum(found, max_rotation / np.maximum(_rotations(edges, sides), 1e-300))
         points = edge_points(edges, FINE_PIECES)
         length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
         with problem.state_context(state):
@@ -101,11 +101,11 @@ def _in_bends(path: Any, share: float, middles: np.ndarray) -> np.ndarray:
                     nearest.curvature) * nearest.distance
                 on_fillet = (radius > 0) & (-nearest.distance < _FILLET_GAP * radius)
                 smallest = np.where(on_fillet, radius, np.inf).reshape(-1, FINE_PIECES + 1).min(1)
-                np.minimum.at(found, column[face], share * smallest / length[face])
+                np.minimum.at(found, column[face], max_rotation * smallest / length[face])
     return found
 
 
-def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Return the rotation of the sheet along each of the n columns, radians, shape (n,).
 
     Half of a kink between two columns counts in each.
@@ -126,7 +126,7 @@ def _turns(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.
     return np.minimum(inside + (kinks[1:] + kinks[:-1]) / 2, _MAX_ROTATION)
 
 
-def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
+def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
     """Return the required over the present length of the n columns, which equidistributes the stress error, shape (n,).
 
     The error of a column is C(s) h^p per length, with its length h and the order p. The optimal size is h ~ C^(-2/(2 p
@@ -145,7 +145,7 @@ def _by_stress(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
     examined = np.unique(np.linspace(0, len(states) - 1, _EXAMINED_STATES).astype(int))
     for state in (states[k] for k in examined):
         estimate = path.stress(state).error()
-        squares = np.bincount(_column_of(estimate.points, middles), estimate.cells**2, n)
+        squares = np.bincount(_nearest_column(estimate.points, middles), estimate.cells**2, n)
         allowed = (error * np.linalg.norm(estimate.stress)) ** 2
         q = 2 * _STRESS_ORDER + 1
         density = (squares / length**q) ** (1 / q)           # C^(2/q)

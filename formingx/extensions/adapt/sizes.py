@@ -14,14 +14,14 @@ _MIN_SIZE_RATIO = 0.25
 """Smallest required over present size: a coarse mesh shows that it is too coarse, not by how much."""
 
 
-def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
+def required_sizes(path: Any, max_rotation: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangle sizes that the states of a run on a sheet in three dimensions demand.
 
     Each limit reduces the size; the smallest size of all states counts.
 
     Args:
         path: the run.
-        share: largest rotation of the surface between neighbouring triangles, radians; None: ignored.
+        max_rotation: largest rotation of the surface between neighbouring triangles, radians; None: ignored.
         error: largest relative change of the wall between neighbouring triangles; None: ignored.
 
     Returns:
@@ -38,15 +38,16 @@ def wanted_sizes(path: Any, share: float | None, error: float | None) -> tuple[n
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         turn = np.arccos(np.clip(np.einsum("ij,ij->i", *normal[pairs.T]), -1, 1))
         change = np.abs(np.diff(np.log(wall.ratio[pairs]), axis=1)[:, 0])
-        for allowed, found in ((share, turn), (error, change)):
+        for allowed, found in ((max_rotation, turn), (error, change)):
             if allowed is not None:
-                part = np.maximum(allowed / np.maximum(found, allowed), _MIN_SIZE_RATIO)
+                reduction = np.maximum(allowed / np.maximum(found, allowed), _MIN_SIZE_RATIO)
                 for triangle in pairs.T:
-                    np.minimum.at(factor, triangle, part)
-    strictest = np.ones(len(wall.reference_points))
-    np.minimum.at(strictest, wall.triangles.ravel(), np.repeat(factor, 3))
-    size = wall.to_nodes(np.sqrt(wall.reference_area / (np.sqrt(3) / 4)))         # equilateral ones
-    return wall.reference_points[:, :COORDINATES], _graded(wall.reference_points, wall.triangles, size * strictest)
+                    np.minimum.at(factor, triangle, reduction)
+    smallest_factor = np.ones(len(wall.reference_points))
+    np.minimum.at(smallest_factor, wall.triangles.ravel(), np.repeat(factor, 3))
+    size = wall.to_nodes(np.sqrt(wall.reference_area / (np.sqrt(3) / 4)))         # of equilateral triangles
+    points = wall.reference_points
+    return points[:, :COORDINATES], _graded(points, wall.triangles, size * smallest_factor)
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
@@ -70,10 +71,10 @@ def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.n
         size: edge lengths of triangles at the nodes, shape (n,), length.
     """
     a, b = edges_of(triangles)[1].T
-    reach = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
+    growth = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:
         before = size.copy()
-        np.minimum.at(size, a, before[b] + reach)
-        np.minimum.at(size, b, before[a] + reach)
+        np.minimum.at(size, a, before[b] + growth)
+        np.minimum.at(size, b, before[a] + growth)
         if np.array_equal(size, before):
             return size

@@ -14,7 +14,7 @@ from ...errors import InputError, instance, known, several
 from ...io import csv_files
 from ...results import files
 from ...results.show import plots
-from .curves import SampledCurve, arc_length, paired, paired_at_equal_values, ranges, resolution_of
+from .curves import SampledCurve, arc_length, pair_at_equal_values, pair_in_order, ranges, resolution_of
 
 _MAX_RANGE_RATIO = 1e100                   # largest ratio of the two ranges: its square stays finite
 
@@ -27,14 +27,14 @@ class Difference:
         values: differences, shape (n,), in the unit of our column.
         range: largest minus smallest value of our column.
         maximum: largest absolute difference.
-        at: index of the point with the largest absolute difference.
+        argmax: index of the point with the largest absolute difference.
         rms: root mean square of the differences along the curve, weighted with its arc length.
     """
 
     values: np.ndarray
     range: float
     maximum: float
-    at: int
+    argmax: int
     rms: float
 
 
@@ -54,7 +54,7 @@ class Comparison:
         limit_points: limit points of (ours, theirs), each a list of {column: value}. A run has located the points of a
             `Path`. Others lie on the parabola through the three points at which the control turns. The control is
             pressure or travel, else the first column.
-        resolution: for our and for their curve, its change over the ranges of the columns if every second point is left
+        resolution: largest change of (our, their) curve, over the ranges of the columns, if every second point is left
             out. A difference below a tenth of it may come from interpolation. A `Path` also knows its tangents, so
             its curve is more accurate.
         along: independent column at whose values the others are compared; "" for pairs by arc length.
@@ -71,21 +71,22 @@ class Comparison:
     along: str = ""
 
     @property
-    def beyond(self) -> int:
+    def points_beyond_ends(self) -> int:
         """Number of points of the other program beyond the ends of the run's curve, which are not compared."""
         return len(self.theirs) - len(self.pairs[0])
 
     def __str__(self) -> str:
         compared = self.theirs[self.pairs[0]]
         how = f"at the same {self.along}" if self.along else "paired by arc length"
+        omitted = self.points_beyond_ends
         lines = [f"{len(compared)} of {len(self.theirs)} points of theirs compared with our curve through"
-                 f" {len(self.ours)}, {how}" + (f"; {self.beyond} lie beyond its ends" if self.beyond else ""),
+                 f" {len(self.ours)}, {how}" + (f"; {omitted} lie beyond its ends" if omitted else ""),
                  f"{'theirs minus ours':24}{'largest':>13}{'of range':>10}{'rms':>13}{'of range':>10}   largest at"]
         for name, d in self.differences.items():
             if name == self.along:
                 continue
-            where = ", ".join(f"{c} {v:.6g}" for c, v in zip(self.columns, compared[d.at]))
-            lines.append(f"{name:24}{d.values[d.at]:13.5g}{_percent(d.maximum / d.range)}{d.rms:13.5g}"
+            where = ", ".join(f"{c} {v:.6g}" for c, v in zip(self.columns, compared[d.argmax]))
+            lines.append(f"{name:24}{d.values[d.argmax]:13.5g}{_percent(d.maximum / d.range)}{d.rms:13.5g}"
                          f"{_percent(d.rms / d.range)}   {where}")
         lines.append(f"{'limit points':24}{'':13}" + "".join(f"{c:>16}" for c in self.columns))
         for k, (a, b) in enumerate(zip_longest(*self.limit_points), 1):
@@ -151,8 +152,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
     If every column turns back, the points are paired by arc length, with each column divided by its range. Both arc
     lengths increase together, and the sum of squared distances is minimal. So a shift along the curve counts as no
-    difference: differences are measured across it. Points of theirs beyond the ends of our curve are left out and
-    counted.
+    difference: the differences are measured across the curve. Points of theirs beyond the ends of our curve are left
+    out and counted.
 
     Args:
         ours: a `Path`, a CSV file (for example of `Path.to_csv`), or {column: values}.
@@ -196,7 +197,8 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     smooth = SampledCurve(curve / scale)
     line = smooth.line * scale
     k = _independent(names, curve / scale, b / scale, along)
-    matched, partners = paired(b / scale, smooth) if k is None else paired_at_equal_values(b / scale, curve / scale, k)
+    matched, partners = (pair_in_order(b / scale, smooth) if k is None
+                         else pair_at_equal_values(b / scale, curve / scale, k))
     if not len(matched):
         raise InputError("compare: no point of theirs lies along our curve: are columns, units, order of rows right?")
     partners = partners * scale
@@ -210,7 +212,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
 
 def _percent(share: float) -> str:
-    """Return a share in percent as text of ten characters."""
+    """Return a ratio in percent as text of ten characters."""
     return f"{f'{100 * share:.2g} %':>10}"
 
 
@@ -256,7 +258,7 @@ def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[
 
 
 def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
-    """Return the number of the independent column, or None for the arc length.
+    """Return the number of the column at whose values the others are compared, or None to pair by arc length.
 
     Args:
         names: names of the c columns.
@@ -267,26 +269,26 @@ def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | No
     Raises:
         InputError: `along` is no column, or is not monotonic on both sides.
     """
-    rising = [k for k in range(len(names)) if _rises(a[:, k]) and _rises(b[:, k])]
+    monotonic = [k for k in range(len(names)) if _is_monotonic(a[:, k]) and _is_monotonic(b[:, k])]
     if along is None:
-        return min(rising, key=lambda k: _steepest(a, k), default=None)
+        return min(monotonic, key=lambda k: _largest_slope(a, k), default=None)
     known("compare: along", along, [*names, "arc length"])
     if along == "arc length":
         return None
-    if names.index(along) not in rising:
+    if names.index(along) not in monotonic:
         raise InputError(f"compare: along = {along!r}: it turns back, or stands still, on one of the sides: use"
                          f" 'arc length'")
     return names.index(along)
 
 
-def _rises(values: np.ndarray) -> bool:
+def _is_monotonic(values: np.ndarray) -> bool:
     """Return True if values strictly increase, or strictly decrease."""
     steps = np.diff(values)
     return bool(np.all(steps > 0) or np.all(steps < 0))
 
 
-def _steepest(points: np.ndarray, k: int) -> float:
-    """Return the largest slope of a curve over column k, in any column, between successive points, shape (n, c)."""
+def _largest_slope(points: np.ndarray, k: int) -> float:
+    """Return the largest slope of any column over column k between successive points of a curve, shape (n, c)."""
     steps = np.abs(np.diff(points, axis=0))
     return float((steps.max(1) / steps[:, k]).max())
 
@@ -303,8 +305,8 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
     weights = np.ones(len(s))
     if s[-1] > 0:                                                   # trapezoidal weights
         weights = (np.diff(s, prepend=s[0]) + np.diff(s, append=s[-1])) / 2
-    at = int(np.argmax(np.abs(values)))
-    return Difference(values, float(size), float(abs(values[at])), at,
+    index = int(np.argmax(np.abs(values)))
+    return Difference(values, float(size), float(abs(values[index])), index,
                       float(np.sqrt(np.average(values**2, weights=weights))))
 
 
@@ -333,6 +335,6 @@ def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], 
             found.append(points[k])
             continue
         parabolas = np.polyfit(s - s[1], points[k - 1:k + 2], 2)
-        at = -parabolas[1, column] / (2 * parabolas[0, column])
-        found.append(parabolas[0] * at**2 + parabolas[1] * at + parabolas[2])
+        index = -parabolas[1, column] / (2 * parabolas[0, column])
+        found.append(parabolas[0] * index**2 + parabolas[1] * index + parabolas[2])
     return [dict(zip(names, point.tolist())) for point in found]

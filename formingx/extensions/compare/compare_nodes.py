@@ -17,7 +17,7 @@ from ...mesh import text as grid
 from ...results import files
 from ...results.show import plots
 
-_REST = {2: ("R", "Z"), 3: ("X", "Y")}
+_COORDINATES_OF = {2: ("R", "Z"), 3: ("X", "Y")}
 """{number of displacement components: columns of the reference coordinates}; a sheet in three dimensions is flat."""
 
 
@@ -59,12 +59,12 @@ class NodalComparison:
 
     def __str__(self) -> str:
         k = int(np.argmax(self.difference))
-        at, ours, theirs = (", ".join(f"{v:.{digits}g}" for v in row[k]) for row, digits in (
+        position, ours, theirs = (", ".join(f"{v:.{digits}g}" for v in row[k]) for row, digits in (
             (self.points, 6), (self.ours, 8), (self.theirs, 8)))
-        size, rest = self.largest or 1.0, ", ".join(_REST[self.ours.shape[1]])
+        size, reference = self.largest or 1.0, ", ".join(_COORDINATES_OF[self.ours.shape[1]])
         return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
                 f"largest difference {self.maximum:.5g} ({100 * self.maximum / size:.2g} %), at node {self.nodes[k]},"
-                f" ({rest}) = ({at}): ours ({ours}), theirs ({theirs})\n"
+                f" ({reference}) = ({position}): ours ({ours}), theirs ({theirs})\n"
                 f"root mean square {self.rms:.5g} ({100 * self.rms / size:.2g} %)")
 
     __repr__ = __str__
@@ -76,10 +76,10 @@ class NodalComparison:
             The matplotlib figure.
         """
         figure, axes = plots.figure()
-        rest = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
+        reference = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
                                 (self.theirs, {"marker": "x", "color": "k"}, "theirs")):
-            axes.plot(*(rest + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
+            axes.plot(*(reference + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
         axes.set(xlabel="r" if self.ours.shape[1] == 2 else "x", ylabel="z",
                  title=f"largest difference {self.maximum:.3g}")
         axes.set_aspect("equal")
@@ -107,9 +107,9 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
     >>> open("nodes.csv").readline().strip()
     'node,R,Z,u_r,u_z'
     """
-    plain = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
-    u = _displacements(path, state, plain.points)
-    rows = [[int(n), *X, *v] for n, X, v in zip(plain.numbers, plain.points.tolist(), u.tolist())]
+    mesh_grid = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
+    u = _displacements(path, state, mesh_grid.points)
+    rows = [[int(n), *X, *v] for n, X, v in zip(mesh_grid.numbers, mesh_grid.points.tolist(), u.tolist())]
     files.write_rows(file, ["node", *_columns(path)], rows, path.problem.comm)
 
 
@@ -146,37 +146,37 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     for name in (*names, *units):
         known("compare_nodes: column", name, ("node", *_columns(path)))
 
-    def take(name: str) -> np.ndarray:
+    def column(name: str) -> np.ndarray:
         """Return the other program's values of a column, in the unit of the run, by our name of the column."""
         return table.take(names.get(name, name), units.get(name))
 
-    def take_nodes() -> np.ndarray:
+    def node_numbers() -> np.ndarray:
         """Return the other program's node numbers; raise an InputError unless they are whole."""
-        numbers = take("node")
+        numbers = column("node")
         if np.any(numbers != np.round(numbers)):
             raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
         return numbers.astype(int)
     if mesh is None:
-        points = np.column_stack([take(name) for name in _columns(path)[:2]])
+        points = np.column_stack([column(name) for name in _columns(path)[:2]])
         numbered = names.get("node", "node") in table.columns
-        nodes = take_nodes() if numbered else np.arange(1, len(points) + 1)
+        nodes = node_numbers() if numbered else np.arange(1, len(points) + 1)
     else:
-        plain = grid.read(mesh)
-        nodes = take_nodes()
-        at = {int(n): k for k, n in enumerate(plain.numbers)}
+        mesh_grid = grid.read(mesh)
+        nodes = node_numbers()
+        rows = {int(n): k for k, n in enumerate(mesh_grid.numbers)}
         for node in nodes.tolist():
-            if node not in at:
+            if node not in rows:
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
-        points = plain.points[[at[int(n)] for n in nodes]]
+        points = mesh_grid.points[[rows[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
-    return NodalComparison(nodes, points, ours, np.column_stack([take(c) for c in _columns(path)[2:]]),
+    return NodalComparison(nodes, points, ours, np.column_stack([column(c) for c in _columns(path)[2:]]),
                            float(np.linalg.norm(ours, axis=1).max()))
 
 
 def _columns(path: Any) -> list[str]:
     """Return the names of the columns with reference positions, then displacements, such as R, Z, u_r, u_z."""
     axes = path.problem.scene.kinematics.axes
-    return [*_REST[len(axes)], *(f"u_{axis}" for axis in axes)]
+    return [*_COORDINATES_OF[len(axes)], *(f"u_{axis}" for axis in axes)]
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:

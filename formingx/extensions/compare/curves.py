@@ -50,21 +50,21 @@ class SampledCurve:
         points: points of the curve in order, shape (n, c), each column divided by its range.
 
     Attributes:
-        at: function that returns the points of the curve at arc lengths.
-        s: m = 2000 equidistant arc lengths, shape (m,), the samples.
+        evaluate: function that returns the points of the curve at arc lengths.
+        arc_lengths: m = 2000 equidistant arc lengths, the samples, shape (m,).
         line: points of the curve at these arc lengths, shape (m, c).
     """
 
     def __init__(self, points: np.ndarray):
         from scipy.interpolate import Akima1DInterpolator, interp1d
         s = arc_length(points)
-        grows = np.concatenate([[True], np.diff(s) > 0])
-        points, s = points[grows], s[grows]
-        self.at = Akima1DInterpolator(s, points, axis=0) if len(points) > 3 else interp1d(s, points, axis=0)
-        self.s = np.linspace(0, s[-1], _CURVE_SAMPLES)
-        self.line = self.at(self.s)
+        advances = np.concatenate([[True], np.diff(s) > 0])
+        points, s = points[advances], s[advances]
+        self.evaluate = Akima1DInterpolator(s, points, axis=0) if len(points) > 3 else interp1d(s, points, axis=0)
+        self.arc_lengths = np.linspace(0, s[-1], _CURVE_SAMPLES)
+        self.line = self.evaluate(self.arc_lengths)
 
-    def foot(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
+    def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
         """Return the point of the curve that is closest to a point, near a sample.
 
         Args:
@@ -75,22 +75,22 @@ class SampledCurve:
             The closest point of the curve, shape (c,); True if `point` lies beyond an end of the curve.
         """
         low, high = max(k - 1, 0), min(k + 1, _CURVE_SAMPLES - 1)
-        line = self.at(np.linspace(self.s[low], self.s[high], _PIECE_POINTS))
+        line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], _PIECE_POINTS))
         d = np.diff(line, axis=0)
         t = ((point - line[:-1]) * d).sum(1) / (d * d).sum(1)
-        feet = line[:-1] + np.clip(t, 0, 1)[:, None] * d
-        j = int(np.argmin(((feet - point) ** 2).sum(1)))
-        past = 0.0
+        closest = line[:-1] + np.clip(t, 0, 1)[:, None] * d
+        j = int(np.argmin(((closest - point) ** 2).sum(1)))
+        overshoot = 0.0
         if low == 0 and j == 0:
-            past = -t[j]
+            overshoot = -t[j]
         elif high == _CURVE_SAMPLES - 1 and j == len(t) - 1:
-            past = t[j] - 1
-        beyond = float(past * np.linalg.norm(d[j]))
-        across = float(np.linalg.norm(point - line[j] - t[j] * d[j]))
-        return feet[j], beyond > max(across, 1e-9)
+            overshoot = t[j] - 1
+        beyond = float(overshoot * np.linalg.norm(d[j]))
+        distance = float(np.linalg.norm(point - line[j] - t[j] * d[j]))
+        return closest[j], beyond > max(distance, 1e-9)
 
 
-def paired(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndarray]:
+def pair_in_order(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndarray]:
     """Pair points with points of a curve in order, so that the sum of squared distances is minimal.
 
     Args:
@@ -107,20 +107,20 @@ def paired(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndar
     n, line = len(points), curve.line
     if n > _MAX_POINTS:
         raise InputError(f"compare: theirs has {n} points; at most {_MAX_POINTS} can be compared: thin it out")
-    cost = _costs(points, line)
-    if 100 * _costs(points[::-1], line)[-1].min() < cost[-1].min():
+    cost = _pairing_costs(points, line)
+    if 100 * _pairing_costs(points[::-1], line)[-1].min() < cost[-1].min():
         raise InputError("compare: theirs runs along our curve backwards: put its rows in order along the path")
-    at, partners, kept = len(line) - 1, np.empty_like(points), []
+    sample, partners, kept = len(line) - 1, np.empty_like(points), []
     for i in range(n - 1, -1, -1):
-        at = int(np.argmin(cost[i, :at + 1]))
-        partners[i], beyond = curve.foot(points[i], at)
+        sample = int(np.argmin(cost[i, :sample + 1]))
+        partners[i], beyond = curve.closest_point(points[i], sample)
         if not beyond:
             kept.append(i)
     kept.reverse()
     return np.array(kept, dtype=int), partners[kept]
 
 
-def paired_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+def pair_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Pair points with points of a curve at equal values of one column.
 
     Args:
@@ -133,7 +133,7 @@ def paired_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tup
     """
     low, high = curve[:, k].min(), curve[:, k].max()
     inside = np.flatnonzero((points[:, k] >= low - 1e-9) & (points[:, k] <= high + 1e-9))
-    return inside, _over(curve, k)(np.clip(points[inside, k], low, high))
+    return inside, _interpolant(curve, k)(np.clip(points[inside, k], low, high))
 
 
 def resolution_of(points: np.ndarray, k: int | None) -> float:
@@ -151,15 +151,15 @@ def resolution_of(points: np.ndarray, k: int | None) -> float:
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))
     dropped = np.setdiff1d(np.arange(len(points)), kept)
     if k is not None:
-        return float(np.abs(_over(points[kept], k)(points[dropped, k]) - points[dropped]).max())
+        return float(np.abs(_interpolant(points[kept], k)(points[dropped, k]) - points[dropped]).max())
     curve = SampledCurve(points[kept])
-    feet = [(curve.foot(point, int(np.argmin(((curve.line - point) ** 2).sum(1))))[0], point)
+    closest = [(curve.closest_point(point, int(np.argmin(((curve.line - point) ** 2).sum(1))))[0], point)
             for point in points[dropped]]
-    return float(max(np.linalg.norm(foot - point) for foot, point in feet))
+    return float(max(np.linalg.norm(nearest - point) for nearest, point in closest))
 
 
-def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the smallest sums of squared distances for pairs of points and samples of a curve, both in order.
+def _pairing_costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Return the smallest sums of squared distances between points and their partners, samples of a curve in order.
 
     Args:
         points: the points, shape (n, c).
@@ -174,8 +174,8 @@ def _costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return cost
 
 
-def _over(points: np.ndarray, k: int) -> Any:
-    """Return the curve through points, shape (n, c), as a function of the value of its monotonic column k."""
+def _interpolant(points: np.ndarray, k: int) -> Any:
+    """Return the interpolated curve through points, shape (n, c), as a function of its monotonic column k."""
     from scipy.interpolate import Akima1DInterpolator, interp1d
     points = points[np.argsort(points[:, k])]
     return (Akima1DInterpolator if len(points) > 3 else interp1d)(points[:, k], points, axis=0)

@@ -58,15 +58,15 @@ class MeasuredWall:
             raise InputError(f"MeasuredWall: {', '.join(given) or 'no places'} given: must be one of length, points and"
                              f" reference_length")
         name, value = next(iter(given.items()))
-        places = finite_array(f"MeasuredWall: {name}", value)
+        positions = finite_array(f"MeasuredWall: {name}", value)
         shape = wall.shape + (2,) * (name == "points")
-        if wall.ndim != 1 or not len(wall) or places.shape != shape:
-            raise InputError(f"MeasuredWall: wall has the shape {wall.shape}, {name} {places.shape}: must be (m,) and"
-                             f" {'(m, 2)' if name == 'points' else '(m,)'}")
+        if wall.ndim != 1 or not len(wall) or positions.shape != shape:
+            raise InputError(f"MeasuredWall: wall has the shape {wall.shape}, {name} {positions.shape}: must be (m,)"
+                             f" and {'(m, 2)' if name == 'points' else '(m,)'}")
         for k in np.flatnonzero(wall <= 0)[:1]:
             raise InputError(f"MeasuredWall: wall[{k}] = {wall[k]:g}: must be above 0")
         object.__setattr__(self, "wall", wall)
-        object.__setattr__(self, name, places)
+        object.__setattr__(self, name, positions)
 
     @classmethod
     def from_csv(cls, file: Any) -> MeasuredWall:
@@ -113,7 +113,7 @@ class MeasuredWall:
             InputError: a length is more than a tenth beyond the end of the computed part.
         """
         profile = path.profile()
-        return np.interp(self._numbers(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
+        return np.interp(self._locate(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
 
     def compare(self, path: Path) -> WallComparison:
         """Compare the wall thickness in the last state of a path with the measured one; collective.
@@ -128,24 +128,24 @@ class MeasuredWall:
             InputError: a length is more than a tenth beyond the end of the computed part; a sheet in three dimensions.
         """
         profile = path.profile()
-        at, away = self._numbers(profile)
+        numbers_of_points, distance = self._locate(profile)
         numbers = np.arange(len(profile.middle))
 
         def interpolated(values: np.ndarray) -> np.ndarray:
-            """Return values at the points of the middle line, interpolated to the measured points."""
-            return np.interp(at, numbers, values)
+            """Return values at the points of the middle line, interpolated to the m measured points, shape (m,)."""
+            return np.interp(numbers_of_points, numbers, values)
         return WallComparison(interpolated(profile.arc_length), interpolated(profile.reference_length), self.wall,
-                              interpolated(profile.wall_thickness), away, path.problem.comm)
+                              interpolated(profile.wall_thickness), distance, path.problem.comm)
 
-    def _numbers(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the positions of the measured points on the middle line of a computed part.
+    def _locate(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places of the measured points on the middle line of a computed part, which is a polyline.
 
         Args:
             profile: outline of the computed part, a `Profile`.
 
         Returns:
-            Fractional numbers of the points of the middle line, shape (m,); distances of the measured points from the
-            middle line, shape (m,), length.
+            Positions in units of the point number of the polyline (2.5: between points 2 and 3), shape (m,); distances
+            of the measured points from the line, or beyond its end, shape (m,), length.
 
         Raises:
             InputError: a length is more than a tenth beyond the end of the computed part.
@@ -154,19 +154,19 @@ class MeasuredWall:
         if self.points is None:
             name = "length" if self.length is not None else "reference_length"
             line = profile.arc_length if self.length is not None else profile.reference_length
-            places = getattr(self, name)
-            beyond = np.maximum(np.maximum(-places, places - line[-1]), 0.0)
+            positions = getattr(self, name)
+            beyond = np.maximum(np.maximum(-positions, positions - line[-1]), 0.0)
             for k in np.flatnonzero(beyond > _MAX_OVERHANG * line[-1])[:1]:
-                raise InputError(f"MeasuredWall: {name}[{k}] = {places[k]:.6g}: the computed part goes from 0 to"
+                raise InputError(f"MeasuredWall: {name}[{k}] = {positions[k]:.6g}: the computed part goes from 0 to"
                                  f" {line[-1]:.6g}")
-            return np.interp(places, line, numbers), beyond
+            return np.interp(positions, line, numbers), beyond
         a, b = profile.middle[:-1], profile.middle[1:]
         along = np.einsum("mij,ij->mi", self.points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
         along = np.clip(along, 0, 1)
-        away = np.hypot(*np.moveaxis(self.points[:, None] - a - along[..., None] * (b - a), -1, 0))
-        nearest = away.argmin(1)
+        distance = np.hypot(*np.moveaxis(self.points[:, None] - a - along[..., None] * (b - a), -1, 0))
+        nearest = distance.argmin(1)
         each = np.arange(len(nearest))
-        return nearest + along[each, nearest], away[each, nearest]
+        return nearest + along[each, nearest], distance[each, nearest]
 
 
 class WallComparison:
@@ -179,13 +179,13 @@ class WallComparison:
         reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
         measured: measured thicknesses, shape (m,), length.
         computed: computed thicknesses, shape (m,), length.
-        away: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
+        distance: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
         comm: MPI communicator of the run.
     """
 
     def __init__(self, length: np.ndarray, reference_length: np.ndarray, measured: np.ndarray, computed: np.ndarray,
-                 away: np.ndarray, comm: Any):
-        self.length, self.reference_length, self.away = length, reference_length, away
+                 distance: np.ndarray, comm: Any):
+        self.length, self.reference_length, self.distance = length, reference_length, distance
         self.measured, self.computed, self._comm = measured, computed, comm
 
     @property
@@ -207,7 +207,7 @@ class WallComparison:
         lines = [f"{'length':>10}{'measured':>12}{'computed':>12}{'deviation':>12}"]
         lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed section" * bool(
             a > _REPORTED_DISTANCE * c)) for s, m, c, d, a in zip(
-                self.length, self.measured, self.computed, self.deviation_percent, self.away)]
+                self.length, self.measured, self.computed, self.deviation_percent, self.distance)]
         worst = int(np.abs(self.deviation_percent).argmax())
         return "\n".join([*lines, f"mean {self.mean_percent:+.1f} %, root mean square {self.rms_percent:.1f} %, largest"
                                   f" {self.deviation_percent[worst]:+.1f} % at length {self.length[worst]:.4g}"])
@@ -240,7 +240,7 @@ class WallComparison:
     def to_csv(self, file: Any) -> FilePath:
         """Write a CSV file with a row for each measured point (rank 0 writes).
 
-        The columns are length, reference_length, measured, computed, deviation_percent and away.
+        The columns are length, reference_length, measured, computed, deviation_percent and distance.
 
         Args:
             file: path of the CSV file.
@@ -250,7 +250,7 @@ class WallComparison:
         """
         columns: Mapping[str, np.ndarray] = {
             "length": self.length, "reference_length": self.reference_length, "measured": self.measured,
-            "computed": self.computed, "deviation_percent": self.deviation_percent, "away": self.away}
+            "computed": self.computed, "deviation_percent": self.deviation_percent, "distance": self.distance}
 
         def write(stream: Any) -> None:
             """Write the header and the rows to an open text file."""

@@ -52,7 +52,7 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
         raise InputError("Path.deformed_mesh: a membrane has no elements across its thickness: form"
                          " a solid, MixedPressure()")
     if size is not None:
-        return _of_size(problem, state, positive("Path.deformed_mesh: size", size))
+        return _with_new_elements(problem, state, positive("Path.deformed_mesh: size", size))
     numbers = fem.functionspace(domain, ("Lagrange", 2)).dofmap
     cells = own_cells(domain)
     triangles = numbers.index_map.local_to_global(np.asarray(numbers.list)[cells].ravel().astype(np.int32))
@@ -105,7 +105,7 @@ def to_msh(path: Path, file: Any, state: State | None = None) -> None:
     write(deformed_mesh(path, state), file)
 
 
-def _of_size(problem: Any, state: Any, size: float) -> Mesh:
+def _with_new_elements(problem: Any, state: Any, size: float) -> Mesh:
     """Return a mesh of the deformed body in a state, with new elements of edge length `size` inside its outline."""
     from ..remeshing.outline_mesh import mesh_of_outline
     mesh, outline = problem.scene.mesh, Outline(problem.forms)

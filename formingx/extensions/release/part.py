@@ -9,7 +9,7 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 """Corner numbers of the edges of a triangle."""
 
 
-def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
+def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
     """Return the elements of a mesh that lie along the first segments of a line through the body; collective.
 
     Each boundary that vanishes, such as the rim, is moved to the cut edges; without such a boundary they are named
@@ -18,7 +18,7 @@ def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
     Args:
         mesh: the mesh.
         line: points of a polyline through the body, such as the middle line of a sheet, shape (n, 2), length.
-        pieces: number of the n - 1 segments whose elements remain.
+        segments: number of the n - 1 segments whose elements remain.
 
     Returns:
         The mesh of these elements.
@@ -30,7 +30,7 @@ def part_along(mesh: Mesh, line: np.ndarray, pieces: int) -> Mesh:
 
     def part() -> Grid:
         """Return the grid of the triangles whose centres are nearest to the first segments of the line."""
-        return _part(grid, {name: rows[_nearest(grid.points[rows[:, :3]].mean(1), line) < pieces]
+        return _part_of_grid(grid, {name: rows[_nearest(grid.points[rows[:, :3]].mean(1), line) < segments]
                             for name, rows in grid.layers.items()})
     return to_mesh(part, mesh.comm, "the trimmed part")
 
@@ -43,7 +43,7 @@ def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return np.argmin(np.hypot(*np.moveaxis(offsets - share[..., None] * along, -1, 0)), axis=1)
 
 
-def _part(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
+def _part_of_grid(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
     """Return the grid of some of the triangles of a grid, with boundaries on the cut edges.
 
     Args:
@@ -51,7 +51,7 @@ def _part(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
         layers: {layer: rows of node numbers of the triangles that remain}.
     """
     triangles = np.concatenate(list(layers.values()))
-    outline, before = _outline(triangles), _outline(np.concatenate(list(grid.layers.values())))
+    outline, before = _boundary_edges(triangles), _boundary_edges(np.concatenate(list(grid.layers.values())))
     cut: np.ndarray = np.array([edge for key, edge in outline.items() if key not in before], dtype=np.int64)
     boundaries: dict[str, np.ndarray] = {name: np.array([row for row in rows.tolist() if frozenset(row[:2]) in outline],
                                                     dtype=np.int64).reshape(-1, rows.shape[1])
@@ -65,7 +65,7 @@ def _part(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
                 {name: number[rows] for name, rows in boundaries.items()})
 
 
-def _outline(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
+def _boundary_edges(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
     """Return {frozenset of the ends of an edge: [first, last, middle]} for edges of a single triangle.
 
     triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle.

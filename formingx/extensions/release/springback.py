@@ -28,7 +28,7 @@ from ...solve.stage import Stage, plan
 from ...solve.state import State
 from ...solve.stepping import allowed as allowed_error
 from ...units import NONE, Units
-from .part import part_along
+from .part import trimmed_mesh
 
 _COOLING_TIME = 1.0
 """Default cooling time over thickness^2/diffusivity: a temperature difference decreases by exp(-pi^2)."""
@@ -42,22 +42,22 @@ class Springback(KeyNumbers):
         path: the run from the part in its tools to the released part (`Path`).
         before: `Wall` of the part in its tools.
         after: `Wall` of the released part.
-        trimmed: radius of the cut end of the middle line, in the tools, length.
+        trim_radius: radius of the cut end of the middle line, in the tools, length.
         units: units of the labels.
     """
 
     path: Path
     before: Wall
     after: Wall
-    trimmed: float
+    trim_radius: float
     units: Units = field(repr=False, default=NONE)
 
     @property
     def height(self) -> float:
         """Height of the released part: largest axial distance of its middle line from the pole, length.
 
-    Without a pole it is measured from the lowest point.
-    """
+        Without a pole it is measured from the lowest point.
+        """
         return _height(self.after)
 
     @property
@@ -83,14 +83,14 @@ class Springback(KeyNumbers):
     @property
     def flange_angle(self) -> float:
         """Rotation of the end of the middle line by the release, positive upward (along Z), degrees: the warpage."""
-        angle = _end(self.after) - _end(self.before)
+        angle = _end_direction(self.after) - _end_direction(self.before)
         return (angle + 180) % 360 - 180
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Rows of the printed table: (label, value with unit)."""
         text, before = self._length, self.before
-        return [("trimmed at the radius", text(self.trimmed)),
+        return [("trimmed at the radius", text(self.trim_radius)),
                 ("height (in its tools)", f"{text(self.height)} ({text(_height(before))})"),
                 ("springback of the height", text(self.springback)),
                 ("largest diameter (in its tools)", f"{text(self.diameter)} ({text(_diameter(before))})"),
@@ -100,9 +100,7 @@ class Springback(KeyNumbers):
 
 
 def _height(wall: Wall) -> float:
-    """Return the largest axial distance of the middle line from the pole (without a pole from its lowest point),
-    length.
-    """
+    """Return the largest axial distance of the middle line from the pole, or else its lowest point, length."""
     return float(wall.height.max())
 
 
@@ -111,8 +109,8 @@ def _diameter(wall: Wall) -> float:
     return 2 * float(max(wall.profile.bottom[:, 0].max(), wall.profile.top[:, 0].max()))
 
 
-def _end(wall: Wall) -> float:
-    """Return the direction of the last edge of the middle line, degrees from the R axis."""
+def _end_direction(wall: Wall) -> float:
+    """Return the angle of the last edge of the deformed middle line, degrees from the R axis, positive along Z."""
     (r, z) = wall.profile.middle[-1] - wall.profile.middle[-3]
     return float(np.degrees(np.arctan2(z, r)))
 
@@ -158,7 +156,7 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
     heat, cooling_time = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
     problem = Problem(_scene(source.scene, mesh, heat))
-    x = _carried(source, state, problem)
+    x = _transferred_unknowns(source, state, problem)
     problem.enter(StepData([0.0] * len(problem.scene.items) + [state.time], [0.0] * (1 + len(problem.scene.items)),
                           [], fading=True), x, 0.0)
     return _run(problem, x, cooling_time, allowed_error("Path.springback", accuracy), trimmed, units or NONE)
@@ -166,7 +164,7 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
 
 def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, trimmed: float,
          units: Units) -> Springback:
-    """Release a part, then let it cool or relax.
+    """Release a part, then let it cool or relax, and return its shape before and after.
 
     Args:
         problem: the problem of the free part.
@@ -262,19 +260,19 @@ class _FixedComponent(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """Return the mesh up to the line of nodes nearest to a trim, and the radius of its middle line now, length."""
+    """Return the mesh up to the line of nodes nearest to a trim, and the deformed radius of this end, length."""
     strips = float(strips_within(wall, trim).sum())                               # an edge has two strips
     last = int(np.clip(round(strips / 2), 1, (len(wall.r) - 1) // 2))
     middle = (wall.profile.reference_bottom + wall.profile.reference_top)[::2] / 2
-    return part_along(mesh, middle, last), float(wall.r[2 * last])
+    return trimmed_mesh(mesh, middle, last), float(wall.r[2 * last])
 
 
-def _carried(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """Return the unknowns of the part in a state of the whole body; transfer the history variables.
+def _transferred_unknowns(source: Any, state: Any, problem: Problem) -> np.ndarray:
+    """Return the unknowns of the part in a state of the whole body, and transfer the history variables to the part.
 
     Args:
         source: the problem of the whole body.
-        state: a state of it.
+        state: the state of the whole body.
         problem: the problem of the part, whose fields are set.
 
     Returns:

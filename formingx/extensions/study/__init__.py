@@ -6,12 +6,12 @@ from typing import Any
 from ...run_hooks import dry_runs
 from .study import Study, study
 from .task import StudyRun
-from .variables import design
+from .variables import sets_of_values
 
 
 def _first_case(build: Callable[..., Any], variables: Any, *_: Any, **__: Any) -> None:
     """Build and run only the first set of values of a study, for a check of a script."""
-    build(**design(variables)[0])
+    build(**sets_of_values(variables)[0])
 
 
 dry_runs["study"] = _first_case

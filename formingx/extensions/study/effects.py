@@ -57,14 +57,14 @@ def page(study: Any, title: str) -> str:
         HTML text.
     """
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{pages.lines(str(study))}</p>"]
-    if study.goal and study.good:
+    if study.goal and study.successful:
         best = study.best
         body += ["<h2>Best</h2>", pages.table(["", ""], [[k, pages.number(v)] for k, v in
                                                          {**best.values, **best.measures}.items()])]
-    for measure in study.measures if study.good else ():
+    for measure in study.measures if study.successful else ():
         caption = f"Main effects on {measure.replace('_', ' ')}: runs (dots), means at each level."
         body.append(pages.figure(study.plot_effects(measure), caption))
-    for a, b in itertools.combinations(study.goal, 2) if study.good else ():
+    for a, b in itertools.combinations(study.goal, 2) if study.successful else ():
         body.append(pages.figure(study.plot_pareto(a, b), f"{a} and {b}: no run beats the red ones in both.", "small"))
     head, columns = list(study.columns), list(study.columns.values())
     rows = [[v if isinstance(v, str) else pages.number(v) for v in row] for row in zip(*columns)]

@@ -15,7 +15,7 @@ from ...results.files import replace
 from .task import StudyRun, Task
 
 
-def checked(folder: FilePath, task: Task, variables: list[str]) -> FilePath:
+def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePath:
     """Make the folder of a study, or check that an existing folder belongs to it.
 
     Args:

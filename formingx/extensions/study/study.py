@@ -31,8 +31,8 @@ from ...errors import InputError, count, file_path, known
 from ...results.files import replace
 from ...results.files.column_table import ColumnTable
 from . import effects, stored_runs
-from .task import Measure, StudyRun, Task, as_text, check_importable, finished, pool_of
-from .variables import design
+from .task import Measure, StudyRun, Task, as_text, check_importable, completed_runs, executor_context
+from .variables import sets_of_values
 
 _EDGE_TOLERANCE = 1e-3
 """Distance from the ends of the range of a variable, over this range, within which the best value is at its edge."""
@@ -55,7 +55,7 @@ class Study(ColumnTable):
         self.measures, self.runs = list(task.measure), list[StudyRun]()
 
     @property
-    def good(self) -> list[StudyRun]:
+    def successful(self) -> list[StudyRun]:
         """Runs without failure."""
         return [run for run in self.runs if not run.error]
 
@@ -74,9 +74,9 @@ class Study(ColumnTable):
         Raises:
             InputError: the study has no goal, or all runs failed.
         """
-        if not self.goal or not self.good:
+        if not self.goal or not self.successful:
             raise InputError("Study.best: the study has no goal" if not self.goal else "Study.best: all runs failed")
-        return min(self.good, key=self._distance)
+        return min(self.successful, key=self._cost)
 
     def pareto(self, a: str, b: str) -> list[StudyRun]:
         """Return the runs that no other run beats in two measures, sorted by the first measure.
@@ -93,9 +93,10 @@ class Study(ColumnTable):
         Raises:
             InputError: an unknown measure.
         """
-        signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in (self._known(a), self._known(b))}
-        points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.good]
-        front = [run for run, p in zip(self.good, points)
+        names = self._checked_measure(a), self._checked_measure(b)
+        signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in names}
+        points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.successful]
+        front = [run for run, p in zip(self.successful, points)
                  if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points)]
         return sorted(front, key=lambda run: run.measures[a])
 
@@ -114,10 +115,10 @@ class Study(ColumnTable):
         Raises:
             InputError: an unknown measure.
         """
-        self._known(measure)
-        values = np.array([run.measures[measure] for run in self.good])
-        levels = {name: sorted({run.values[name] for run in self.good}) for name in self.variables}
-        masks = {name: np.array([[run.values[name] == level for level in tried] for run in self.good], dtype=float)
+        self._checked_measure(measure)
+        values = np.array([run.measures[measure] for run in self.successful])
+        levels = {name: sorted({run.values[name] for run in self.successful}) for name in self.variables}
+        masks = {name: np.array([[run.values[name] == level for level in tried] for run in self.successful], float)
                  for name, tried in levels.items()}
         parts = np.split(np.linalg.lstsq(np.hstack(list(masks.values())), values)[0],
                          np.cumsum([len(tried) for tried in levels.values()])[:-1])
@@ -134,7 +135,7 @@ class Study(ColumnTable):
         Returns:
             The matplotlib figure.
         """
-        return effects.main_effects(self.good, self.effects(measure), measure)
+        return effects.main_effects(self.successful, self.effects(measure), measure)
 
     def plot_pareto(self, a: str, b: str) -> Any:
         """Draw two measures of all successful runs as dots, with the Pareto front as a line.
@@ -146,7 +147,7 @@ class Study(ColumnTable):
         Returns:
             The matplotlib figure.
         """
-        return effects.pareto(self.good, self.pareto(a, b), a, b)
+        return effects.pareto(self.successful, self.pareto(a, b), a, b)
 
     def report(self, file: Any, title: str = "Study") -> None:
         """Write an HTML page with the best run, main effects, Pareto fronts of the goals, and all runs.
@@ -184,7 +185,7 @@ class Study(ColumnTable):
         for name in within:
             known("refine: variable", name, self.variables)
         low, high = np.array(list(within.values()), dtype=float).T
-        worst = max(map(self._distance, self.good))
+        worst = max(map(self._cost, self.successful))
 
         def objective(x):
             """Return the measure to be minimised at a point x of the unit cube, from a stored or a new run."""
@@ -192,30 +193,30 @@ class Study(ColumnTable):
             run = next((run for run in self.runs if run.values == values), None) or pool.submit(
                 self._task, values).result()
             if run not in self.runs:
-                self._keep(run)
-            return worst + abs(worst) if run.error else self._distance(run)
+                self._store(run)
+            return worst + abs(worst) if run.error else self._cost(run)
         first = (np.array([start.values[name] for name in within]) - low) / (high - low)
         simplex = np.vstack([first, *(first + np.eye(len(first))[k] * (0.2 if first[k] < 0.5 else -0.2)
                                       for k in range(len(first)))])
-        with pool_of(executor, 1) as pool:
+        with executor_context(executor, 1) as pool:
             minimize(objective, first, method="Nelder-Mead", bounds=[(0, 1)] * len(first),
                      options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6})
         return self.best
 
     def __str__(self) -> str:
-        failed = len(self.runs) - len(self.good)
+        failed = len(self.runs) - len(self.successful)
         lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
                  + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
-        if self.goal and self.good:
+        if self.goal and self.successful:
             shown = as_text({**self.best.values, **self.best.measures})
             lines.append(f"best ({', '.join(f'{direction} {name}' for name, direction in self.goal.items())}): {shown}")
-            lines += self._edges()
+            lines += self._edge_warnings()
         lines += [f"failed: {as_text(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
         return "\n".join([*lines, *(f"warning: {as_text(run.values)}: {text}" for run in self.runs
                                     for text in run.warnings)])
 
-    def _edges(self) -> list[str]:
-        """Return a line of text for each variable whose best value is the lowest or the highest one tried."""
+    def _edge_warnings(self) -> list[str]:
+        """Return a line of text for each variable whose value in the best run is the lowest or highest one tried."""
         found = []
         for name in self.variables:
             values = [run.values[name] for run in self.runs]
@@ -226,17 +227,17 @@ class Study(ColumnTable):
                              f" may lie {'below' if best <= low + margin else 'above'}")
         return found
 
-    def _distance(self, run: StudyRun) -> float:
-        """Return the measure of the first goal in a run, with the sign for which smaller is better."""
+    def _cost(self, run: StudyRun) -> float:
+        """Return the measure of the first goal in a run, times -1 for the goal "max"; the best run has the lowest."""
         name, direction = next(iter(self.goal.items()))
         return run.measures[name] * (1 if direction == "min" else -1)
 
-    def _known(self, measure: str) -> str:
+    def _checked_measure(self, measure: str) -> str:
         """Return the name of a measure; raise an InputError if the study does not have it."""
         known("Study: measure", measure, self.measures)
         return measure
 
-    def _keep(self, run: StudyRun) -> None:
+    def _store(self, run: StudyRun) -> None:
         """Add a run to the study, and write it to the folder, if there is one."""
         if self._folder is not None:
             stored_runs.write(self._folder, run)
@@ -254,13 +255,14 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         build: function of the variables, by name, that returns a path. Under an MPI executor it must make its mesh on
             `MPI.COMM_SELF`.
         variables: {name: values} for all combinations, or a list of {name: value}, one for each run.
-        measure: {name: a function of the path that returns a number, or the name of a column, at the last state}.
+        measure: {name: function of the path that returns a number, or name of a column of the path}. Of a column the
+            value in the last state counts.
         goal: {measure: "max" or "min"}; the first one defines the best run.
         folder: folder for the results of the runs. Runs stored there are not repeated.
         executor: an executor of `concurrent.futures`, or `mpi4py.futures.MPIPoolExecutor`. Default: processes of this
             machine. Functions run in other processes must be importable: no lambda, no function inside another.
         workers: number of parallel processes; default one per core.
-        progress: show a progress bar.
+        progress: True for a progress bar.
 
     Returns:
         The `Study`, with the failed runs.
@@ -278,22 +280,22 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     {'c10': 0.2}
     """
     from tqdm import tqdm
-    cases = design(variables)
+    cases = sets_of_values(variables)
     task, goals = Task(build, _measures(build, measure)), dict(goal or {})
     for name, direction in goals.items():
         known("study: goal", name, task.measure)
         known(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
-    folder = None if folder is None else stored_runs.checked(file_path("study: folder", folder), task, names)
+    folder = None if folder is None else stored_runs.prepare_folder(file_path("study: folder", folder), task, names)
     found = Study(task, names, goals, folder)
     found.runs += [] if folder is None else stored_runs.read(folder, names)
-    todo = [case for case in cases if not any(run.values == case for run in found.runs)]
-    with pool_of(executor, min(workers or os.cpu_count() or 1, max(len(todo), 1))) as pool:
+    missing = [case for case in cases if not any(run.values == case for run in found.runs)]
+    with executor_context(executor, min(workers or os.cpu_count() or 1, max(len(missing), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
             check_importable(task)
-        runs = finished(pool, task, todo)
-        for run in tqdm(runs, total=len(todo), disable=not (progress and todo), desc="study", unit="run"):
-            found._keep(run)
+        runs = completed_runs(pool, task, missing)
+        for run in tqdm(runs, total=len(missing), disable=not (progress and missing), desc="study", unit="run"):
+            found._store(run)
     order = {tuple(case.items()): k for k, case in enumerate(cases)}
     found.runs.sort(key=lambda run: order.get(tuple(run.values.items()), len(order)))
     return found

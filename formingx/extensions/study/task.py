@@ -39,7 +39,7 @@ class StudyRun:
 
 
 class Task(NamedTuple):
-    """Task of a process: builds a run from values of the variables, and measures it.
+    """Task of one process: it runs the user's function for a set of values, and evaluates the measures of the run.
 
     Attributes:
         build: function of the variables that returns a path.
@@ -98,7 +98,7 @@ def as_text(numbers: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
 
 
-def finished(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
+def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
     """Run a task with sets of values, the first one alone, and yield the runs as they finish.
 
     Args:
@@ -116,7 +116,7 @@ def finished(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
             yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
 
 
-def pool_of(executor: futures.Executor | None, workers: int) -> Any:
+def executor_context(executor: futures.Executor | None, workers: int) -> Any:
     """Return a context manager of an executor for the runs of a study.
 
     Args:

@@ -7,7 +7,7 @@ from typing import Any
 from ...errors import InputError, finite, several
 
 
-def design(variables: Any) -> list[dict[str, float]]:
+def sets_of_values(variables: Any) -> list[dict[str, float]]:
     """Return the sets of values of a parameter study, one for each run.
 
     Args:
