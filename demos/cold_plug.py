@@ -5,7 +5,7 @@ of the depth in 1 s; then vacuum draws it into the mould in 0.3 s. The mould has
 mm, a depth of 70 mm and fillets of 4 and 2 mm. The sheet sticks to the mould, which takes no heat. At 150 C the sheet
 has an equilibrium modulus of 0.04 MPa and a branch of 0.16 MPa and 0.5 s. On cooling it stiffens, by a table, and
 relaxes more slowly, by Arrhenius' law. The friction of the plug is 0.6 at 150 C, 0.3 at 100 and 0.15 at 20 (a table).
-The numbers have the size of those of polystyrene, but are of no particular grade.
+The values are of the order of those of polystyrene, but of no particular grade.
 
 Plugs at 30, 100 and 150 C take heat through a contact of 0, 200 and 1000 W/(m2 K), where and while they touch. Then
 eight runs, for a plug at 30 C, have each of relaxation, chill and friction or not; a sheet without relaxation is

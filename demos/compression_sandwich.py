@@ -1,8 +1,8 @@
 """Press a stuck block with a strip ten times as stiff in its middle (Song 1993, section 7.4, figs. 7.12, 7.13).
 
-The I1 and I2 constants are 1.0 and 0.1 MPa outside, 10.0 and 1.0 MPa inside. The height of the strip is not printed: it
-is 0.3125 cm of the half height here. The block of one material is run for comparison, with and without plates that its
-side may touch.
+The I1 and I2 constants are 1.0 and 0.1 MPa outside, 10.0 and 1.0 MPa inside. The thesis does not print the height of
+the strip: here it is 0.3125 cm of the half height. The block of one material is run for comparison, with and without
+plates that its side may touch.
 """
 
 from common import parser, save, say, summarise

@@ -3,8 +3,8 @@
 The sheet and the cup of `cup`, but with a corner of an eighth of the thickness (0.0375 cm). The sheet sticks to the
 mould, to 160 psi. The wall is thinnest beside the corner, where contact comes last. A sticking point keeps its wall, so
 the minimum wall varies with the positions of the nodes, by percents on columns of one size. `mesh.adapted` takes a run
-on 20 columns. It chooses columns that turn by at most `share` radians as the sheet bends, or over a fillet on which it
-lies. Each mesh is made from the run on the one before. Lengths in cm, stresses in psi.
+on 20 columns. In the result the sheet rotates by at most `share` radians along a column, as it bends or over a fillet.
+Each mesh is made from the run on the one before. Lengths in cm, stresses in psi.
 """
 
 import numpy as np

@@ -45,15 +45,15 @@ def main():
                        {"wall": fx.spline(KNOTS, start=WALL, low=0.1, high=0.39)}, step=fx.StepControl(target=8))
     first = design.run()
     end = PART * first.profile.reference_length[-1]
-    answer = design.fit(even=True, within=(0.0, end), max_runs=2 if args.quick else args.runs, min_change=2e-3,
+    result = design.fit(even=True, within=(0.0, end), max_runs=2 if args.quick else args.runs, min_change=2e-3,
                         start=first)
     before, after = (run.wall[run.profile.reference_length < PART * run.profile.reference_length[-1]]
-                     for run in (answer.before, answer.best))
-    say(str(answer))
+                     for run in (result.before, result.best))
+    say(str(result))
     drawing, axes = figure(2)
-    answer.plot_wall(axes[0])
+    result.plot_wall(axes[0])
     axes[0].set(xlabel="length along the parison, cm", ylabel="wall of the bottle, cm")
-    knots = answer.values["wall"]
+    knots = result.values["wall"]
     axes[1].plot(np.full(KNOTS, WALL), knots.coordinates * (ROUND + LENGTH), "0.6", label="before")
     axes[1].plot(knots.values, knots.coordinates * (ROUND + LENGTH), "C0o-", label="after")
     axes[1].set(xlabel="wall of the parison, cm", ylabel="length along its inside, cm", xlim=(0, None))
@@ -61,8 +61,8 @@ def main():
     save(drawing, args.out / "even_bottle.png")
     summarise(args.out, {
         "cv_before": before.std() / before.mean(), "cv_after": after.std() / after.mean(),
-        "least_wall_before": before.min(), "least_wall_after": after.min(), "paths": answer.paths,
-        "volume_before": answer.before.volume, "volume_after": answer.best.volume,
+        "least_wall_before": before.min(), "least_wall_after": after.min(), "paths": result.paths,
+        "volume_before": result.before.volume, "volume_after": result.best.volume,
         "wall_of_the_parison": {f"{s:g}": w for s, w in zip(knots.coordinates * (ROUND + LENGTH), knots.values)},
         "elements_along": elements[0], "versions": files.versions()})
 

@@ -35,21 +35,21 @@ def sheet(model, elements, stretch, h0=None, c=None):
 
 
 def search(model, elements, knots, stretch, of):
-    """Return the answer of one case; `of` is "h0" or "c"."""
+    """Return the `DesignResult` of one case; `of` is "h0" or "c"."""
     design = fx.Design(lambda profile: sheet(model, elements, stretch, **{of: profile}),
                        {"profile": fx.spline(knots, start=0.0, low=-4.0, high=4.0, smooth=True)})
     return design.fit(even=True, volume=None, max_runs=6, min_change=2e-4)
 
 
-def numbers(answer, name):
-    """Return the numbers of the summary of one answer."""
-    profile, wall = answer.values["profile"], answer.best.wall
+def numbers(result, name):
+    """Return the numbers of the summary of one result."""
+    profile, wall = result.values["profile"], result.best.wall
     over = {"h0_over_h": THICKNESS / wall.mean(), "C_over_C0": 1.0}[name]
-    pressure = answer.best.path.last.measures["pressure"]
+    pressure = result.best.path.last.measures["pressure"]
     scale = {"p_R0_over_C_h": C * wall.mean(), "p_R0_over_C0_h0": C * THICKNESS}
     key = "p_R0_over_C_h" if name == "h0_over_h" else "p_R0_over_C0_h0"
     return {name: {f"{R:g}": float(over * relative(profile, R)) for R in RADII}, key: pressure / scale[key],
-            "spread": float(np.ptp(wall) / wall.mean()), "paths": answer.paths}
+            "spread": float(np.ptp(wall) / wall.mean()), "paths": result.paths}
 
 
 def main():
@@ -65,14 +65,14 @@ def main():
         for part, cases, of, name in (("thickness", stretches, "h0", "h0_over_h"),
                                       ("constant", walls, "c", "C_over_C0")):
             for k, case in enumerate(cases):
-                answer = search(model, elements, knots, case if of == "h0" else case**-0.5, of)
-                found = numbers(answer, name)
+                result = search(model, elements, knots, case if of == "h0" else case**-0.5, of)
+                found = numbers(result, name)
                 summary[part].setdefault(model, {})[f"{case:g}"] = found
-                say(f"{part}, {model}, {case:g}: {answer.paths} runs, spread {found['spread']:.2e}, "
+                say(f"{part}, {model}, {case:g}: {result.paths} runs, spread {found['spread']:.2e}, "
                     + ", ".join(f"{v:.5f}" for v in found[name].values()))
                 R = np.linspace(0, 1, 101)
                 label = f"stretch of the pole {case:g}" if of == "h0" else f"wall {case:g} h0"
-                axes[int(part == "constant")].plot(R, found[name]["0"] * relative(answer.values["profile"], R), style,
+                axes[int(part == "constant")].plot(R, found[name]["0"] * relative(result.values["profile"], R), style,
                                               color=f"C{k}", label=label if model == "solid" else None)
     axes[0].set_ylabel("thickness of the sheet / even wall")
     axes[1].set_ylabel("constant C / C at the pole")

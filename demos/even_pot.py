@@ -59,8 +59,8 @@ def main():
     elements, runs, search = ((12, 1), 2, 2) if args.quick else ((24, 1), args.runs, args.search)
     design = fx.Design(lambda **values: pot(**values, elements=elements),
                        {**PLUG, "heat": fx.spline(KNOTS, start=HEAT[0], low=HEAT[1], high=HEAT[2])}, step=STEP)
-    answer = design.fit(even=True, within=(0.0, PART), volume=None, max_runs=runs, min_change=2e-3)
-    say(str(answer))
+    result = design.fit(even=True, within=(0.0, PART), volume=None, max_runs=runs, min_change=2e-3)
+    say(str(result))
     heats = {f"heat_{k}": HEAT for k in range(KNOTS)}
     bounds = {**PLUG, **heats}
     with ThreadPoolExecutor(1) as here:
@@ -69,21 +69,21 @@ def main():
                          progress=False)
         study.refine(search, {name: b[1:] for name, b in bounds.items()}, executor=here)
     found = [one.measures.get("cv", np.inf) for one in study.runs]
-    reached = next((k + 1 for k, value in enumerate(found) if value <= answer.cv[1]), None)
+    reached = next((k + 1 for k, value in enumerate(found) if value <= result.cv[1]), None)
     say(f"Nelder and Mead: cv {min(found):.4f} in {len(found)} runs; that of the derivatives"
         f" {'after ' + str(reached) + ' runs' if reached else 'was not reached'}")
     drawing, axes = figure(2)
-    answer.plot_wall(axes[0])
+    result.plot_wall(axes[0])
     axes[0].set(xlabel="reference radius R, cm", ylabel="wall, cm")
-    axes[1].plot(range(1, len(answer.runs) + 1), [one.wall[answer.inside].std() / one.wall[answer.inside].mean()
-                                                  for one in answer.runs], "C0o-", label="with derivatives")
+    axes[1].plot(range(1, len(result.runs) + 1), [one.wall[result.inside].std() / one.wall[result.inside].mean()
+                                                  for one in result.runs], "C0o-", label="with derivatives")
     axes[1].plot(range(1, len(found) + 1), np.minimum.accumulate(found), "0.5", label="Nelder and Mead")
     axes[1].set(xlabel="runs", ylabel="standard deviation / mean of the wall", ylim=(0, None))
     axes[1].legend()
     save(drawing, args.out / "even_pot.png")
-    values = {name: value.values.tolist() if name == "heat" else value for name, value in answer.values.items()}
+    values = {name: value.values.tolist() if name == "heat" else value for name, value in result.values.items()}
     summarise(args.out, {
-        "cv_before": answer.cv[0], "cv_after": answer.cv[1], "paths": answer.paths, "values": values,
+        "cv_before": result.cv[0], "cv_after": result.cv[1], "paths": result.paths, "values": values,
         "refine": {"cv_after": min(found), "paths": len(found), **({"paths_to_the_same": reached} if reached else {})},
         "elements_along": elements[0], "versions": files.versions()})
 

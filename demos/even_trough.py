@@ -37,16 +37,16 @@ def trough(profile, of, elements):
 
 
 def search(of, elements, knots, runs):
-    """Return the answer for "h0" or "C"."""
+    """Return the `DesignResult` for "h0" or "C"."""
     design = fx.Design(lambda profile: trough(profile, of, elements),
                        {"profile": fx.spline(knots, start=0.0, low=-6.0, high=6.0)}, step=fx.StepControl(target=8))
     return design.fit(even=True, volume="kept" if of == "h0" else None, within=(0.0, COUNTED), max_runs=runs,
                       min_change=2e-3)
 
 
-def places(answer):
+def places(result):
     """Return {name: reference R} of the points on the wall, and of those beside the corner on the floor."""
-    profile = answer.best.profile
+    profile = result.best.profile
     R, (r, z) = profile.reference_radius, profile.middle.T
     on_wall = r > z / z.max()                                # beyond the diagonal through the corner
     found = {name: float(np.interp(depth, z[on_wall][::-1], R[on_wall][::-1])) for name, depth in PLACES.items()}
@@ -55,12 +55,12 @@ def places(answer):
     return found, floor
 
 
-def arc(answer):
+def arc(result):
     """Return the radius of the free arc in the corner.
 
     An arc that touches wall and floor is at a distance of (sqrt(2) - 1) of its radius from the corner.
     """
-    middle = answer.best.profile.middle
+    middle = result.best.profile.middle
     corner = np.array([1.0, DEPTH])
     return float(np.hypot(*(middle - corner).T).min() / (np.sqrt(2) - 1))
 
@@ -74,9 +74,9 @@ def main():
     summary = {}
     drawing, axes = figure(2)
     for k, of in enumerate(("h0", "C")):
-        answer = search(of, elements, knots, runs)
-        wall, floor = places(answer)
-        profile, mean = answer.values["profile"], answer.best.wall[answer.inside].mean()
+        result = search(of, elements, knots, runs)
+        wall, floor = places(result)
+        profile, mean = result.values["profile"], result.best.wall[result.inside].mean()
         if of == "h0":
             summary["h0_over_h"], summary["h0_over_h_on_the_floor"] = (
                 {name: float(SHEET * np.exp(profile(R)) / mean) for name, R in there.items()}
@@ -84,10 +84,10 @@ def main():
         else:
             summary["C_over_C_rim"] = {name: float(np.exp(profile(wall[name]) - profile(wall["rim"])))
                                        for name in ("half_wall", "mouth")}
-        summary[of] = {"cv_before": answer.cv[0], "cv_after": answer.cv[1], "paths": answer.paths,
-                       "free_arc_radius": arc(answer), "mean_wall": mean}
-        say(f"{of}: {answer.paths} runs, cv {answer.cv[0]:.4f}, after {answer.cv[1]:.4f}; radius of the free arc"
-            f" {arc(answer):.4f}", str(summary["h0_over_h" if of == "h0" else "C_over_C_rim"]))
+        summary[of] = {"cv_before": result.cv[0], "cv_after": result.cv[1], "paths": result.paths,
+                       "free_arc_radius": arc(result), "mean_wall": mean}
+        say(f"{of}: {result.paths} runs, cv {result.cv[0]:.4f}, after {result.cv[1]:.4f}; radius of the free arc"
+            f" {arc(result):.4f}", str(summary["h0_over_h" if of == "h0" else "C_over_C_rim"]))
         R = np.linspace(0, 1, 201)
         axes[k].plot(R, np.exp(profile(R) - (of == "C") * profile(1.0)) * (SHEET / mean if of == "h0" else 1), "C0")
         for name, at in wall.items():

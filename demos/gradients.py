@@ -6,7 +6,7 @@ thickness (1 + b R^2)/100. They are those of the pressure p R0/(C(0) h0(0)), and
 R = 0 and 0.5.
 
 Cup: a sheet of thickness 0.03 is blown into a cup, 0.7 deep, to which it sticks; C = 0.5 (1 + b (R^2 - 0.5)). The
-moment at which a node touches depends on b. So the derivative of a run is not the derivative of its steps as they were.
+time at which a node touches depends on b. So the derivative of a run is not its derivative with constant steps.
 Differences of whole runs scatter by some 0.001, because the steps change with b.
 
 Pot: a plug pushes a clamped sheet, with Coulomb friction, into a mould to which it sticks; air at a low pressure

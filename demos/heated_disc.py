@@ -20,7 +20,7 @@ CASES = {"cool_rim": lambda R: 1 + 3 * R**2,
          "hot_rim": lambda R: 1 - 0.5 * R**2}
 STRETCHES, PLACES = ("1.25", "1.5", "2", "3"), ("0", "0.25", "0.5", "0.75", "0.9", "1")
 MODELS = {"membrane": fx.Membrane(), "solid": fx.MixedPressure()}
-# a solid has a boundary layer of about one thickness at the hinge; nodes lie on the places
+# a solid has a boundary layer of about one thickness at the hinge; nodes lie at the evaluated radii
 ELEMENTS = {"membrane": (200, 1), "solid": (120, 2)}
 FINE = {"membrane": {float(x): 1.0 for x in PLACES}, "solid": {float(x): 1.0 for x in PLACES[:-1]} | {1.0: 0.05}}
 
@@ -60,7 +60,7 @@ def theory(modulus):
 
 
 def largest_errors(found, exact):
-    """Return {name: largest relative difference over the stretches}; the thickness at R = 1 stands by itself."""
+    """Return {name: largest relative difference over the stretches}; the thickness at R = 1 has a key of its own."""
     errors = dict.fromkeys(("p_R0_over_C0_h0", "w_over_R0", "thickness", "thickness_at_1"), 0.0)
     for stretch in STRETCHES:
         a, b = found[stretch], exact[stretch]

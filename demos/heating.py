@@ -83,7 +83,7 @@ def main():
             s, weights = np.polynomial.legendre.leggauss(20)
             names, found = [*names, "mean"], np.column_stack([found, heated.mean_through()])
             right = np.column_stack([right, exact((s + 1) / 2) @ weights / 2])
-        # from the start to where a sheet that stays for ever comes, or to the hottest it gets
+        # from the initial to the steady temperature, or to the highest one
         span = {"convection": 175.0, "two_sides": 195.0}.get(name, right.max() - START)
         errors[name] = print_errors(name, names, heated.outputs, found, right, span, heated)
         summary[name] = at_times(names, heated.outputs, found)

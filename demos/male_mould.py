@@ -1,10 +1,11 @@
 """Form a sheet over a male mould, by draping and by vacuum (Song 1993, section 4.1, names the process).
 
-All sizes are ours. Drape: the mould rises into a sheet clamped at its rim and stretches it over its top. Vacuum: the
-mould stands just below the sheet in a box as wide as the clamp, and pressure from above lays the sheet over top, wall
-and base. (Vacuum after the drape needs a process in stages.) Sheet and material as in demos/cup.py (Mooney, I1 constant
-50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm). Mould: top radius 4 cm, height 3 cm, draft 10 degrees, fillets of
-1.5 cm around the top, 1 cm at the foot and in the corner of the box. Lengths in cm, stresses in psi.
+The thesis computes none: all sizes are ours. Drape: the mould rises into a sheet clamped at its rim and stretches it
+over its top. Vacuum: the mould stands just below the sheet in a box as wide as the clamp, and pressure from above lays
+the sheet over top, wall and base. (Vacuum after the drape needs a process in stages.) Sheet and material as in
+demos/cup.py (Mooney, I1 constant 50 psi, I2 constant 15 psi; r0 = 10 cm, h0 = 0.3 cm). Mould: top radius 4 cm, height 3
+cm, draft 10 degrees, fillets of 1.5 cm around the top, 1 cm at the foot and in the corner of the box. Lengths in cm,
+stresses in psi.
 """
 
 import numpy as np

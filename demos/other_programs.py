@@ -57,8 +57,8 @@ def vm56(fine):
 def solids4foam(fine):
     """Solve solids4foam's tubes at 100 MPa: neo-Hookean, 8 to 16 m, and Mooney, 7 to 18.625 m.
 
-    E = 1000 MPa of an incompressible solid is c10 = 500/3 MPa; the program has its exact solution. Of the second it has
-    a finite-volume result with Poisson's ratio 0.49, here in the innermost cell, whose middle is at R = 7.1527 m.
+    E = 1000 MPa of an incompressible solid is c10 = 500/3 MPa; the program has its exact solution. For the second tube
+    it has a finite-volume result with Poisson's ratio 0.49, here in the innermost cell, centred at R = 7.1527 m.
     """
     path = tube(8.0, 16.0, fx.NeoHookean(c10=500 / 3), 100.0, fine)
     exact = in_wall(path, 8.0), in_wall(path, 12.0)
@@ -112,7 +112,7 @@ def vm201(size, out):
 def vm218(elements, out):
     """Solve Ansys VM218: a hinged circular plate, Mooney 80 and 20 psi: height of the pole at 4, 24 and 38 psi.
 
-    Its targets are read from a graph. Membrane theory is beside them, for the graph is off it.
+    Its targets are read from a graph. Membrane theory is given beside them, because the graph deviates from it.
     """
     scene = fx.Scene(mesh=fx.mesh.disc(radius=7.5, thickness=0.5, elements=elements), loads=[fx.Pressure("bottom")],
                      materials=fx.MooneyRivlin(c10=80.0, c01=20.0),

@@ -10,8 +10,8 @@ from formingx.results.show import plots
 
 NEWTON = 100.0                                               # N in one MPa cm2
 LAWS = {
-    "held": ("stick", False),                                # no slip, as the thesis: never lets go
-    "stick": ("stick", True),                                # a rough plug that the sheet may lift off
+    "held": ("stick", False),                                # no slip, as in the thesis; never separates
+    "stick": ("stick", True),                                # a rough plug from which the sheet may separate
     "frictionless": ("none", True),
 }
 """{name: (friction, separates)}; a number is Coulomb's coefficient."""

@@ -1,12 +1,12 @@
 """Form a pot with a plug, chill it in its mould, release and trim it: which of three materials keeps its shape?
 
 The sheet, plug and mould are those of demos/relaxing_pot.py, at 150 C: instantaneous modulus 130 psi, of which 90 %
-relax with 1 s. The plug waits for 1 s, vacuum fills the mould, which is steel at 20 C, and the part stays in it for
-30 s. It is released, trimmed next to its flange, and cooled to 20 C. Three materials: "sets" (between 85 and 75 C a
-glass of shear modulus 10000 psi is born in the shape of that moment, `Solidification`); "glassy_branch" (a branch of
-that modulus whose relaxation time is 1e-4 s at 150 C and endless when cold, `Arrhenius`); "neither" (the rubber and its
-branch alone). All shrink by 7e-5 per degree. Shrinkage is that of the largest diameter. Lengths in cm, stresses in psi,
-times in s, heat in J, g, W.
+relax with 1 s. The plug waits for 1 s, vacuum fills the mould, which is steel at 20 C, and the part stays in it for 30
+s. It is released, trimmed next to its flange, and cooled to 20 C. Three materials: "sets" (between 85 and 75 C a glass
+of shear modulus 10000 psi forms, free of stress in the shape of that moment, `Solidification`); "glassy_branch" (a
+branch of that modulus whose relaxation time is 1e-4 s at 150 C and infinite when cold, `Arrhenius`); "neither" (the
+rubber and its branch alone). All shrink by 7e-5 per degree. Shrinkage is that of the largest diameter. Lengths in cm,
+stresses in psi, times in s, heat in J, g, W.
 """
 
 import numpy as np

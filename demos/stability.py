@@ -31,7 +31,7 @@ def purity(loss, radius, length):
 
 
 def search(scene, targets, wanted, radius, length):
-    """Return {(n, flipped): critical point of one half wave}, from target to target until all are found.
+    """Return {(n, symmetry plane or None): critical point of one half wave}, from target to target until all are found.
 
     The modes of every state are counted, because many shorter ones may become unstable before, or in the same step.
     """
@@ -39,12 +39,12 @@ def search(scene, targets, wanted, radius, length):
     for target in targets:
         seen = [] if path is None else path.states[:-1]
         path = fx.trace(scene, start=path, until=target, progress=False)
-        new = [state for state in path.states if all(state is not one for one in seen)]
-        for n, flipped in [kind for kind in wanted if kind not in found]:
-            losses = [one for one in path.stability([n], new).critical_points if one.antisymmetric_about == flipped]
-            best = max(losses, key=lambda one: purity(one, radius, length), default=None)
+        new = [state for state in path.states if all(state is not point for point in seen)]
+        for n, plane in [kind for kind in wanted if kind not in found]:
+            losses = [point for point in path.stability([n], new).critical_points if point.antisymmetric_about == plane]
+            best = max(losses, key=lambda point: purity(point, radius, length), default=None)
             if best is not None and purity(best, radius, length) > 0.7:
-                found[n, flipped] = best
+                found[n, plane] = best
         if len(found) == len(wanted):
             break
     return found
@@ -137,10 +137,10 @@ def switched(ratio, kB, fine):
     from formingx.forms.probes import probe
     target = fx.pressure(float(ends[1].last.measures["pressure"]))
     moved = []
-    for sense, one in ends.items():
-        met = sense == 1 or abs(one.last.measures["pressure"] / target.value - 1) < 1e-9
-        state = one.last if met else one.state_at(target, after=one.states[-2])
-        with one.problem.state_context(state) as problem:
+    for sense, point in ends.items():
+        met = sense == 1 or abs(point.last.measures["pressure"] / target.value - 1) < 1e-9
+        state = point.last if met else point.state_at(target, after=point.states[-2])
+        with point.problem.state_context(state) as problem:
             moved.append(probe(problem, np.column_stack([np.full(41, ratio), z])).displacement(problem.x)[:, 0])
     return float(np.abs(moved[0] - moved[1][::-1]).max() / np.abs(moved[0]).max()), loss, ends[1]
 

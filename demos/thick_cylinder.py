@@ -195,9 +195,9 @@ def draw_wall(grids, path, targets, out):
     misses, rows = {}, [R * INCH, true.hydrostatic_pressure * PSI, h * PSI]
     runs = {f"{n} triangles": run for n, run in grids.items()}
     runs[f"{path.problem.forms.domain.topology.index_map(2).size_global} triangles"] = (path, targets)
-    for (name, (run, aims)), style in zip(runs.items(), ("C1.--", "C0.-", "C2-"), strict=True):
+    for (name, (run, targets)), style in zip(runs.items(), ("C1.--", "C0.-", "C2-"), strict=True):
         points, _, _ = through("tube", run.problem.scene.mesh, len(R))
-        stress = run.stress(run.met(aims["50"])).at_points(points)
+        stress = run.stress(run.met(targets["50"])).at_points(points)
         p = stress.hydrostatic_pressure
         misses[name] = float(np.abs(p - true.hydrostatic_pressure).max() / np.abs(true.hydrostatic_pressure).max())
         every = {"markevery": 8} if name.startswith(("6 ", "12 ")) else {}
@@ -221,8 +221,8 @@ def draw_curves(kind, path, targets, out, grids=None):
     axes.plot(u, [exact(kind, d).pressure * PSI for d in u], "k", linewidth=1, label="exact")
     runs = {f"{n} triangles": run for n, run in (grids or {}).items()}
     runs[f"{path.problem.forms.domain.topology.index_map(2).size_global} triangles"] = (path, targets)
-    for (name, (run, aims)), style in zip(reversed(runs.items()), ("C2.", "C0x", "C1+")):
-        bound = aims["50"].bind(run.problem)
+    for (name, (run, targets)), style in zip(reversed(runs.items()), ("C2.", "C0x", "C1+")):
+        bound = targets["50"].bind(run.problem)
         displacement = [run.value(bound, s) * INCH for s in run.states]
         axes.plot(displacement, run["pressure"] * PSI, style, markersize=7, label=name)
         for s in run.limit_points:
@@ -255,8 +255,8 @@ def main():
     outer, inside = geometry_of_the_thesis()
     cylinder |= {
         "pressure_MPa_at_inner_displacement_cm_on_grid": {
-            str(k): {d: p.met(t).measures["pressure"] * PSI for d, t in aims.items()}
-            for k, (p, aims) in grids.items()},
+            str(k): {d: p.met(t).measures["pressure"] * PSI for d, t in targets.items()}
+            for k, (p, targets) in grids.items()},
         "hydrostatic_pressure_error": misses,
         "outer_radius_in_that_gives_1.26_MPa": outer, "inner_radius_in_that_gives_1.26_MPa": inside}
     summarise(args.out, {"cylinder": cylinder, "sphere": sphere, "versions": files.versions()})

@@ -5,8 +5,8 @@ constants (0.1213, 0.03327 MPa) and with Treloar's (0.143, 0.03327 MPa). Thick: 
 (0.1731, 0.004006 MPa). "held": points that touch the plug stay on it (no slip), to 10 cm. "frictionless": to a pole
 stretch of 3. Both are run with a clamped and with a hinged rim, beside the membrane under a plug with a sharp edge
 (`formingx.exact.plug`, up to the travel at which it would touch the plug's side). With mu = 0.3: to 10 cm. The edge of
-the plug is rounded here (--fillet); with smaller fillets the force tends to that of the membrane. Lengths in cm, forces
-in N.
+the plug is rounded here (--fillet); with smaller fillets the force tends to the force on the membrane. Lengths in cm,
+forces in N.
 
 The text of the thesis has no forces (figs. 6.6 to 6.10 show them). It says this: for the thick sheet its curve seems
 better than Throne's own. For the thin one Throne's constants give much softer curves than measured; Treloar's compare

@@ -2,10 +2,10 @@
 
 A parison is blown into a mould, taken as a new body free of stress (cm, MPa: forces times 100 are N) and crushed,
 elastic. Contact acts at 16 points of each edge, so that the ring on which the bottle stands rolls. With four points it
-hops from point to point: the force is a saw, and its highest tooth is 5 % above (on 360 elements the peak is 1.4 %
-lower). A second mould has a groove round the body. Under top load the groove is no gain: the bottle loses a fifth,
-because the wall gives way along the axis and two waves tilt the groove. Shallower grooves, at mid-height, lose 1 to 3
-%.
+hops from point to point: the force oscillates, and its highest value is 5 % above (on 360 elements the peak is 1.4 %
+lower). A second mould has a groove round the body. Under top load the groove is no gain: the buckling force falls
+by a fifth, because the groove yields axially and a mode of two waves tilts it. With shallower grooves, at mid-height,
+it falls by 1 to 3 %.
 """
 
 from common import parser, save, say, summarise
