@@ -96,10 +96,13 @@ class WallObjective:
                 raise InputError("fit: wall: must be greater than 0 at all reference lengths")
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals of a run and their derivatives by the n parameters.
+        r"""Return the residuals of a run and their derivatives by the n parameters.
 
-        The residuals are the relative deviations of the thickness at the m nodes that count from the wanted thickness,
-        or from the mean for an even wall. A prescribed volume appends its weighted relative deviation.
+        .. math:: r_i = \frac{h_i}{w_i} - 1, \quad i = 1, \dots, m, \qquad
+            r_{m+1} = 100 \sqrt{m} \left(\frac{V}{V_0} - 1\right)
+
+        with the thickness h at the m nodes that count, the wanted thickness w (for an even wall the mean of h), and the
+        volume V. The last residual is left out without a prescribed volume V0.
 
         Args:
             run: a run of the search.
@@ -220,8 +223,8 @@ class MeasuredWallObjective(WallObjective):
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals of a run and their derivatives by the n parameters.
 
-        The residuals are the relative deviations of the wall from the measured wall at the m points. A prescribed
-        volume appends its weighted relative deviation.
+        The residuals are the relative deviations of the wall from the measured wall at the m points. With a prescribed
+        volume its deviation is appended, as in `WallObjective.residual`.
 
         Args:
             run: a run of the search.

@@ -34,6 +34,9 @@ from .perturbed_runs import PerturbedRun, solve_perturbed
 def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
     """Solve for all perturbed runs at the last state of the base run; collective.
 
+    A perturbed run is the base run with one parameter slightly changed. Derivatives by this parameter are difference
+    quotients between the runs.
+
     Args:
         path: the `Path` of the base run.
         end: the `Target` of a run with one control, or the stages of a process.
@@ -46,7 +49,7 @@ def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> 
 
 
 class _PerturbedPaths:
-    """Transfer of the perturbed runs along the base run.
+    """Perturbed runs that follow the path of the base run, state by state.
 
     Args:
         path: the `Path` of the base run.
@@ -175,7 +178,7 @@ class _PerturbedPaths:
             self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
 
     def _keep_open(self, state: State) -> None:
-        """Keep those contact points of the perturbed runs open that are open in the base run at a state."""
+        """Keep the contact points of the perturbed runs open that are open in the base run at a state."""
         n = self.problem.n_owned
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):
@@ -283,7 +286,7 @@ class _PerturbedPaths:
         return self._targets[key]
 
     def _gap_constraints(self) -> tuple[Any, list[Any]]:
-        """Return constraints by which a gap that closes at the end of the step is closed in each run.
+        """Return constraints that close, in every run, the gap that closes at the end of the base run's step.
 
         Returns:
             Constraint of the base run, or None without such a gap; constraints of the perturbed runs.
@@ -326,7 +329,7 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
 
 
 def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """Return the properties of a stage that no parameter may change.
+    """Return the properties of a stage, given as its `Plan`, that no parameter may change.
 
     Returns:
         Numbers of the controlled loads; (load, length) of each table of an amplitude; numbers of the inactive items.

@@ -146,7 +146,8 @@ class PerturbedRun:
         """Return the residual of a constraint at the present state of the perturbed run.
 
         Args:
-            equation: constraint, a function of (x, control, gradient) that returns the residual first.
+            equation: constraint, a function of (x, control, gradient) that returns the residual first and overwrites
+                the PETSc vector `gradient`.
 
         Returns:
             Residual of the constraint.
@@ -163,9 +164,14 @@ class PerturbedRun:
 
 def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
-    """Solve for the states of the perturbed runs near a state of the base run; collective.
+    r"""Solve for the states of the perturbed runs near a state of the base run; collective.
 
-    The problem of the base run must have been restored to the state, with the history variables before it.
+    Modified Newton iterations use the tangent K and the constraint derivatives of the base run:
+
+    .. math:: K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
+
+    with residual F' and constraint c' of the perturbed run, its unknowns x and its control. The problem of the base run
+    must have been restored to the state, with the history variables before it.
 
     Args:
         curve: solver of the base run, a `Curve`.
