@@ -251,7 +251,7 @@ def _parabola_factor_slopes(s: Any) -> tuple[Any, Any]:
 
 
 def _quadratic_weight(x: np.ndarray) -> np.ndarray:
-    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of the quadratic part over a step of x relaxation times."""
+    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of a parabola's bulge over a step of x relaxation times."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

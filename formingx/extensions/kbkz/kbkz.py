@@ -276,7 +276,9 @@ class KBKZ(Relaxing):
         return float(initial + np.sum(half * _WEIGHTS * memory * self._damped_difference(mode, relative)))
 
     def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return the ends of the quadrature panels of the memory integral, ages before the last time, from 0 upwards.
+        """Return the ends of the quadrature panels of the memory integral, ages before the last time, ascending.
+
+        times and stretches: those of the test, shape (n,) each.
         """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)

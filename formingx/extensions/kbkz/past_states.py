@@ -218,7 +218,7 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _present(self) -> tuple[np.ndarray, Any, Any]:
-        """Return the present Cbar, shape (4, n), the reduced time since the last state, and its rate."""
+        """Return the present Cbar, shape (4, n); reduced time since the last state; its rate per process time."""
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
         if not len(self._own):

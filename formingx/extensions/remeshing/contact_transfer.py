@@ -94,7 +94,7 @@ class ContactState(NamedTuple):
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
     def _nearest_pairs(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest pair of old points to each position, shape (n, 2), and the place between them, 0 to 1."""
+        """Return the nearest pair of neighbours on the old face, shape (n, 2), and the place between them, 0 to 1."""
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         offset = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)

@@ -188,7 +188,7 @@ class Preformed(NamedTuple):
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-            """Return the nodal values of the least-squares fit of values at quadrature points, in each cell."""
+            """Return nodal values that fit values at points, shape (cells, points, k); shapes: shape functions there."""
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]

@@ -230,7 +230,8 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
     """Return the segment on a new mesh of the last body of a path, and the first state on it.
 
-    Several sizes near the requested one are tried. The first mesh with good J is taken, or else the best of all.
+    Several sizes near the requested one are tried. The first mesh whose J is far from its limits is taken, or else the
+    one whose J is furthest from them.
 
     Args:
         path: the path.

@@ -101,7 +101,7 @@ class _ModesOfState(NamedTuple):
     """Number of unstable modes of a state, and its modes with eigenvalues nearest to 0.
 
     Attributes:
-        fraction: position of the state between the two others, from 0 to 1.
+        fraction: position of the state between the two states that enclose a critical point, from 0 to 1.
         state: the state.
         unstable: number of unstable modes.
         values: k eigenvalues of the second variation nearest to 0, ascending, shape (k,), dimensionless.
