@@ -28,6 +28,8 @@ _STRESS_ORDER = 2
 def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
     """Return the required over the present length of the n columns of a mesh, the smallest over all states.
 
+    A column consists of the elements through the sheet between two successive cross-sections.
+
     Args:
         path: the run.
         max_rotation: largest rotation of the sheet along a column, radians, or length of a column over the radius of a

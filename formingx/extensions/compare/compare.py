@@ -23,6 +23,8 @@ _MAX_RANGE_RATIO = 1e100                   # largest ratio of the two ranges: it
 class Difference:
     """Difference of one column between two curves, theirs minus ours, at the n compared points of their curve.
 
+    "Ours" is the curve of the run, "theirs" the curve of the other program.
+
     Attributes:
         values: differences, shape (n,), in the unit of our column.
         range: largest minus smallest value of our column.

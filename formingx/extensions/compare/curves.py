@@ -65,7 +65,7 @@ class SampledCurve:
         self.line = self.evaluate(self.arc_lengths)
 
     def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
-        """Return the point of the curve that is closest to a point, near a sample.
+        """Return the point of the curve that is closest to a given point, in the two pieces that meet at a sample.
 
         Args:
             point: the point, shape (c,).

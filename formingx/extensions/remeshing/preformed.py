@@ -188,7 +188,7 @@ class Preformed(NamedTuple):
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-            """Return nodal values that fit values at points, shape (cells, points, k); shapes: shape functions there."""
+            """Return nodal values that fit values at points, shape (cells, points, k); shapes: functions there."""
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]

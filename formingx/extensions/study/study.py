@@ -160,7 +160,7 @@ class Study(ColumnTable):
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
                executor: futures.Executor | None = None) -> StudyRun:
-        """Search for a better run, from the best one, by the Nelder-Mead method with bounds; all runs are kept.
+        """Search for a better run, from the best one, by the Nelder-Mead method with bounds; all runs join the study.
 
         Nelder and Mead, Computer Journal 7 (1965) 308 (doi:10.1093/comjnl/7.4.308), as in SciPy. It suits few variables
         with a smooth effect. A failed run counts as worse than all others.
@@ -247,7 +247,7 @@ class Study(ColumnTable):
 def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | Sequence[Mapping[str, float]],
           measure: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
           executor: futures.Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
-    """Run a script with many sets of values, and measure each run.
+    """Run the function `build` for many sets of values, and evaluate measures of each run.
 
     The first run goes alone, so that the forms are compiled only once. The others run in parallel.
 
