@@ -19,7 +19,7 @@ def disc(elements, **options):
     return fx.mesh.disc(radius=10.0, thickness=0.5, elements=elements, **options)
 
 
-def test_pilot_puts_columns_on_the_edge():
+def test_columns_of_a_pilot_run_resolve_the_plug_edge():
     """The run on adapted columns: they fit the edge, others stay long; the force is that of a finer mesh."""
     path = plugged(disc((20, 1)), adapt_mesh={"max_rotation": 0.5})
     ends = path.problem.scene.mesh.columns.ends
@@ -35,7 +35,7 @@ def test_pilot_puts_columns_on_the_edge():
     assert abs(path.last.measures["tool_force"] / fine - 1) < max(2e-3, 0.5 * abs(pilot / fine - 1))
 
 
-def test_an_error_of_the_stress_is_met():
+def test_adapted_columns_meet_the_requested_stress_error():
     """Columns that share the error: fewer than uniform ones of the same error, which is near what was asked for."""
     def inflated(mesh):
         scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
@@ -49,7 +49,7 @@ def test_an_error_of_the_stress_is_met():
     assert found < min(first / 2, uniform) and columns < 24
 
 
-def test_layers_parts_and_bodies_of_all_kinds_keep_their_shape():
+def test_adapted_meshes_keep_volume_names_and_interfaces():
     """Every builder's mesh made again: the same volume, names and interfaces; ends that must stay do."""
     layers = {"core": {0.0: 0.4, 10.0: 0.2}, "skin": 0.1}
     line = [(0, 0), (20, 0), (30, 40)]
@@ -72,7 +72,7 @@ def test_layers_parts_and_bodies_of_all_kinds_keep_their_shape():
         assert set(mesh.columns.fixed) <= set(ends)
 
 
-def test_present_area_holds_what_is_pressed_flat():
+def test_force_of_a_block_compressed_to_a_twentieth_is_exact():
     """A block 20 times flatter: the force is exact to 1e-3 where the penalty of the block at rest is off by 1e-2."""
     def pressed(**options):
         block = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2))
@@ -88,7 +88,7 @@ def test_present_area_holds_what_is_pressed_flat():
     assert path.value("tool_force", path.states[-2]) == pytest.approx(path.states[-2].measures["tool_force"], rel=1e-12)
 
 
-def test_refusals():
+def test_wrong_arguments_of_adapted_are_refused():
     mesh = disc((4, 1))
     with pytest.raises(fx.InputError, match="adapted: max_rotation = 0"):
         fx.mesh.adapted(None, max_rotation=0)

@@ -34,7 +34,7 @@ def displaced(problem, u):
 
 
 @pytest.mark.parametrize("space", ["P1", "P1dg"])
-def test_values_are_those_of_the_deformation_gradient(space):
+def test_hoop_stretch_and_determinant_equal_those_of_ufl(space):
     """On curved elements, with bubbles that are not 0, at every point: those of UFL."""
     scene = fx.Scene(mesh=fx.mesh.sphere(inner_radius=1.0, thickness=0.5, elements=(3, 2)),
                      supports=[fx.Symmetry("axis"), fx.Symmetry("equator", normal="z")], loads=[fx.Pressure("inner")],
@@ -52,7 +52,7 @@ def test_values_are_those_of_the_deformation_gradient(space):
         assert found[quantity][:, : len(inside)] == pytest.approx(expected, abs=1e-12)
 
 
-def test_values_follow_the_fields():
+def test_stored_values_are_renewed_for_other_fields():
     """The values of the last fields are stored; other fields have other values."""
     problem = ring()
     body = displaced(problem, lambda X: (0 * X[0], 0 * X[0]))
@@ -70,7 +70,7 @@ def smallest_J(problem):
     return elements.body(problem, problem.x, 0.0).J.min()
 
 
-def test_beyond_the_axis():
+def test_a_ring_pushed_through_the_axis_is_inadmissible():
     """A ring pushed through the axis: J > 0 everywhere, both of its factors negative there."""
     problem = ring()
     whole = displaced(problem, lambda X: (0 * X[0] + 0.1, 0 * X[0]))
@@ -84,7 +84,7 @@ def test_beyond_the_axis():
     assert not turned.holds() and turned.least().value == pytest.approx(-1.0)
 
 
-def test_beside_the_quadrature_points():
+def test_negative_determinant_between_quadrature_points_is_found():
     """A midpoint moved along its edge: det < 0 near a corner, det F > 0 where the energy looks."""
     problem = ring("P1")
     forms = problem.forms
@@ -123,7 +123,7 @@ def test_membranes_and_plane_strain():
     assert Admissible(membrane.forms).least().quantity == "hoop stretch" and not Admissible(membrane.forms).holds()
 
 
-def test_not_a_number_is_no_state():
+def test_fields_with_nan_are_inadmissible():
     problem = ring()
     problem.forms.w.x.array[:] = np.nan
     assert not Admissible(problem.forms).holds() and np.isnan(Admissible(problem.forms).least().value)

@@ -34,7 +34,7 @@ def test_compression_is_equibiaxial_tension():
     assert nearest_test(*strain("uniaxial", 0.3)[0]) == "equibiaxial"
 
 
-def test_between_two_modes_and_beyond_them():
+def test_modes_between_two_tested_modes_are_covered_up_to_their_strain():
     tested = MeasuredRange.from_stretches({"uniaxial": (1.0, 4.0), "equibiaxial": (1.0, 3.0)})
     assert not outside(tested, "pure_shear", 2.0) and outside(tested, "pure_shear", 4.5)
     assert tested.distance(strain("pure_shear", 2.0))[0] == 0 and not tested.single_mode
@@ -49,7 +49,7 @@ def blown(material, stretch=2.0, **more):
 
 
 @pytest.mark.parametrize("more", [{}, {"model": fx.Membrane()}], ids=["solid", "membrane"])
-def test_a_run_says_how_much_of_the_body_leaves_the_tests(more):
+def test_warning_names_the_volume_share_beyond_the_tests(more):
     """The volume that is thinner than in the equibiaxial tests leaves them: its share by the profile of the wall."""
     from formingx.extensions.fits.beyond_tests import strains_beyond_tests
     covered = fx.with_tests(RUBBER, uniaxial=(1, 3), equibiaxial=(1, 2.6))
@@ -81,7 +81,7 @@ def test_a_run_warns_and_check_predicts_it(caplog):
     assert "tests" not in caplog.text
 
 
-def test_a_card_says_so(tmp_path):
+def test_material_report_names_the_tested_range(tmp_path):
     data = fx.treloar1944()
     found = fx.fit(fx.Ogden, {"uniaxial": data["uniaxial"]})
     page = found.material.report(tmp_path / "card.html").read_text()
@@ -90,7 +90,7 @@ def test_a_card_says_so(tmp_path):
     assert "tested" not in RUBBER.report(tmp_path / "card.html").read_text()
 
 
-def test_in_space():
+def test_warning_for_a_sheet_in_three_dimensions():
     from formingx.extensions.fits.beyond_tests import strains_beyond_tests
     scene = fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(10.0, part="quarter"), size=4.0), thickness=0.2,
                      materials=fx.with_tests(RUBBER, uniaxial=(1, 3)), supports=[

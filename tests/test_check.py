@@ -109,7 +109,7 @@ def test_a_force_of_plane_strain_is_per_depth():
     lambda: treloar(length=1e-3, stress=1e-6),
     lambda: formed(),
 ])
-def test_good_scenes(scene):
+def test_good_scenes_have_no_findings(scene):
     report = fx.check(scene(), targets=[fx.pole_height(0.3)] if scene().contacts else [fx.pole_stretch(2.0)])
     assert report.healthy and report.findings == []
     assert "no fault was found" in str(report)
@@ -125,7 +125,7 @@ MM = fx.Units(length="mm", stress="MPa")
     ({"mould": fx.tools.Tool([(28.0, 31.2), (28.0, 1.2), (80.0, 1.2)], [0.0, 3.0, 0.0])},
      r"is open: straight ahead of \(R, Z\) = \(0, 1.2\).* pressure = 0.09 is more than the 0.04405 MPa"),
 ])
-def test_what_engineers_mistake(given, words):
+def test_common_input_mistakes_are_found(given, words):
     """In the pot of the README, in which nothing else is found."""
     scene, stages = pot()
     assert fx.check(scene, stages=stages, units=MM).healthy and fx.check(scene).healthy
@@ -135,7 +135,7 @@ def test_what_engineers_mistake(given, words):
     assert [f.about for f in others] == (["materials['sheet']"] if "c10" in given else [])
 
 
-def test_the_table_of_a_stage_is_looked_at():
+def test_targets_in_tables_of_stages_are_checked():
     scene, _ = pot()
     stage = fx.Stage("vacuum", amplitudes={"vacuum": [(0.0, 0.0), (1.0, 9e4), (2.0, 0.0)]})
     assert "the table of 'vacuum' in Stage 'vacuum': it is 1.1e+05" in str(fx.check(scene, stages=[stage]))
@@ -150,7 +150,7 @@ def test_the_table_of_a_stage_is_looked_at():
     (lambda: formed(tool=drilled()), [fx.pressure(1.0)], "the mould is open"),
     (lambda: formed(tool=drilled()), [], "the mould is open"),
 ])
-def test_what_no_state_follows(make, targets, words):
+def test_targets_without_equilibrium_are_found(make, targets, words):
     finding, = fx.check(make(), targets=targets).findings
     assert finding.severity == "warning" and re.search(words, str(finding)), str(finding)
 
@@ -162,7 +162,7 @@ def test_what_no_state_follows(make, targets, words):
     (lambda: bottle(fx.Gent(mu=0.8, Jm=30.0), 3.0), [fx.pressure(1.0)]),
     (lambda: bottle(fx.NeoHookean(c10=0.4), 2.0), [fx.pressure(1.0)]),
 ])
-def test_what_has_states(make, targets):
+def test_targets_with_equilibrium_pass(make, targets):
     assert fx.check(make(), targets=targets).healthy
 
 
@@ -230,7 +230,7 @@ def test_rows_of_elements_under_a_sharp_edge():
     (lambda: gripped(), [fx.displacement(0.1, at=(10.0, 0.25))], "warning", "Clamped.* holds"),
     (lambda: treloar(), [fx.pole_stretch(0.5)], "warning", "starts at 1"),
 ])
-def test_findings(make, targets, severity, words):
+def test_each_fault_of_a_scene_has_its_finding(make, targets, severity, words):
     report = fx.check(make(), targets=targets)
     assert len(report.findings) == 1, str(report)
     assert report.findings[0].severity == severity
@@ -269,7 +269,7 @@ def test_a_stage_refuses_what_cannot_be_met():
     assert fx.Process(scene).run([away], progress=False).last.measures["pole_height"] == pytest.approx(0.6)
 
 
-def test_a_tool_that_does_not_let_go_may_pull():
+def test_an_adhering_tool_may_be_retracted():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(20, 1)),
                      materials=fx.NeoHookean(c10=2.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", fx.tools.cylinder(radius=0.5, z=0.082), "stick", direction=(0, -1),

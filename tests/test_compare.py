@@ -75,7 +75,7 @@ def test_curves_that_turn_back_are_paired_by_arc_length():
         fx.compare(GOOD, GOOD, along="x")
 
 
-def test_a_longer_curve_is_cut():
+def test_points_beyond_the_ends_of_a_curve_are_left_out():
     t = np.linspace(0, 1, 41)
     longer = np.linspace(-0.5, 2, 51)
     found = fx.compare({"a": t, "b": t**2}, {"a": longer, "b": np.where(longer > 0, longer**2, 0)})
@@ -178,7 +178,7 @@ def test_numbers_near_the_largest():
             fx.compare(GOOD, theirs)
 
 
-def test_a_cell_without_end(tmp_path):
+def test_an_oversized_csv_cell_is_refused(tmp_path):
     file = tmp_path / "long.csv"
     file.write_text("a,b\n0,0\n1," + "1" * 200_000 + "\n2,2\n")
     with pytest.raises(fx.InputError, match=r"long.csv', line 3: field larger than field limit \(131072\)"):

@@ -83,7 +83,7 @@ def test_a_run_calls_the_compiler_a_few_times(monkeypatch):
     assert calls == [1, 1, 8, 4, 2]
 
 
-def test_an_interruption_leaves_nothing_that_counts(calls, tmp_path, monkeypatch, domain):
+def test_an_interrupted_compilation_leaves_no_library(calls, tmp_path, monkeypatch, domain):
     """Neither a compiler that is stopped, nor a file that was written in part."""
     def interrupted(command, code):
         raise KeyboardInterrupt

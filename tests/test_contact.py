@@ -92,7 +92,7 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
 
 @pytest.mark.parametrize("mu", [0.0, np.inf])
 @pytest.mark.parametrize("touched", [True, False])
-def test_a_tool_that_holds(mu, touched):
+def test_stiffness_of_an_adhering_tool_is_the_derivative_of_its_force(mu, touched):
     """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
     law = Law(TOOL, mu, K, THETA, SLIP, pulls=True)
     x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
@@ -117,7 +117,7 @@ def test_force_is_continuous(mu):
     assert np.abs(a - b).max() < 10 * K * step
 
 
-def test_a_shear_limit_of_ones_own():
+def test_stiffness_of_a_user_defined_shear_limit():
     """The stiffness is the derivative of the force, stuck and sliding, below the strength and at it; no force jumps."""
     strength, mu = 0.3 * K * THETA, 0.3
 
@@ -159,7 +159,7 @@ def test_an_accepted_state_keeps_its_forces(mu):
 
 
 @pytest.mark.parametrize("mu", [0.3, np.inf])
-def test_points_that_are_guessed_are_linearised_where_they_begin(mu):
+def test_predicted_points_are_linearised_at_their_positions_in_the_first_iteration(mu):
     """In the first iteration: by the law where they are, not where their motion is predicted; then as the others."""
     law = Law(TOOL, mu, K, THETA, SLIP)
     x, tangent = points_near(TOOL, SIDES)
@@ -189,7 +189,7 @@ def test_a_point_slides_after_the_same_slip_at_every_pressure(depth):
     assert back.tangential == pytest.approx(np.zeros(4), abs=1e-6 * mu * found.normal[0])
 
 
-def test_what_friction_gains_in_a_cycle_of_pressure_vanishes_with_the_elastic_slip():
+def test_energy_gained_in_a_pressure_cycle_vanishes_with_the_elastic_slip():
     """Slip under little pressure and back under more: the traction returns mu (N2 - N1) g^2 / (2 g_s), no more."""
     mu, low, high = 0.4, 2 * THETA, 10 * THETA
     law = Law(tools.plane(0.0), mu, K, THETA, SLIP)
@@ -271,7 +271,7 @@ def test_default_penetration_is_small():
     assert path.last.measures["penetration"] < 1e-3 * path.profile().thickness.min()
 
 
-def test_length_in_touch_does_not_depend_on_the_node_on_the_axis():
+def test_contact_length_does_not_depend_on_the_node_on_the_axis():
     """It bears nothing, and stands a little off, or not, by the steps: 8.083 with one node a step."""
     found = [form(cup("stick", (20, 1), nodes_per_step=n), 30.0).last.measures["contact_length"] for n in (None, 1)]
     assert found == pytest.approx([8 + 1 / 6] * 2)
@@ -340,7 +340,7 @@ def test_thickness_does_not_depend_on_the_largest_step(friction):
     assert max(changes) < 2e-3, changes
 
 
-def test_coulomb_goes_over_into_free_and_stick():
+def test_coulomb_friction_tends_to_frictionless_and_to_stick():
     pole = {f: form(cup(f), 15.0).profile().thickness_ratio[0] for f in ("none", 0, 1e-3, 0.05, 0.3, 10, "stick")}
     assert pole[0] == pole["none"]
     assert pole[1e-3] == pytest.approx(pole["none"], rel=5e-3)
@@ -362,7 +362,7 @@ def test_gap_closures_cost_few_iterations_and_change_no_state(friction, close, m
     np.testing.assert_allclose(settled.profile().thickness, plain.profile().thickness, rtol=close)
 
 
-def test_a_scene_pays_for_what_is_in_it():
+def test_scenes_without_friction_store_no_history_variables():
     mesh = fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1))
     free = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
@@ -391,7 +391,7 @@ def test_a_moving_tool():
 
 
 @pytest.mark.parametrize("friction", ["none", "stick"])
-def test_a_plate_that_holds_pulls(friction):
+def test_an_adhering_plate_pulls_a_block_in_uniaxial_tension(friction):
     """Free to slide, the block is in uniaxial tension: N = 2 A (l - 1/l^2) (c10 + c01 / l); stuck, it is stiffer."""
     c10, c01, l = 1.0, 0.2, 1.4                               # noqa: E741
     mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(4, 4))
@@ -429,7 +429,7 @@ def scene_with(contact, pressed="bottom"):
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure(pressed)], contacts=[contact])
 
 
-def test_what_never_slides_is_stick():
+def test_coulomb_friction_that_never_slides_equals_stick():
     """Coulomb's law with a coefficient that is never reached gives the numbers of stick, one node a step."""
     paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5, nodes_per_step=1), 8.0, largest=0.02, length=0.02)
              for friction in ("stick", 1000.0, 10.0)]

@@ -119,7 +119,7 @@ def test_sliding_points_move_as_in_the_tangent():
     (ContactStatus.STICKS, (1.0, 0.3), (0.0, 1.0), 1, (0.0, 0.0)),        # is at the limit of friction
     (ContactStatus.STICKS, (1.0, 0.3), (0.0, -1.0), ContactStatus.STICKS, (0.0, -1.0)),
     (ContactStatus.STICKS, (0.0, 0.0), (-1.0, 0.0), ContactStatus.FREE, (0.0, 0.0))])   # goes away
-def test_a_point_sticks_slides_or_lets_go(before, force, moves, after, rate):
+def test_status_rates_of_a_point_that_sticks_slides_or_separates(before, force, moves, after, rate):
     """A point of unit compliance with mu = 0.3; forces, motions and rates are (normal, tangential)."""
     face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))
     points = Points([face], 0, 0, None)
@@ -176,7 +176,7 @@ def test_the_core_without_contact_events(tmp_path):
     np.testing.assert_allclose(path.profile().thickness, [float(t) for t in walls], rtol=4e-3)
 
 
-def test_iterations_that_go_to_and_fro_are_mixed():
+def test_anderson_mixing_converges_where_iterations_oscillate():
     """Two coordinates, by an iteration -3 and -0.5 times as far from a fixed point: three find it (Anderson)."""
     fixed, grows = np.array([0.4, -0.2]), np.array([-3.0, -0.5])
 

@@ -102,7 +102,7 @@ push(*sys.argv[1:])
 """
 
 
-def test_ranks_agree_and_go_on_where_others_stopped(tmp_path):
+def test_ranks_agree_and_continue_runs_of_other_ranks(tmp_path):
     """A facet's points are on one rank, its nodes may be on another."""
     one, two, three, end = (tmp_path / name for name in ("one", "two", "three", "end"))
     path = push(one)

@@ -45,7 +45,7 @@ def test_adiabatic_work_becomes_heat():
     assert abs(work) == pytest.approx(path.last.measures["strain_energy"] + lost, rel=5e-3)
 
 
-def test_half_of_the_work_heats_half_as_much_and_none_not_at_all():
+def test_temperature_rise_is_proportional_to_the_share_of_work():
     rises = {}
     for share in (1.0, 0.5, None):
         scene = pulled(work_to_heat=share)
@@ -55,7 +55,7 @@ def test_half_of_the_work_heats_half_as_much_and_none_not_at_all():
     assert rises[0.5] == pytest.approx(rises[1.0] / 2, rel=1e-9) and abs(rises[None]) < 1e-9
 
 
-def test_what_does_not_dissipate_is_refused():
+def test_dissipation_of_elastic_materials_is_refused():
     with pytest.raises(fx.InputError, match="no material of the scene dissipates work"):
         pulled(fx.NeoHookean(c10=1.0))
     with pytest.raises(fx.InputError, match="work_to_heat = -1"):
@@ -92,7 +92,7 @@ def drawn_over(length=0.5, conductance=0.1):
                                  accuracy=0.5, step=fx.StepControl(length=length, largest=length))
 
 
-def test_what_gives_off_heat_touches_node_by_node(monkeypatch):
+def test_contact_with_heat_flow_closes_one_node_per_step(monkeypatch):
     """When a node touches decides how cold it becomes: a step brings one, half an element (where none cools, more)."""
     def spreads():
         return 12 * np.diff(drawn_over()["contact_length"]).max()
@@ -101,7 +101,7 @@ def test_what_gives_off_heat_touches_node_by_node(monkeypatch):
     assert spreads() > 1.01
 
 
-def test_what_comes_to_touch_in_a_step_gives_off_heat_for_half_of_it():
+def test_new_contact_conducts_for_half_of_its_step():
     """All of it would chill too much: 0.9 degrees in the mean of long steps, of 7; half of it 0.3."""
     means = []
     for length in (0.5, 0.005):
@@ -123,7 +123,7 @@ def told(path):
             float(len(path))]
 
 
-def test_a_restart_goes_on_as_if_it_had_never_stopped(tmp_path):
+def test_a_restarted_run_equals_an_uninterrupted_one(tmp_path):
     scene = pressed()
     whole = press(scene, checkpoint=tmp_path / "run")
     assert told(whole)[1] < 120 and whole.last.measures["tool_force"] != 0
@@ -145,7 +145,7 @@ if scene.mesh.comm.rank == 0:
 """
 
 
-def test_two_ranks_are_one():
+def test_two_ranks_agree_with_one():
     one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
     assert two == pytest.approx(one, rel=1e-9)
 
@@ -168,7 +168,7 @@ def laid_on(layers, stays=0.1):
     return path, X[axis, 1], values[axis]
 
 
-def test_a_mesh_too_coarse_for_the_heat_is_said(caplog):
+def test_a_warning_names_a_mesh_too_coarse_for_heat(caplog):
     """Right after it was laid on a tool; the estimate is within a factor of 3. Its layers are fine enough."""
     _, z, T = laid_on([2 ** (k / 3) for k in range(16)])
     order = np.argsort(z)

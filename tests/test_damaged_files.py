@@ -16,7 +16,7 @@ def test_damaged_files_are_read_right_or_refused():
     assert list(found) and all(endings["bad"] == 0 and endings["InputError"] > 5 for endings in found.values()), found
 
 
-def test_another_reading_is_found(monkeypatch):
+def test_a_reader_that_drops_data_is_detected(monkeypatch):
     """A reader that leaves out what it does not understand."""
     good = damaged_files.sources
     monkeypatch.setattr(damaged_files, "sources", lambda folder: {"text": (good(folder)["text"][0], lambda file: [

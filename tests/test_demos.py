@@ -236,7 +236,7 @@ def test_throne_plug_quick(tmp_path):
         assert drawn(tmp_path / f"{picture}.png")
 
 
-def test_processes_of_a_sweep_end_with_the_one_that_began_them(tmp_path):
+def test_processes_of_a_sweep_end_with_their_parent(tmp_path):
     """A demo that is killed leaves none behind that computes for nobody."""
     script = tmp_path / "sweeping.py"
     script.write_text(f"""

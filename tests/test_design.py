@@ -55,7 +55,7 @@ def heated(heater):
 
 
 @pytest.mark.slow
-def test_heaters():
+def test_derivative_by_a_heater_temperature_includes_radiation_and_conduction():
     """The derivative by a heater temperature includes radiation and conduction, which the user's function computes."""
     design = fx.Design(heated, {"heater": (430.0, 300, 500)})
     above, below = (design.run({"heater": heater}).wall for heater in (431, 429))
@@ -82,7 +82,7 @@ def blown(b):
 
 @pytest.mark.parametrize("build", (lambda b: disc(c=b), pushed, blown, lambda b: pushed(0.0, 0.3 + b)),
                          ids=("elastic", "contact", "relaxing", "friction"))
-def test_taylor(build):
+def test_linearisation_error_is_of_second_order(build):
     """The error of the linearisation is of second order over two decades: elastic, in contact, in time, of friction."""
     design = fx.Design(build, {"b": (0.0, -1, 1)})
     run = design.run()
@@ -110,7 +110,7 @@ def test_an_even_wall():
     assert "unevenness" in str(answer) and abs(answer.predicted / answer.best.wall - 1).max() < 0.02
 
 
-def test_bad_input_is_told_in_words():
+def test_wrong_arguments_of_designs_are_refused():
     def finer(n):
         return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(int(round(8 + 1e6 * n)), 1)),
                         materials=fx.NeoHookean(c10=0.5), **CAN), fx.pole_height(0.3)
@@ -148,7 +148,7 @@ def test_bad_input_is_told_in_words():
             run.spread({"height": wrong})
 
 
-def test_what_is_not_reached_is_said():
+def test_results_name_unattainable_targets_and_the_reason():
     """Results name a wall, a volume and a minimum wall that the bounds make unattainable, and the reason."""
     design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
     answer = design.fit(wall=1.0, volume=None)
@@ -178,7 +178,7 @@ def cup(b, fillet=0.2):
                     contacts=[fx.Contact("top", mould, "stick")], **CAN), fx.pressure(0.25)
 
 
-def test_when_a_node_touches_moves_with_the_parameter():
+def test_derivatives_include_the_change_of_gap_closure_times():
     """Derivatives of a sticking sheet agree with differences of runs; with constant steps they would be 0.04 wrong.
 
     Walls within an element of the rim or the axis scatter with the steps, and do not count.
@@ -239,7 +239,7 @@ def test_forces_of_tools():
     assert to_force.derivative("travel")[1].item() == pytest.approx(-by[0, 0] / by[0, 2], rel=1e-4)
 
 
-def test_contacts_of_a_script_stay_as_they_are():
+def test_runs_of_designs_do_not_change_the_scene():
     """Runs of designs take one node per step, but the contact of the user's scene does not change."""
     mould = fx.Contact("top", fx.tools.plane(0.3), "stick")
 
@@ -266,7 +266,7 @@ def test_a_stage_that_waits_ends_where_its_target_is_met():
     assert abs(run.derivative("sag")[1].item()) < 1e-6
 
 
-def test_where_a_run_has_no_derivative_it_says_so():
+def test_runs_without_derivatives_name_the_reason():
     """A run with a stage that keeps a quantity constant in the presence of friction refuses derivatives."""
     def held(mu):
         scene, stages = pot(mu, 1.0)
@@ -318,7 +318,7 @@ def test_covariance_of_a_fit():
         run.spread([0.1])
 
 
-def test_report_says_how_sure(tmp_path):
+def test_report_shows_standard_deviations(tmp_path):
     run = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1)}).run()
     text = run.report(tmp_path / "run.html", deviations={"h": 0.002}).read_text()
     assert "How sure" in text and "volume" in text and "pressure" in text

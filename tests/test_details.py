@@ -54,7 +54,7 @@ def test_heat_flows_in_the_deformed_body(by):
     assert rates[0] == pytest.approx(rates[1], abs=1e-9 * np.abs(rates[0]).max())
 
 
-def test_a_tool_that_is_away_takes_no_heat():
+def test_an_inactive_tool_conducts_no_heat():
     plug = fx.Contact("top", tools.cylinder(radius=0.5, z=0.05), "none", direction=(0, -1), name="plug")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(4, 1)), temperature=150.0, contacts=[plug],
                      materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -86,7 +86,7 @@ def test_area_of_the_node_on_the_axis():
     assert area - lumped == pytest.approx(2 * np.pi * L**2 / 24 * np.array([1, -2, 1, *[0] * (len(R) - 3)]), abs=1e-14)
 
 
-def test_a_step_may_not_bring_a_whole_region_into_touch():
+def test_a_step_that_closes_a_whole_region_is_refused():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(8, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
                      contacts=[fx.Contact("top", tools.plane(0.2), 0.3, direction=(0, -1))])
@@ -108,7 +108,7 @@ def test_rest_is_free_of_stress_under_the_penalty():
 
 
 @pytest.mark.parametrize("tool", [tools.sphere(radius=0.5, z=0.0), tools.cup(radius=2.0, depth=1.0, fillet=0.5)])
-def test_slip_on_a_curved_tool_has_the_slope_that_is_said(tool):
+def test_derivative_of_slip_on_a_curved_tool_is_consistent(tool):
     """Where the point has gone into the tool, or out of it, since it touched, the tangent turns as it moves."""
     law = fx.Contact("top", tool, 0.3).law(1.0, 1.0, np.zeros((1, 2)))
     law.shift = 0.0
@@ -122,7 +122,7 @@ def test_slip_on_a_curved_tool_has_the_slope_that_is_said(tool):
         assert (law.motion(x, old).along @ along)[smooth] == pytest.approx(slope[smooth], abs=1e-7)
 
 
-def test_a_step_back_to_what_was_passed_is_made_shorter(monkeypatch):
+def test_a_step_back_along_the_path_is_shortened(monkeypatch):
     true, asked = path_following.was_passed, []
 
     def at_first(*args):
@@ -135,7 +135,7 @@ def test_a_step_back_to_what_was_passed_is_made_shorter(monkeypatch):
     assert path["pressure"][-1] == pytest.approx(plain["pressure"][-1], rel=1e-9)
 
 
-def test_a_tool_that_comes_in_remembers_nothing():
+def test_a_reactivated_tool_starts_without_contact_history():
     """What stuck to it before it left has moved since: it starts from where it is now."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(3, 1)), materials=fx.NeoHookean(c10=1.0),
                      supports=[fx.Symmetry("axis"), fx.Clamped("bottom")],
@@ -177,7 +177,7 @@ def test_a_target_met_on_a_far_part_of_the_path_is_a_failure(monkeypatch):
     assert path.counts.failures == 1 and all(state is not asked[0] for state in path.states)
 
 
-def test_no_parabola_goes_through_a_jump():
+def test_no_predictor_uses_states_before_a_snap_through():
     def states(kind):
         return [State(np.array([s]), 0.0, np.ones(1), 0.0, kind=k) for s, k in enumerate(["step", kind, "step"])]
 
@@ -188,7 +188,7 @@ def test_no_parabola_goes_through_a_jump():
     assert predictor.parabola_state(broken, 3.0, apart) is None
 
 
-def test_a_jump_does_not_pass_its_target():
+def test_a_snap_through_does_not_pass_its_target():
     """How far the control goes on in it ends where something that is driven has its target value."""
     class Driven(Amplitude):
         is_controlled = True
@@ -201,7 +201,7 @@ def test_a_jump_does_not_pass_its_target():
     assert targets.short_of_targets(near, 1e-3) == pytest.approx(1e-3)
 
 
-def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():
+def test_energy_lost_in_a_snap_through_is_work_of_the_mean_unbalanced_force():
     """Out of balance by 3 where it begins and by 1 where it ends; one that has turned since counts for nothing."""
     way = snap_through._Motion.__new__(snap_through._Motion)
     way.problem, way.dissipated, way._pull = SimpleNamespace(comm=MPI.COMM_SELF), 0.0, np.array([3.0, 0.0])
@@ -212,7 +212,7 @@ def test_loss_in_a_jump_is_that_of_the_mean_force_on_the_way():
     assert way.dissipated == pytest.approx(4 + 1 / 2 * 2)
 
 
-def test_a_jump_that_fails_leaves_what_is_remembered():
+def test_a_failed_snap_through_restores_history_variables():
     """One viscous solution has advanced it; that is no rest."""
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
         [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
@@ -238,7 +238,7 @@ def test_every_mutant_stands_in_its_file(monkeypatch):
     assert missing() == []
 
 
-def test_a_state_with_an_element_inside_out_is_none(monkeypatch):
+def test_a_state_with_an_inverted_element_is_refused(monkeypatch):
     path = fx.trace(treloar((4, 1)), until=fx.pole_height(0.2), progress=False)
     monkeypatch.setattr(Problem, "has_inverted_element", lambda *_: True)
     with path.problem.state_context(path.last), pytest.raises(Failure, match="inside out"):

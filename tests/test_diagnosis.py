@@ -43,7 +43,7 @@ def test_target_below_a_limit_point():
     assert "the pressure has its minimum, -0.49" in str(error) and "the target -0.6 lies below it" in str(error)
 
 
-def test_a_limit_point_that_a_path_has_left_behind_is_no_cause():
+def test_an_earlier_limit_point_is_not_named_as_cause():
     """It rose above the first maximum again."""
     facts = {"what": "travel", "limit_points": (0.54, 0.51)}
     for control, is_cause in ((0.53, True), (0.73, False)):
@@ -63,7 +63,7 @@ def test_a_pressure_in_time_beyond_its_maximum():
     assert "bifurcation" not in str(error) and "enclosed_volume" in found.advice[0]
 
 
-def test_a_state_that_no_body_can_have_says_itself_what_to_try():
+def test_an_inadmissible_state_names_its_own_remedy():
     """Of a face that sinks into its mould: the penalty; no other cause is sought, nothing else advised."""
     scene = cup("stick", (10, 1), penalty=1.0)
     error, _ = failure(lambda: fx.trace(scene, until=fx.pressure(50.0), progress=False))
@@ -123,7 +123,7 @@ def test_buckling():
     assert "such as buckling" in found.causes[0] and found.limit_points == ()
 
 
-def test_contact_that_settles_where_nodes_leave_an_edge():
+def test_contact_converges_where_nodes_slide_off_an_edge():
     """A plug whose edge (fillet 0.05) falls between the nodes (0.44 apart): they slide off it one by one."""
     plug = fx.tools.male(radius=1.905, height=30.0, base=-30.0, fillet=0.05).mirrored().moved(z=0.6985)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(20, 1)),
@@ -165,7 +165,7 @@ def test_condition_number():
 
 
 @pytest.mark.parametrize("able", [True, False], ids=["kept", "MUMPS cannot"])
-def test_solutions_with_a_scaling_that_is_kept(able, monkeypatch):
+def test_solutions_with_stored_scaling_agree_to_round_off(able, monkeypatch):
     """Of another tangent, to round-off; a MUMPS that cannot keep one makes another."""
     from formingx.problem.problem import Problem
     from formingx.solve import linear
@@ -201,7 +201,7 @@ except fx.ConvergenceError as error:
 """
 
 
-def test_ranks_tell_the_same():
+def test_ranks_give_the_same_diagnosis():
     one, two = run_json(SCRIPT, 1), run_json(SCRIPT, 2)
     assert two == pytest.approx(one, rel=1e-4)
 

@@ -75,7 +75,7 @@ def test_tutorials_have_the_same_sections(page):
     ("force 1 N", "force  1\nN", True), ("force 1 N", "forces 1 N", False), ("", "1", False),
     ("2 runs, ... s", "2 runs, 7 s", True),
     ("2 runs, ... s", "3 runs, 7 s", False), ("[1. 2.]", "[1. 2. 3.]", False), ("-1.5", "1.5", False)])
-def test_what_is_shown_is_compared(shown, printed, same):
+def test_printed_output_is_compared_to_the_shown_digits(shown, printed, same):
     with nullcontext() if same else pytest.raises(AssertionError):
         assert_shows(shown, printed)
 

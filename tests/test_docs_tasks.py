@@ -43,7 +43,7 @@ def test_task_is_found(task):
     assert len(clicks) <= CLICKS and phrase in page.read_text()
 
 
-def test_every_page_is_near():
+def test_every_page_is_three_clicks_from_the_readme():
     near = {README}
     for _ in range(CLICKS):
         near |= {file for page in near if page.is_file() for file in links(page).values()}

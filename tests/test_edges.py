@@ -32,13 +32,13 @@ def test_turn_is_that_of_the_arc_between_two_nodes(friction):
     assert np.hypot(*(edge.point - centre)) == pytest.approx(FILLET, rel=0.1)
 
 
-def test_what_sticks_has_no_edge_to_slide_over():
+def test_sticking_sheets_have_no_edge_finding():
     path = pushed(16, "stick")
     assert edges.coarsest(path, path.last) is None
 
 
 @pytest.mark.parametrize("points", ["nodes", 3])
-def test_what_is_held_does_not(points):
+def test_a_constrained_rim_has_no_edge_finding(points):
     """A rim held where the lip of a cup meets its wall rests on the lip; the next points hang beside the wall."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)), loads=[fx.Pressure("bottom")],
                      materials=fx.MooneyRivlin(c10=50.0, c01=15.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -49,7 +49,7 @@ def test_what_is_held_does_not(points):
     assert all(edges.coarsest(path, state) is None for state in path.states)
 
 
-def test_a_run_warns_where_its_force_is_not_resolved(caplog):
+def test_runs_warn_of_elements_that_turn_too_much_over_an_edge(caplog):
     """Against 120 elements: 8 that turn by more than 40 degrees are more than 1 % off, 16 and 30 less than 0.3 %."""
     exact = plug_force(pushed(120))
     for elements, warns in ((8, True), (16, False), (30, False)):

@@ -134,7 +134,7 @@ def done():
 
 
 @pytest.mark.parametrize("increments", [1, 20])
-def test_books_of_runs_at_fixed_control_are_kept(increments):
+def test_energy_balance_of_runs_at_fixed_control(increments):
     """A sheet without stiffness at rest moves at first in no proportion to its pressure: it was 18 % off."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[fx.Pressure("bottom")],
                      materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
@@ -142,7 +142,7 @@ def test_books_of_runs_at_fixed_control_are_kept(increments):
     assert np.abs(work["unbalanced"]).max() < 2e-4 * work["strain_energy"].max()
 
 
-def test_books_that_are_off_are_said(caplog, monkeypatch):
+def test_an_energy_imbalance_is_reported(caplog, monkeypatch):
     """Once, and it is a finding of the path from then on."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(12, 1)), loads=[fx.Pressure("bottom")],
                      materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
@@ -160,7 +160,7 @@ def test_books_that_are_off_are_said(caplog, monkeypatch):
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_books_are_kept(name, done):
+def test_energy_balance_of_processes(name, done):
     """What is put in is stored or lost, to half a percent at default steps (small ones under plates)."""
     path = done.setdefault(name, RUNS[name]())
     work = path.work()
@@ -230,7 +230,7 @@ def test_step_control_of_a_process_reaches_its_flows():
     assert len(run(sheet(RELAXES), stage, step=fx.StepControl(length=0.02, largest=0.02))) > 50
 
 
-def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
+def test_tangent_of_a_body_resting_on_a_tool_follows_the_tool():
     """Its points rest at the outer edge of the ramp, where there is no stiffness: the tool would move alone."""
     path = fx.trace(sheet(friction="none"), until=fx.travel(0.05), progress=False)
     start = path.states[0]
@@ -240,7 +240,7 @@ def test_a_body_that_lies_on_a_tool_has_a_tangent_that_goes_with_it():
     assert pole == pytest.approx(moved, rel=0.1)
 
 
-def test_what_a_bond_holds():
+def test_energy_stored_in_an_adhesive_bond():
     """A block is pulled by a tool that it is stuck to: the penalty is a spring; let go, the bond keeps nothing."""
     tool = fx.Contact("top", tools.plane(1.0), "none", separates=False, penalty=5.0, direction=(0, 1), name="tool")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(2, 2)), materials=RUBBER, contacts=[tool],

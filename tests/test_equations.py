@@ -105,7 +105,7 @@ def followed(until, at_limit_point=None, arch=Arch, **given):
     return record
 
 
-def test_to_a_target_through_both_limit_points():
+def test_arch_passes_both_limit_points_to_its_target():
     record = followed(2.4)
     limits = [s for s in record.states if s.kind == "limit point"]
     assert [s.control for s in limits] == pytest.approx([load(TOP), load(2 - TOP)], rel=2e-7)
@@ -114,7 +114,7 @@ def test_to_a_target_through_both_limit_points():
     assert all(s.control == pytest.approx(load(s.x[0]), abs=1e-9) for s in record.states)
 
 
-def test_snap_through():
+def test_arch_snaps_through_and_loses_the_enclosed_energy():
     """At the maximum of what it carries the arch snaps to the other root of g(x) = g(TOP), and loses g's area."""
     record = followed(2.4, at_limit_point="snap_through")
     limit, after = next((a, b) for a, b in zip(record.states, record.states[1:]) if b.kind == "jump")

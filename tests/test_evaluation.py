@@ -55,7 +55,7 @@ def test_mass_is_kept(inflated, formed):
         assert part.min_wall < part.mean_wall and part.uniformity == pytest.approx(part.min_wall / part.mean_wall)
 
 
-def test_content_of_a_closed_and_of_an_open_part():
+def test_capacity_of_closed_and_open_parts():
     """What a parison holds at rest: half a ball and a tube; and a sheet that bulged: what it swept below its face."""
     mesh = fx.mesh.parison(inner_radius=2.0, thickness=0.3, length=5.0, elements=(20, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
@@ -117,7 +117,7 @@ def test_filling_of_a_cup(formed):
         formed.filling("plug")
 
 
-def test_contact_presses_as_the_air_does(formed):
+def test_contact_pressure_equals_the_air_pressure(formed):
     """On the flat floor the sheet passes on the pressure, at the axis too; none where there is a gap, no friction."""
     table = formed.contact()
     flat = table.reference_points[:, 0] < 2.8
@@ -249,7 +249,7 @@ def test_volume_swept_where_the_rim_moves(u, swept):
     assert fx.enclosed_volume(1.0).bind(problem).value(problem.x, 0.0) == pytest.approx(swept, rel=1e-12, abs=1e-12)
 
 
-def test_what_has_no_volume_is_refused():
+def test_enclosed_volume_of_a_load_without_face_is_refused():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(2, 1)), materials=fx.NeoHookean(c10=0.5),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[Weight()])
     with pytest.raises(fx.InputError, match="enclosed_volume: the scene has .*Weight.*, which has no face"):

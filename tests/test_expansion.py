@@ -69,7 +69,7 @@ def test_restrained_cooling_against_the_closed_form():
         6 * C10 * 7e-4 / 0.5, rel=5e-3)
 
 
-def test_a_part_that_is_let_go_shrinks_to_its_free_size():
+def test_a_released_part_shrinks_to_its_free_size():
     """Held while it cools, then let go at 20 C: residual stress first, then none, and the rim at j R."""
     scene = disc(20.0, [fx.PinnedNode(0.0, 0.0), grip := fx.Symmetry("rim")])
     path = fx.Process(scene).run([fx.Stage("held", duration=1.0), fx.Stage("free", inactive=[grip])], progress=False)
@@ -94,7 +94,7 @@ def drawn_and_let_go(branches):
     return path.profile().top[-1, 0] / 4e-3, path
 
 
-def test_what_has_set_keeps_its_shape_and_shrinks():
+def test_a_solidified_part_keeps_its_shape_and_shrinks():
     """A branch that is glassy when cold (200 times as stiff) and has no time when hot freezes a sheet as it is drawn.
 
     Let go, it springs back by the small strain at which the frozen branch bears what the rubber pulls with, and by
@@ -136,7 +136,7 @@ def test_a_strip_of_two_layers_warps_as_timoshenko_says(heights, moduli):
     assert curvature == pytest.approx(exact, rel=2e-3)          # the upper shrinks more: the ends go up
 
 
-def test_the_tangent_and_the_bits_of_a_scene_without_expansion():
+def test_scenes_without_expansion_have_no_expansion_field():
     """A body at its stress-free temperature does not move; without expansion no field is made."""
     scene = disc(HOT, loads=[fx.Pressure("bottom")])
     plain = disc(HOT, loads=[fx.Pressure("bottom")], expansion=None)
@@ -157,6 +157,6 @@ def test_the_tangent_and_the_bits_of_a_scene_without_expansion():
     (lambda: disc(20.0, [fx.SimplySupported("rim")], model=fx.Membrane()), "a membrane keeps its volume"),
     (lambda: disc(20.0, model=fx.DisplacementPenalty()), "use MixedPressure"),
 ])
-def test_what_is_refused(make, words):
+def test_wrong_expansions_are_refused(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()

@@ -625,7 +625,7 @@ def test_findings_say_where_they_begin(formed):
     assert len(record.warnings()) == 2
 
 
-def test_a_verdict_is_named(inflated):
+def test_the_report_names_an_inadmissible_state(inflated):
     record = report.of_path(inflated)
     record.verdicts = ["the body folds" if k > 3 else "" for k in range(len(inflated))]
     found, = record.all_findings()
@@ -649,7 +649,7 @@ def test_command_line(inflated, tmp_path, capsys):
     assert "Trace" not in error
 
 
-def test_open_shows_a_screenful(plugged, tmp_path, capsys):
+def test_open_prints_a_short_summary(plugged, tmp_path, capsys):
     """The ends of the stages, limit points, states between them; what is driven by its own name."""
     path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(3.0), step=fx.StepControl(largest=0.05), progress=False)
     (limit,), rows = path.limit_points, []
@@ -690,7 +690,7 @@ def test_unwritable(inflated, write):
 
 
 @pytest.mark.parametrize("name", ["to_csv", "report", "animate", "view3d", "mesh"])
-def test_pipes_links_and_modes_stay(inflated, tmp_path, name):
+def test_writing_keeps_pipes_links_and_file_modes(inflated, tmp_path, name):
     """What is no regular file is written to; a link stays one, a mode and its file too; nothing is left beside."""
     ending = {"to_csv": "csv", "report": "html", "animate": "gif", "view3d": "png", "mesh": "msh"}[name]
     write = partial(inflated.animate, frames=2) if name == "animate" else getattr(

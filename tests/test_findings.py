@@ -31,7 +31,7 @@ def warnings_about(path, about):
     return [found.text for found in path.findings() if found.about == about and found.severity == "warning"]
 
 
-def test_one_scale():
+def test_findings_are_sorted_by_severity():
     """Serious ones come first; those of one severity keep their order; a moment that is not known is refused."""
     found = [Finding(*one, "") for one in (("note", "a"), ("serious", "b"), ("warning", "c"), ("note", "d"))]
     assert [f.about for f in worst_first(found)] == ["b", "c", "a", "d"]
@@ -55,14 +55,14 @@ def test_checks_of_extensions_are_registered():
     (lambda: sheet(loads=[fx.Gravity(1e-13, 9.81)]), "moves nothing"),
     (lambda: sheet(loads=[fx.CentrifugalLoad(1050.0, 100.0)]), "tears the body apart"),
 ])
-def test_quantities_of_no_polymer(make, words):
+def test_implausible_moduli_and_pressures_are_reported(make, words):
     """Said before every run; not of scenes in mm and MPa, m and Pa, in and psi."""
     found, = before_run(make())
     assert found.severity == "warning" and re.search(words, str(found)), str(found)
 
 
 @pytest.mark.parametrize("length, stress", [(1.0, 1.0), (1e-3, 1e6), (1 / 25.4, 145.0)])
-def test_quantities_of_polymers(length, stress):
+def test_plausible_quantities_in_other_units_pass(length, stress):
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0 * length, thickness=0.5 * length, elements=(12, 1)),
                      materials=fx.NeoHookean(c10=0.4 * stress), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
@@ -136,7 +136,7 @@ def test_volumes_that_a_clamped_corner_costs_are_no_warning(caplog):
         assert other.severity == "warning" and "use a finer mesh" in other.text
 
 
-def test_a_ring_is_no_mould():
+def test_a_ring_is_not_taken_for_a_mould():
     """A sheet that is blown through a ring leaves it as it should."""
     ring = fx.Contact("top", fx.tools.Tool([(8.0, 3.0), (8.0, 0.5), (12.0, 0.5)], [0.0, 0.0, 0.0]), "none")
     assert moulds(sheet(contacts=[ring])) == [] and len(moulds(sheet())) == 1

@@ -43,7 +43,7 @@ def test_constants_are_recovered(material, unit):
     assert ordered(found.material, unit) == pytest.approx(ordered(material), rel=1e-4)
 
 
-def test_own_energy():
+def test_constants_of_a_user_defined_energy_are_recovered():
     def energy(I1, I2, a, b):
         return a * (I1 - 3) + b * (I2 - 3)
     found = fx.fit(fx.Hyperelastic(energy, a=1.0, b=1.0), measured(fx.MooneyRivlin(c10=0.3, c01=0.05)))
@@ -135,7 +135,7 @@ def test_standard_errors_are_the_scatter_of_the_fits(relative):
         fits[0].intervals(1)
 
 
-def test_what_the_data_leave_open_is_named():
+def test_undetermined_constants_are_named():
     """Undetermined are a limit beyond the tests, an unnecessary second term, and a constant of I2 at small strain."""
     neo_hookean = measured(fx.NeoHookean(c10=0.3), reach=2.0)
     gent = fx.fit(fx.Gent, neo_hookean)

@@ -50,7 +50,7 @@ def test_other_equilibrium_and_no_equilibrium():
 
 
 @pytest.mark.slow
-def test_noise():
+def test_constants_are_recovered_from_noisy_tests():
     """With 2 % noise, constants are within 5 %, the misfit equals the noise, and there is no third branch."""
     data = [relaxation(P1, "uniaxial", 2.0, noise=0.02)] + [rates(P1, "uniaxial", r, 0.02) for r in (0.1, 1, 10)]
     found = fx.fit(fx.Viscoelastic, data)
@@ -60,7 +60,7 @@ def test_noise():
     assert 0.01 < found.rms_total / np.sqrt(np.mean(measured**2)) < 0.025
 
 
-def test_what_the_data_leave_open_is_named():
+def test_undetermined_branches_are_named():
     """A fast test alone determines neither the time of the slow branch nor the equilibrium modulus."""
     fast = fx.fit(P1, [rates(P1, "uniaxial", 100.0)])
     assert {"tau_2", "c10"} <= set(fast.undetermined) and "do not determine" in str(fast)
@@ -101,7 +101,7 @@ def test_result_is_admissible():
 
 
 @pytest.mark.parametrize("first", [0.05, 3.0])
-def test_a_stretch_that_is_held_was_put_on_at_time_0(first):
+def test_a_constant_stretch_is_applied_at_time_0(first):
     """A constant stretch whose rows begin later was applied at time 0: else G(0) would be 12 % too low."""
     exact = fx.Viscoelastic(fx.NeoHookean(c10=0.2), branches=[(0.4, 1.0)])
     times = first * np.geomspace(1, 100, 12)
@@ -146,7 +146,7 @@ def test_a_damping_is_recovered(damping):
     assert found.material.tested.rates == pytest.approx((0.2, 0.5))
 
 
-def test_one_mode_leaves_the_share_of_the_invariants_open():
+def test_one_mode_does_not_determine_the_share_of_the_invariants():
     """Uniaxial extension alone does not determine the share alpha of the invariants."""
     melt = fx.KBKZ([(1e4, 0.3), (1e3, 8.0)], fx.SoskeyWinter(alpha=0.02, a=0.3, b=1.5))
     l = np.exp(np.linspace(0.2, 2.0, 10))

@@ -81,7 +81,7 @@ def test_convection_and_absorption_are_those_of_the_series():
     assert run.mean_through() == pytest.approx(mean, abs=1e-4 * (exact.max() - 25))
 
 
-def test_a_sudden_temperature_at_a_face_does_not_ring():
+def test_a_temperature_step_at_a_face_causes_no_oscillation():
     """A face set to 125 C in a body at 25 C: T = 125 - 100 erf(x/sqrt(4 a t)) (Carslaw and Jaeger, section 2.4)."""
     from scipy.special import erf
     times = [0.5, 2.0]
@@ -251,7 +251,7 @@ def test_a_stretched_sheet_is_a_thinner_one():
     assert numbers[0] == pytest.approx(numbers[1], rel=1e-9)
 
 
-def test_a_displacement_that_changes_is_taken_up():
+def test_conduction_follows_a_changed_displacement():
     mesh = fx.mesh.disc(radius=4e-3, thickness=D, elements=(2, 3))
     u = stretched(mesh, 1.0)
     body, plain, fresh = (body_of(mesh, everything(), displacement=v) for v in (u, None, stretched(mesh, 1.4)))
@@ -264,7 +264,7 @@ def test_a_displacement_that_changes_is_taken_up():
     assert after == pytest.approx(right, rel=1e-12) and np.abs(after - first).max() > 0.1
 
 
-def test_turning_the_body_changes_nothing():
+def test_conduction_does_not_depend_on_rigid_rotation():
     mesh, c, s = fx.mesh.disc(radius=5e-3, thickness=TWO, elements=(2, 2)), np.cos(0.7), np.sin(0.7)
     u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
     u.interpolate(lambda x: np.stack([c * x[0] - s * x[1] - x[0], s * x[0] + c * x[1] - x[1]]))

@@ -21,7 +21,7 @@ PLACES = {"convection": ("mid", "quarter", "face", "mean"), "two_sides": ("0", "
     pytest.param("chilling", (), 2e-5, marks=pytest.mark.slow),
     pytest.param("heating", (), 2e-5, marks=pytest.mark.slow),
 ])
-def test_keys(demo, options, allowed, tmp_path):
+def test_heat_demo_summaries_are_within_their_errors(demo, options, allowed, tmp_path):
     run(f"demos/{demo}.py", "--out", tmp_path, *options)
     found = json.loads((tmp_path / "summary.json").read_text())
     for case, times in TIMES[demo].items():

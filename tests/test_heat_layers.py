@@ -37,7 +37,7 @@ def chilled(accuracy, thickness, conductance, metal, times, start=150.0, **optio
     ("draft", 1e-3, 1000.0, ALUMINIUM, 150.0), ("standard", 1e-3, 1000.0, ALUMINIUM, 150.0),
     ("draft", 4e-3, 3e4, STEEL, 200.0), ("draft", 0.3e-3, 300.0, ALUMINIUM, 90.0),
     pytest.param("fine", 1e-3, 1000.0, ALUMINIUM, 150.0, marks=pytest.mark.slow)])
-def test_presets_promise_the_temperature(accuracy, thickness, conductance, metal, start, caplog):
+def test_accuracy_presets_keep_their_temperature_error(accuracy, thickness, conductance, metal, start, caplog):
     """The promise of docs/heat.md, right after the sheet was laid on the tool."""
     with caplog.at_level(logging.WARNING, "formingx"):
         run, errors = chilled(accuracy, thickness, conductance, metal, [0.05, 0.1, 0.2], start)
@@ -98,7 +98,7 @@ def test_layers_are_the_same_body(name):
     assert len(depths) > 1 or layered(fine, depths) is fine
 
 
-def test_an_element_that_is_too_curved_is_left_and_said(caplog):
+def test_too_curved_elements_are_not_divided(caplog):
     mesh = fx.mesh.parison(inner_radius=1e-2, thickness=3e-3, length=2e-2, elements=(6, 2))
     with caplog.at_level(logging.WARNING, "formingx"):
         run = fx.heat(mesh, SHEET, [fx.ContactWithTool("outer", conductance=1000.0, tool=20.0)], start=100.0,

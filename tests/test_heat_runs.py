@@ -41,7 +41,7 @@ def test_hottest_coldest_and_when_the_sheet_is_in_a_window(heated):
     assert heated.time_to_reach(20.0, 300.0) == (0.0, None)
 
 
-def test_starts(heated, tmp_path):
+def test_initial_temperatures_given_in_all_ways_agree(heated, tmp_path):
     """A number, a function, a table, a file, a run and a Function: the same temperatures where they say the same."""
     heated.field_to_csv(tmp_path / "start.csv")
     (tmp_path / "line.csv").write_text("Z,T\n0,20\n0.003,80\n")
@@ -146,7 +146,7 @@ def test_runs_that_are_refused(changes, words, small):
         fx.heat(arguments.pop("mesh"), arguments.pop("materials"), arguments.pop("boundaries"), **arguments)
 
 
-def test_what_a_result_refuses(heated, tmp_path):
+def test_wrong_requests_to_a_heat_result_are_refused(heated, tmp_path):
     for ask, words in ((lambda: heated.at([(0.0, 2 * D)]), "not in the mesh"),
                        (lambda: heated.temperature(21.0), "must be from 0 to 20"),
                        (lambda: heated.time_to_reach(3.0, 2.0), "must be below high"),

@@ -24,7 +24,7 @@ def test_theory_of_an_even_membrane_is_the_same_both_ways():
     (("--quick",), {"membrane": (2e-4, 1e-3, 1e-3), "solid": (1e-3, 5e-3, 1e-2)}),
     pytest.param((), {"membrane": (1e-5, 1e-4, 1e-4), "solid": (2e-4, 1e-3, 5e-3)}, marks=pytest.mark.slow),
 ], ids=["quick", "full"])
-def test_keys(options, allowed, tmp_path):
+def test_demo_summary_agrees_with_membrane_theory(options, allowed, tmp_path):
     """Off membrane theory at most so much in pressure and height, in thickness, and in thickness at the hinge."""
     run("demos/heated_disc.py", "--out", tmp_path, *options)
     found = json.loads((tmp_path / "summary.json").read_text())

@@ -38,7 +38,7 @@ def inside_out(path, state):
     return bad / cells
 
 
-def test_a_run_ends_before_its_first_bad_state(caplog):
+def test_a_run_ends_before_its_first_inadmissible_state(caplog):
     with pytest.raises(fx.ConvergenceError,
                        match="elements are inside out, the worst at .* allow_inadmissible=True") as error:
         fx.trace(foot(), until=fx.travel(-0.85), progress=False)
@@ -56,7 +56,7 @@ def test_a_sheet_that_folds_ends_the_run():
         fx.trace(funnel(), until=fx.pressure(0.09), progress=False)
 
 
-def test_open_and_report_say_it_too(tmp_path):
+def test_open_and_report_name_the_inadmissible_state(tmp_path):
     from formingx.results.files import checkpoint_data
     from formingx.results.show import record
     fx.trace(foot(), until=fx.travel(-0.85), progress=False, allow_inadmissible=True, checkpoint=tmp_path / "run")
@@ -85,7 +85,7 @@ def test_a_run_says_how_much_penetration_changes_the_force(gap, penalty, caplog)
 
 
 @pytest.mark.parametrize("gap, penalty", [(0.1, 2e5), (0.6, 100)])
-def test_a_force_that_penetration_changes_by_more_than_5_percent_is_none(gap, penalty):
+def test_a_force_with_more_than_5_percent_penetration_error_is_refused(gap, penalty):
     with pytest.raises(fx.ConvergenceError, match="penetration changes the force by about .* %: give") as error:
         fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
     harder = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
@@ -93,7 +93,7 @@ def test_a_force_that_penetration_changes_by_more_than_5_percent_is_none(gap, pe
     assert path["tool_force"][-1] == pytest.approx(2 * (gap**-3 - gap), rel=5e-3)
 
 
-def test_a_pole_that_is_thinner_than_nothing_is_no_state():
+def test_a_pole_with_negative_thickness_is_inadmissible():
     """A ball on elements that are far too long for it."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(20, 1)), materials=fx.NeoHookean(c10=0.4),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -105,7 +105,7 @@ def test_a_pole_that_is_thinner_than_nothing_is_no_state():
     assert path["pole_stretch"].max() < 100
 
 
-def test_a_good_state_has_no_verdict():
+def test_an_admissible_state_has_no_warning():
     path = fx.trace(block(), until=fx.travel(0.3), progress=False)
     verdict = AdmissibilityCheck(path.problem)
     assert [verdict.reason(state) for state in path.states] == [""] * len(path)

@@ -139,13 +139,13 @@ def rough():
     return path
 
 
-def test_a_rough_plug_goes_on_where_points_leave_its_edge(rough):
+def test_a_rough_plug_continues_where_points_leave_its_edge(rough):
     assert rough["travel"][-1] == pytest.approx(6.5, rel=1e-12)
     assert np.all(np.diff(rough["travel"]) > 0)
     assert all(state.jump["dissipated"] > 0 and state.jump["moved"] > 0 for state in rough.jumps)
 
 
-def test_walls_that_a_jump_with_friction_changes_much_are_doubted(rough):
+def test_large_wall_changes_in_a_frictional_snap_through_are_reported(rough):
     snap, k = snaps.largest(rough), next(k for k, state in enumerate(rough.states) if state.kind == "jump")
     ratios = [rough.profile(rough.states[n]).wall_ratio for n in (k - 1, k)]
     assert (snap.jumps, snap.state) == (len(rough.jumps), k)
@@ -186,7 +186,7 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 
 
 @pytest.mark.slow
-def test_nor_in_shorter_steps(monkeypatch):
+def test_snap_through_states_do_not_depend_on_the_step(monkeypatch):
     """At 7.2, past the third jump; at 6.9, at its brink, which of two states a run ends in is left to round-off."""
     before = pushed(7.2, largest=0.02)["tool_force"][-1]
     monkeypatch.setattr(Run, "settings", PathFollowing(snap_through=SnapThrough(eta=3.0, falls=0.5)))
@@ -224,7 +224,7 @@ def test_a_sheet_without_friction_snaps_off_an_edge_too():
     assert path.jumps[0].measures["travel"] == pytest.approx(3.08, abs=0.05)
 
 
-def test_a_sheet_that_is_nearly_singular_comes_to_rest_after_two_snaps():
+def test_a_nearly_singular_sheet_is_in_equilibrium_after_two_snaps():
     """On a rough plug, at 8.80 and 8.82 as with steps of 0.01. With looser viscous solutions it snaps 16 times."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), "stick", (60, 2))
     path = fx.trace(made, until=fx.travel(9.5), progress=False)
@@ -232,7 +232,7 @@ def test_a_sheet_that_is_nearly_singular_comes_to_rest_after_two_snaps():
     assert min(state.jump["dissipated"] for state in path.jumps) > 5e-4
 
 
-def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
+def test_snap_through_without_equilibrium_ends_in_bounded_time():
     mesh = fx.mesh.disc(radius=10.0, thickness=0.3, elements=(12, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("bottom")],
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
@@ -244,7 +244,7 @@ def test_what_comes_to_rest_nowhere_is_said_in_bounded_time():
 
 
 @pytest.mark.slow
-def test_a_body_at_rest_where_no_state_is_found_is_not_moved_on():
+def test_a_snap_through_ends_once_the_body_is_in_equilibrium():
     """A plug and a pressure in step, where another branch starts: each jump ends once the body rests."""
     plug = fx.Contact("top", tools.sphere(radius=0.5, z=0.1), "none", direction=(0, -1), name="plug")
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
@@ -256,7 +256,7 @@ def test_a_body_at_rest_where_no_state_is_found_is_not_moved_on():
     assert error.value.path.counts.iterations < 9000        # 11600 with 400 solutions of a body that stands still
 
 
-def test_a_pot_that_is_let_go_springs_back_and_does_not_turn_inside_out():
+def test_a_released_pot_springs_back_without_inversion():
     """What the mould bore, as a load that fades by and by, would press the pot through its own base on the way."""
     path, _ = relaxing_pot.form("relaxing", 0.6, 0, (20, 1), 2e-2)
     deep = max(state.measures["pole_height"] for state in path.states if state.stage == "in the mould")

@@ -62,7 +62,7 @@ def test_steady_extension(damping):
     assert found == pytest.approx(quad(integrand, 0, 60, epsabs=1e-12, epsrel=1e-10, limit=200)[0], rel=1e-6)
 
 
-def test_at_once_and_slow():
+def test_sudden_and_slow_stretches_have_their_limits():
     melt = fx.KBKZ(SPECTRUM, DAMPINGS[0])
     assert melt.constant_rate("equibiaxial", 1e7, L) == pytest.approx(melt.stress("equibiaxial", L), rel=1e-5)
     assert melt.stress("uniaxial", 2.0) == pytest.approx(melt.relaxation("uniaxial", 2.0, 0.0))

@@ -45,7 +45,7 @@ def unimodular(rng, n):
 
 
 @pytest.mark.parametrize("name", DAMPINGS)
-def test_kernel_against_tensors_and_differences(name):
+def test_stress_and_tangent_of_the_memory_integral(name):
     rng, n = np.random.default_rng(3), 5
     law = MemoryIntegral(SPECTRUM, DAMPINGS[name], False, False)
     past, C = np.array([unimodular(rng, n) for _ in range(4)]), unimodular(rng, n)
@@ -74,7 +74,7 @@ def test_kernel_against_tensors_and_differences(name):
         assert D[:, j] == pytest.approx((stress(C + by)[0] - stress(C - by)[0]) / 2e-6, rel=1e-5, abs=1e-8)
 
 
-def test_a_guess_far_back_in_time_has_no_stress_and_nothing_is_printed():
+def test_a_trial_state_far_back_in_time_raises_no_warning():
     path = fx.Process(block(fx.KBKZ([(0.1, 1e-6), (0.02, 1.0)]))).run(
         [fx.Stage("pull", control="grip", until=fx.travel(0.1), duration=0.1)], progress=False, accuracy="draft")
     problem, F = path.problem, path.problem.x.duplicate()
@@ -156,7 +156,7 @@ def test_irreversible_damping_does_not_come_back():
 
 
 @pytest.mark.parametrize("irreversible", [False, True])
-def test_what_is_saved_goes_on_as_it_was(irreversible, tmp_path):
+def test_a_run_continues_from_saved_past_states(irreversible, tmp_path):
     def scene():
         return block(fx.KBKZ(SPECTRUM, DAMPINGS["psm"], shift=fx.WLF(17.44, 51.6, 100.0), irreversible=irreversible),
                      temperature=105.0)
@@ -217,7 +217,7 @@ def test_kbkz_demo_quick(tmp_path):
     assert drawn(tmp_path / "kbkz.png")
 
 
-def test_where_a_step_ruptures():
+def test_rupture_stretch_is_the_maximum_of_the_sudden_stress():
     """The largest h (B11 - B33) in equibiaxial extension; without damping there is none."""
     psm, wagner = fx.KBKZ(SPECTRUM, DAMPINGS["psm"]), fx.KBKZ(SPECTRUM, DAMPINGS["wagner"])
     assert psm.rupture_stretch("equibiaxial") == pytest.approx(1.794, abs=3e-3)
@@ -225,7 +225,7 @@ def test_where_a_step_ruptures():
     assert fx.KBKZ(SPECTRUM).rupture_stretch("equibiaxial") == np.inf
 
 
-def test_a_melt_that_sets():
+def test_a_solidified_melt_keeps_its_stress():
     """`Solidification` over K-BKZ: the glass holds what the melt pulls with when it is let go."""
     l, melt, G = 1.5, fx.KBKZ(SPECTRUM, DAMPINGS["wagner"]), 100.0
     heat = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000.0)
@@ -250,7 +250,7 @@ def test_a_melt_that_sets():
     (lambda: fx.KBKZ(SPECTRUM, irreversible=1), "True or False"),
     (lambda: fx.LuoTanner(n=0.1, beta=2.0), "LuoTanner: beta"),
 ])
-def test_what_is_refused(make, words):
+def test_wrong_kbkz_arguments_are_refused(make, words):
     if words is None:
         assert make().shear_modulus > 0
         return
@@ -258,7 +258,7 @@ def test_what_is_refused(make, words):
         make()
 
 
-def test_a_card_of_viscosities():
+def test_moduli_from_viscosities():
     assert fx.KBKZ.of_viscosities([(12.9, 1e-4), (94.8, 1e-3)]).spectrum == pytest.approx(
         [(129000, 1e-4), (94800, 1e-3)])
 
@@ -271,7 +271,7 @@ def ruptures(volume):
     return scene, fx.Stage("blow", control="air", amplitudes={fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})
 
 
-def test_a_damped_melt_that_ruptures_is_said():
+def test_rupture_of_a_damped_melt_is_reported():
     """The run ends at the axis, in words; check has said so before; not of a mild draw, nor without damping."""
     scene, stage = ruptures(3.5)
     with pytest.raises(fx.ConvergenceError, match="the sheet thins without end at .R, Z.") as raised:
@@ -291,7 +291,7 @@ def test_a_damped_melt_that_ruptures_is_said():
 
 
 @pytest.mark.slow
-def test_what_is_left_out_of_many_states_does_not_add_up():
+def test_dropped_past_states_change_the_stress_little():
     """An equibiaxial block at a Hencky rate to stretch 5 in 800 steps: within 0.05 % of the integral."""
     law, end = fx.published()["LDPE melt 150 C"].material, float(np.log(5.0))
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1)), materials=law,

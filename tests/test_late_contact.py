@@ -30,7 +30,7 @@ def serious(path):
 
 @pytest.mark.parametrize("more", [{}, {"friction": "none"}, {"tool": fx.tools.revolved(fx.tools.sphere(
     radius=35.0, z=0.5))}])
-def test_nothing_is_in_a_tool_at_a_target(drawn, more):
+def test_no_point_penetrates_a_tool_at_a_target(drawn, more):
     """Targets are met exactly, of a box one of the force, too; between them points do come late."""
     targets = [fx.travel(5.0), *([] if more else [fx.force(2.0)]), fx.travel(20.0)]
     path = fx.trace(draw(16.0, **more), until=targets[-1], intermediate=targets[:-1],
@@ -52,7 +52,7 @@ def test_a_stage_ends_without_late_contact():
         assert end.measures["penetration"] < 2e-3 * THICKNESS
 
 
-def test_a_point_deep_in_a_tool_is_told_in_words(drawn):
+def test_deep_penetration_is_reported(drawn):
     """A penetration of 0.2 at the last state is a serious finding; one of 5 makes the state inadmissible."""
     path = drawn
     state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)

@@ -33,7 +33,7 @@ def home_file():
 
 
 @pytest.mark.skipif(not built(), reason="needs to run as root inside a Debian root that ./fx built")
-def test_what_is_written_is_there(tmp_path, home_file):
+def test_written_files_exist_at_their_paths(tmp_path, home_file):
     """In the temporary folder, beside and above the current one, at home; elsewhere it fails with words."""
     (tmp_path / "a" / "b c").mkdir(parents=True)
     places = ["here.csv", "../up.csv", "../../further up.csv", tmp_path / "x.csv", home_file]
@@ -50,7 +50,7 @@ def test_what_is_written_is_there(tmp_path, home_file):
     assert fx("sh", "-c", "exit 7", FX="root").returncode == 7
 
 
-def test_what_a_container_sees(tmp_path):
+def test_container_mounts_the_writable_folders_alone(tmp_path):
     """The run line of an engine: all that a command may write is mounted, the rest of the container is read-only."""
     stub = tmp_path / "bin" / "docker"
     stub.parent.mkdir()

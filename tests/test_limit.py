@@ -36,7 +36,7 @@ print(matplotlib.pyplot.get_fignums())"""
     assert printed == "False [] True\n[]\n"
 
 
-def test_nearest_points_are_those_of_a_tree():
+def test_nearest_points_equal_those_of_a_search_tree():
     points, places = (np.random.default_rng(k).random((n, 2)) for k, n in ((1, 60), (2, 50)))
     places = places.reshape(2, 25, 2)
     for found, wanted in zip(mesh_nodes.nearest(points, places), cKDTree(points).query(places)):
@@ -56,7 +56,7 @@ def cup(friction="stick", **options):
                           contacts=[limit.fx.Contact("top", scene.contacts[0].tool, friction, **options)])
 
 
-def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
+def test_tool_distances_are_evaluated_once_for_the_same_points(monkeypatch):
     """Of 19 evaluations a state, beside those of iterations, four follow its points and three check the state.
 
     (Contact events that are predicted one after the other need more evaluations a state, and fewer in all.)
@@ -77,7 +77,7 @@ def test_a_tool_is_looked_at_once_for_the_same_points(monkeypatch):
 
 
 @pytest.mark.parametrize("friction", ["stick", "none"])
-def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction):
+def test_the_path_tangent_uses_the_stored_factors(monkeypatch, friction):
     update_ahead, found, changed = BorderedNewton.update_ahead, [], [0.0]
 
     def beside_other_factors(self, x, control):
@@ -97,7 +97,7 @@ def test_the_tangent_ahead_comes_from_the_factors_at_hand(monkeypatch, friction)
     assert (max(changed) > 1e-3) == (friction == "stick")           # nodes that have just arrived
 
 
-def test_what_materials_remember_is_computed_four_times_a_step(monkeypatch):
+def test_internal_variables_are_computed_four_times_per_step(monkeypatch):
     """Once, in two halves for the error, and half way for the energy dissipated (Simpson's rule): an accepted state
     takes the predicted values."""
     calls, after = [0], MaterialHistory._after

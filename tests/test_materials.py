@@ -212,7 +212,7 @@ def test_second_derivatives_of_powers_do_not_jump(alpha):
 
 @pytest.mark.parametrize("material", [fx.Gent(mu=1.0, Jm=20.0), fx.ArrudaBoyce(mu=1.0, N=8.0)],
                          ids=lambda m: type(m).__name__)
-def test_limit(material):
+def test_stress_grows_up_to_the_limiting_stretch(material):
     """The stress grows without bound up to the limit; beyond it an error states the limit."""
     for mode in MODES:
         limit = material.largest_stretch(mode)
@@ -326,7 +326,7 @@ def test_any_two_stretches_and_true_stress(material):
     (fx.KBKZ([(0.3, 1.0)], fx.PSM(10.0, 0.05), shift=fx.WLF(17.44, 51.6, 100.0)),
      {"temperatures": [100.0, 120.0]},
      ["stretch at which it ruptures when stretched suddenly, equibiaxial", "1.795", "at 120"])])
-def test_a_card(tmp_path, material, options, words):
+def test_material_report_is_one_page(tmp_path, material, options, words):
     """The card is one page with an embedded picture; an error names a missing temperature."""
     page = material.report(tmp_path / "card.html", **options).read_text()
     assert all(word in page for word in (*words, "data:image/png;base64,", "crystallisation")), page[:500]

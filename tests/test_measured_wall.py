@@ -30,7 +30,7 @@ def noisy(truth, noise=0.0, seed=0):
     return fx.MeasuredWall(wall=wall * (1 + noise * np.random.default_rng(seed).standard_normal(14)), length=s)
 
 
-def test_points_are_where_they_are_by_any_measure(truth):
+def test_positions_by_length_point_and_reference_length_agree(truth):
     """By length, by (r, z) and by the place on the flat sheet: the same walls; a point that lies off is named."""
     profile, numbers = truth.profile, [0, 3.5, 8, 12.25]
 
@@ -50,7 +50,7 @@ def test_points_are_where_they_are_by_any_measure(truth):
     assert left.get_ylabel() == "wall" and right.get_ylabel() == "deviation, %"
 
 
-def test_a_fit_finds_what_the_wall_tells(truth):
+def test_fitted_parameters_and_covariance_are_recovered(truth):
     """Without noise the true values; with noise these, within the intervals, and a covariance by hand."""
     design = fx.Design(cap, RANGES)
     first = design.run()
@@ -70,7 +70,7 @@ def test_a_fit_finds_what_the_wall_tells(truth):
     assert "measured" in [line.get_label() for line in answer.plot_wall().lines]
 
 
-def test_what_the_wall_does_not_tell(truth):
+def test_undetermined_and_indistinguishable_parameters_are_named(truth):
     """Blown to a height, stiffness has no effect; two thicknesses that only their sum changes cannot be told apart."""
     part = noisy(truth, 0.01)
     sure = fx.Design(cap, RANGES | {"scale": (1.0, 0.5, 2.0)}).fit(wall=part, start=TRUE, max_runs=1).confidence

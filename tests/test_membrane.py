@@ -207,7 +207,7 @@ def test_reference_volume_of_an_uneven_sheet(tmp_path):
     ([fx.Symmetry("axis"), fx.SimplySupported("rim"), fx.Symmetry("top", "z")], "bottom", "held at its ends only"),
     (None, "rim", "its upper face only"),
 ])
-def test_what_a_membrane_cannot_have(supports, on, words):
+def test_supports_that_membranes_cannot_have_are_refused(supports, on, words):
     with pytest.raises(fx.InputError, match=words):
         Problem(sheet(supports=supports, on=on))
 
@@ -217,7 +217,7 @@ def test_no_stress_through_the_thickness():
         Problem(sheet()).forms.bodies  # noqa: B018
 
 
-def test_off_the_mid_surface():
+def test_displacement_targets_off_the_mid_surface_are_refused():
     with pytest.raises(fx.InputError, match="mid-surface"):
         trace(sheet(), fx.displacement(0.1, at=(0.5, 0.0)))
     path = trace(sheet(), fx.displacement(0.1, at=(0.5, 0.005)))
@@ -265,7 +265,7 @@ def test_negative_ogden_exponents(alpha):
 @pytest.mark.parametrize("material", [MATERIALS[1], fx.Viscoelastic(MATERIALS[0], [(1.0, 1.0)])],
                          ids=["rubber", "relaxes"])
 @pytest.mark.parametrize("stretch", [0.93, 1.04])
-def test_compression_is_said(material, stretch, caplog, tmp_path):
+def test_compressive_resultants_are_reported(material, stretch, caplog, tmp_path):
     """A flat sheet whose rim moves: the resultant over mu h is (1 - l^-6)(c10 + l^2 c01)/(c10 + c01) all over."""
     body = fx.mesh.disc(radius=1.0, thickness={"a": 0.01, "b": 0.02}, elements=(4, 1))
     scene = fx.Scene(mesh=body, materials=material, model=fx.Membrane(),
@@ -282,7 +282,7 @@ def test_compression_is_said(material, stretch, caplog, tmp_path):
     assert ("membrane is in compression" in path.report(tmp_path / "run.html").read_text()) == said
 
 
-def test_where_elements_meet_the_wall_is_the_mean_of_both():
+def test_wall_at_an_element_boundary_is_the_mean_of_both_elements():
     """Which of them a point counts to is left to round-off: the wall is not."""
     walls = [trace(sheet(10, thickness=lambda R, k=k: 0.01 * (1 + 1e-6 * np.sin(k * R))), fx.pole_stretch(1.5))
              .profile().thickness for k in (0, 37, 61, 83)]

@@ -256,7 +256,7 @@ def test_bad_files(tmp_path, what):
         read(tmp_path, text)
 
 
-def test_square_is_read(tmp_path):
+def test_a_text_mesh_of_a_square_is_read(tmp_path):
     mesh = read(tmp_path, SQUARE)
     assert mesh.nodes_of("top").tolist() == [[0, 1], [1, 1]] and list(mesh.layers) == ["sheet"]
     apart = changed(("$Nodes\n4", "$Nodes\n6"), ("4 0 1 0\n", "4 0 1 0\n5 0 5 0\n6 1 5 0\n"), ("2 1 2 3 2 3 4",

@@ -18,7 +18,7 @@ def peaks(case, refinements, travel=2.0):
     return found
 
 
-def test_a_coarse_mesh_knows_what_it_resolves():
+def test_a_coarse_mesh_reports_an_unresolved_stress_peak():
     """Both have their largest stress on the lower face; only under the sharp edge may there be a larger one."""
     fillet, sharp = peaks("fillet", (1,))[0], peaks("sharp", (1,))[0]
     for found in (fillet, sharp):

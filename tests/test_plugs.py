@@ -39,7 +39,7 @@ def test_work_on_a_membrane_is_its_energy(friction):
     assert (at.face_stretch == 1) == (friction == "stick")
 
 
-def test_membrane_limits():
+def test_membrane_forces_scale_with_moduli_and_balance_at_the_edge():
     """The force is proportional to the moduli; for a sliding membrane it is 2 pi rp T sin(slope) at the edge."""
     twice = membrane_under_plug(3.0, **{**SHEET, "c10": 0.2426, "c01": 0.06654})
     assert twice.force == pytest.approx(2 * membrane_under_plug(3.0, **SHEET).force, rel=1e-8)
@@ -76,7 +76,7 @@ def test_extreme_plugs(plug):
         assert np.abs(path.last.x).max() < 1e-6
 
 
-def test_a_path_never_comes_back_to_itself():
+def test_a_repeated_state_of_the_path_is_refused():
     """Beyond the pressure maximum a state of the rising branch is refused; one of the falling branch is not."""
     path = fx.trace(treloar(), until=fx.pole_stretch(4.0), progress=False)
     risen, fallen = path.state_at(fx.pressure(0.46)), path.state_at(fx.pressure(0.46), after=path.limit_points[0])

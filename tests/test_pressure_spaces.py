@@ -113,7 +113,7 @@ def test_probe_reads_the_element_of_the_displacement(space):
     assert row.dot(x) * problem.forms.length == pytest.approx(np.sum(factors * exact.reshape(3, 2)), rel=1e-12)
 
 
-def test_arc_length_does_not_know_the_space():
+def test_arc_length_does_not_depend_on_the_pressure_space():
     """A rigid motion is as long in all spaces, but for the ends, where P2 has lumped masses below 0 that count as 0."""
     sizes = []
     for space in SPACES:

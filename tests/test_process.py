@@ -98,7 +98,7 @@ def test_one_stage_is_a_trace():
     assert traced.columns == staged.columns and np.array_equal(traced.last.x, staged.last.x)
 
 
-def test_beyond_a_limit_point_and_back():
+def test_a_process_passes_a_limit_point_and_returns():
     """A stage that ends on the falling branch; the next goes back by pole height, through the maximum, to rest."""
     mesh = fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1))
     p = fx.Pressure("bottom")
@@ -113,7 +113,7 @@ def test_beyond_a_limit_point_and_back():
     assert first_at_this_height.measures["pressure"] == pytest.approx(path.last.measures["pressure"], rel=1e-9)
 
 
-def test_tables():
+def test_stages_with_tables_hit_the_knots_exactly():
     """Knots are hit exactly; the end is that of driving one thing after the other; what waits stays."""
     tables = {"plug": [(0, 0), (1, 1.0), (2, 1.0), (4, 2.0)], "air": [(2.5, 0.0), (3, 0.02), (5, 0.05)]}
     path = run(plugged(), Stage("machine", amplitudes=tables, intermediate=[fx.process_time(3.5)], step=STEP))
@@ -132,7 +132,7 @@ def test_tables():
 
 
 @pytest.mark.parametrize("end", [1e-20, 1e-12, 1e12])
-def test_time_has_no_smallest_length(end):
+def test_tables_do_not_depend_on_the_unit_of_time(end):
     """Without materials that know time a table is the same in any unit of time."""
     scene = fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom", name="air")],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
@@ -255,7 +255,7 @@ def test_two_tools_on_one_face():
     assert path.last.measures["ring_force"] > 0.01 and end(path, "plug").measures["ring_force"] == 0
 
 
-def test_a_tool_that_leaves():
+def test_the_force_of_a_removed_tool_fades_away():
     """Its force fades away; the sheet is then as if it had never been there; it comes back only where no body is."""
     path = run(plugged("stick"), plug("down", 2.0), Stage("gone", inactive=["plug"], step=STEP),
                air("blow", 0.02, inactive=["plug"]), plug("home", -4.0, inactive=["plug"]), plug("again", -1.0))
@@ -267,7 +267,7 @@ def test_a_tool_that_leaves():
         run(plugged("stick"), air("blow", 0.02, inactive=["plug"]), plug("again", 1.0))
 
 
-def test_a_load_that_is_left_out_reads_nothing(tmp_path):
+def test_an_inactive_load_has_no_value_in_its_columns(tmp_path):
     """It leaves and comes back gradually, and its columns say what acts; its value waits for it."""
     path = run(plugged(), air("on", 0.05), Stage("off", inactive=["air"], step=STEP),
                plug("down", 0.5, inactive=["air"]),
@@ -343,7 +343,7 @@ def test_checkpoint(tmp_path):
         assert len(path) == len(whole) and same(path.last, whole.last, 1e-10)
 
 
-def test_the_record(tmp_path, there_and_back):
+def test_record_and_csv_of_a_process_are_complete(tmp_path, there_and_back):
     path = there_and_back
     assert {"plug_travel", "air_pressure", "tool_force"} <= set(path.columns)
     path.to_csv(tmp_path / "process.csv")
@@ -442,7 +442,7 @@ def test_tables_follow_one_another():
     assert path["plug_travel"][-1] == pytest.approx(1.0)
 
 
-def test_tools_are_kept_apart_from_where_a_stage_ended():
+def test_tools_of_a_stage_start_where_the_previous_stage_ended():
     """How far a plug has come at a pole height is known when the next stage begins; what was computed is kept."""
     floor = fx.Contact("bottom", tools.plane(2.0).mirrored(), "none", name="floor")
     by_height = Stage("by height", control="plug", until=fx.pole_height(-1.0), step=STEP)

@@ -20,7 +20,7 @@ def plug():
 
 
 @pytest.mark.parametrize("shown, level", [(True, logging.WARNING), (False, logging.INFO)])
-def test_a_long_run_says_where_it_stands(shown, level, monkeypatch, caplog):
+def test_a_long_run_logs_its_progress(shown, level, monkeypatch, caplog):
     """Each line: how far, what limits the steps, and how long it will take; seen without asking if there is a bar."""
     monkeypatch.setattr(progress.Progress, "silence", 0.02)
     with caplog.at_level(logging.INFO, "formingx"):
@@ -60,6 +60,6 @@ def test_ctrl_c_while_it_is_imported(error, lines):
         assert "Traceback" in ended.stderr and ended.stderr.endswith("ValueError: x\n")
 
 
-def test_the_hook_is_the_usual_one_again():
+def test_importing_restores_the_exception_hook():
     script = "import sys, formingx; sys.exit(sys.excepthook is not sys.__excepthook__)"
     assert subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode == 0

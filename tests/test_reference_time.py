@@ -117,11 +117,11 @@ def expected(numbers):
     (balloon, "pressure_0.2/snap_time_s", 64.95442437),
     (balloon, "pressure_0.8/snap_time_s", 0.6223191115),
 ])
-def test_numbers(numbers, key, value):
+def test_reference_values_in_time(numbers, key, value):
     assert expected(numbers)[key] == pytest.approx(value, rel=1e-8)
 
 
-def test_keys():
+def test_reference_summary_is_complete_and_finite():
     """As many numbers as the studies need, all finite."""
     for numbers, count in ((relaxation, 2 * 5 * 7 + 2 * 3 * 6 + 5 + 8),
                            (viscoelastic_tube, 6 * 18), (balloon, 3 * 12 + 12 + 3)):

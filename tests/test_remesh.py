@@ -23,7 +23,7 @@ def pressed(friction, travel, **options):
     return fx.trace(block(friction), until=fx.travel(travel), progress=False, **options)
 
 
-def test_a_homogeneous_block_does_not_feel_it(monkeypatch):
+def test_remeshing_a_homogeneous_block_changes_no_force(monkeypatch):
     """Without friction F_old is the same everywhere: the force goes on, as do volume, energy and columns."""
     from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.kind == "target")
@@ -71,7 +71,7 @@ def test_stages_go_on_where_they_were(monkeypatch):
         assert path.state(stage=stage).measures["tool_force"] == pytest.approx(whole, rel=5e-4)
 
 
-def test_a_stuck_block_goes_on():
+def test_remeshing_a_stuck_block_keeps_its_force():
     """Remeshed where the corner crushes its elements: the force goes on to a percent, no volume is lost."""
     path = pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
     made = [state for state in path.states if state.kind == "remesh"]
@@ -91,7 +91,7 @@ def test_contact_events_are_not_predicted(monkeypatch):
     assert len(path.segments) > 1 and not any(segment.problem.limit.predicts_events for segment in path.segments)
 
 
-def test_a_mesh_without_a_state_ends_no_path(monkeypatch):
+def test_a_failed_new_mesh_is_not_part_of_the_path(monkeypatch):
     """The path of a run that fails at once on its new mesh ends before that."""
     from formingx.extensions.remeshing import remeshing
 
@@ -154,7 +154,7 @@ def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
         gmsh.finalize()
 
 
-def test_what_is_not_carried_is_refused():
+def test_scenes_that_cannot_be_transferred_are_refused():
     remesh = fx.Remesh(size=0.3)
     with pytest.raises(fx.InputError, match="several layers"):
         scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness={"a": 0.5, "b": 0.5}, elements=(2, 1)),
@@ -185,7 +185,7 @@ def test_what_is_not_carried_is_refused():
         fx.trace(block("none"), until=fx.travel(0.2), remesh=remesh, adapt_mesh=True)
 
 
-def test_any_state_goes_on_to_the_same_path(tmp_path):
+def test_a_remeshed_run_continues_from_any_state(tmp_path):
     """From before remeshing, from the state with poor elements, from the first state on the new mesh, and later."""
     scene, remesh = block("stick"), fx.Remesh(size=0.2, corner=0.1, volume_ratio=(0.8, 1.2))
     whole = fx.trace(scene, until=fx.travel(0.5), remesh=remesh, progress=False, checkpoint=tmp_path / "run")
@@ -201,7 +201,7 @@ def test_any_state_goes_on_to_the_same_path(tmp_path):
     assert again.last.measures["travel"] == pytest.approx(0.55)
 
 
-def test_results_go_on_from_mesh_to_mesh(tmp_path):
+def test_results_at_material_points_are_continuous_across_meshes(tmp_path):
     """The same points of the material are looked at on all meshes, and whatever draws and writes takes them."""
     path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)),
                    record={"u": fx.displacement(0.1, at=(0.7, 0.6), component="r")})
@@ -268,7 +268,7 @@ RELAX = [fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]),
 
 
 @pytest.mark.parametrize("material", RELAX, ids=lambda one: type(one).__name__)
-def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
+def test_internal_variables_are_transferred_to_new_meshes(monkeypatch, tmp_path, material):
     """A thick tube, blown up and left to creep: as without new meshes in both stages; and so after a kill."""
     tube = fx.mesh.from_lines([(0.5, 0.0), (0.5, 1.0)], [(1.5, 0.0), (1.5, 1.0)], elements=(5, 5))
     scene = fx.Scene(mesh=tube, materials=material, loads=[fx.Pressure("inner")],
@@ -299,7 +299,7 @@ def test_what_a_material_remembers_goes_on(monkeypatch, tmp_path, material):
             same(run(remesh=remesh, start=fx.load(tmp_path / "run", scene, state=state)), path)
 
 
-def test_supports_hold_from_where_they_are(monkeypatch):
+def test_supports_continue_on_new_meshes(monkeypatch):
     """One that is driven goes on; a hinge holds the mean of its face."""
     from formingx.extensions.remeshing import remeshing
     monkeypatch.setattr(remeshing, "_needs_remeshing", lambda record, state, remesh: state.kind == "target")
@@ -323,7 +323,7 @@ def test_supports_hold_from_where_they_are(monkeypatch):
 
 
 @pytest.mark.parametrize("heat", [False, True])
-def test_constants_and_temperatures_go_with_the_material(monkeypatch, tmp_path, heat):
+def test_constants_and_temperatures_follow_the_material(monkeypatch, tmp_path, heat):
     """A thick tube whose modulus depends on R and on the temperature, which is given, or falls from outside."""
     tube = fx.mesh.from_lines([(0.5, 0.0), (0.5, 1.0)], [(1.5, 0.0), (1.5, 1.0)], elements=(6, 6))
     outside = fx.Cooling(fx.ThermalProperties(conductivity=1.0, density=1.0, heat_capacity=1.0),
@@ -376,7 +376,7 @@ def forms_of(n):
                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")])).forms
 
 
-def test_a_deformation_is_carried_to_other_elements():
+def test_transfer_of_a_deformation_is_of_third_order():
     """F of r -> r s(z), with det F = 1: of third order, up to the faces, however it turns."""
     import ufl
 
@@ -413,7 +413,7 @@ def remeshed_at(monkeypatch, travel, n):
     return path, state
 
 
-def test_no_stress_is_lost(monkeypatch):
+def test_mean_stress_is_conserved_by_the_transfer(monkeypatch):
     """The mean of F F^T/J, that of a neo-Hookean stress, is what it was; a new mesh costs what the old was wrong by."""
     import ufl
     from dolfinx import fem

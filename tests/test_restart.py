@@ -55,7 +55,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.quick
 @pytest.mark.parametrize("name", SCENES)
-def test_any_state_goes_on_to_the_same_path(name, whole):
+def test_a_run_continues_from_any_state_to_the_same_path(name, whole):
     folder, scene, path = whole[name]
     same(fx.load(folder, scene), path, rel=0)
     for state in (0, len(path) // 2, len(path) - 2):
@@ -83,7 +83,7 @@ def test_on_another_number_of_ranks(name, ranks, whole, tmp_path):
         same(fx.trace(scene, until=SCENES[name][1], start=start, progress=False), path)
 
 
-def test_goes_on_to_another_target_and_from_memory(whole, tmp_path):
+def test_a_run_continues_to_another_target(whole, tmp_path):
     folder, scene, path = whole["hinged"]
     further = fx.trace(scene, until=fx.pole_stretch(4.0), start=path, progress=False)
     assert len(further) > len(path) == len(fx.load(folder, scene))
@@ -148,7 +148,7 @@ def killed_after(seconds, folder):
     return running
 
 
-def test_a_shorter_path_takes_no_state_away(tmp_path):
+def test_a_shorter_path_deletes_no_stored_state(tmp_path):
     scene = treloar()
     fx.solve(scene, to=0.3, increments=3).save(tmp_path / "solved")
     fx.trace(scene, until=fx.pole_stretch(1.5), progress=False, checkpoint=tmp_path / "traced")
@@ -192,7 +192,7 @@ def copied(whole, tmp_path):
 
 @pytest.mark.parametrize("file", ["0003/arrays.bin", "0003/state.json", "scene.json"])
 @pytest.mark.parametrize("how", ["cut", "changed", "gone", "empty"])
-def test_damaged(file, how, copied):
+def test_damaged_checkpoint_files_are_refused(file, how, copied):
     folder, scene = copied
     victim = folder / file
     content = victim.read_bytes()
@@ -206,7 +206,7 @@ def test_damaged(file, how, copied):
         fx.load(folder, scene)
 
 
-def test_what_is_many_numbers_is_no_text(whole):
+def test_histories_are_saved_as_arrays(whole):
     """Histories are saved as arrays: state.json does not grow with the mesh."""
     folder, _, path = whole["coulomb"]
     for k in range(len(path)):
@@ -214,7 +214,7 @@ def test_what_is_many_numbers_is_no_text(whole):
         assert len(json.dumps(variables)) < 600, variables
 
 
-def test_a_digit_that_changed(copied):
+def test_a_changed_digit_in_a_checkpoint_is_detected(copied):
     folder, scene = copied
     file = folder / "0003" / "state.json"
     text = file.read_text()
@@ -257,7 +257,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("message", OTHERS)
-def test_of_another_scene(message, whole):
+def test_a_checkpoint_of_another_scene_is_refused(message, whole):
     folder, _, path = whole["hinged"]
     with pytest.raises(fx.InputError, match=f"of another scene: .*{message}"):
         fx.load(folder, OTHERS[message]())
@@ -291,7 +291,7 @@ def test_bad_state(given, message, copied):
         fx.load(*copied, **given)
 
 
-def test_nothing_there(tmp_path):
+def test_a_missing_checkpoint_is_named(tmp_path):
     with pytest.raises(fx.InputError, match="there is no folder"):
         fx.load(tmp_path / "nothing", treloar())
     (tmp_path / "file").write_text("x")

@@ -116,7 +116,7 @@ def test_an_undercut_cup_without_friction():
     assert path["pressure"][-1] == pytest.approx(8.0, rel=1e-12) and path.profile().top[:, 1].max() > 5.29
 
 
-def test_a_jump_of_what_has_no_wall_is_no_doubt_about_it():
+def test_a_snap_through_of_a_block_has_no_wall_warning():
     """A block that rolled over: distances of opposite points mean nothing there, and were told as nan."""
     from types import SimpleNamespace
 

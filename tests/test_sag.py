@@ -66,7 +66,7 @@ def test_a_stage_waits_for_a_sag():
     assert passed.met(fx.sag(0.05)).time == pytest.approx(met.time, rel=2e-3)
 
 
-def test_a_sag_that_does_not_come_is_said():
+def test_an_unreachable_sag_is_reported():
     with pytest.raises(fx.ConvergenceError, match="sag = 0.5 was not reached within its duration of 1: it is 0.0"):
         creeping(fx.sag(0.5), duration=1.0)
     with pytest.raises(fx.InputError, match="or duration=..., the longest time"):

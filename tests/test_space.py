@@ -127,7 +127,7 @@ def test_a_reflected_mesh_is_symmetric():
         assert area == pytest.approx(4 * quarter, rel=1e-9)
 
 
-def test_triangles_as_a_pilot_run_asks_for():
+def test_triangles_refined_by_a_pilot_run_are_as_accurate():
     """With triangles that a pilot run refined, walls are as accurate as with small triangles everywhere."""
     path = fx.trace(trough(), until=fx.pressure(1.2), adapt_mesh={"error": 0.1}, progress=False)
     even = fx.trace(trough(size=0.075), until=fx.pressure(1.2), progress=False)
@@ -245,7 +245,7 @@ def test_box_distance_is_exact():
     np.testing.assert_allclose(plug.signed_distance([(0, 0, -0.2), (0, 0, 0.1)]), [-0.2, 0.1], atol=1e-12)
 
 
-def test_tool_files_are_looked_over(tmp_path):
+def test_tools_from_stl_have_exact_distances_and_known_undercuts(tmp_path):
     box = fx.tools.box(half=(1.0, 1.5), depth=1.0, corner=0.3, fillet=0.2, draft=3.0)
     box.to_stl(tmp_path / "box.stl", wall=0.3)
     solid = fx.tools.solid(tmp_path / "box.stl")
@@ -589,12 +589,12 @@ def test_moulds_from_files_fill(make, tmp_path):
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: 1e-5 + x * x), "more than 500000 triangles"),
     (lambda: fx.mesh.sheet(fx.mesh.circle(1.0), lambda x, y: np.nan if 1e-3 < x < 0.02 else 0.03), "size at.*nan"),
 ])
-def test_what_is_not_proven_is_refused(make, words):
+def test_unsupported_scenes_in_three_dimensions_are_refused(make, words):
     with pytest.raises(fx.InputError, match=words):
         make()
 
 
-def test_a_path_in_space_gives_what_it_has(tmp_path):
+def test_results_of_sections_are_refused_for_sheets_in_three_dimensions(tmp_path):
     """A path of a sheet refuses results of sections in words; its fields of thickness agree with `Path.wall`."""
     path = fx.trace(trough(), until=fx.pressure(0.2), progress=False)
     for name in ("stability", "work", "profile", "stress", "deformed_mesh", "springback", "contact"):

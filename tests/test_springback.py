@@ -32,7 +32,7 @@ def path():
 
 
 @pytest.mark.parametrize("trim", [None, 0.7])
-def test_an_elastic_part_goes_back_to_rest(trim):
+def test_an_elastic_part_recovers_its_reference_shape(trim):
     part = blown(fx.NeoHookean(c10=0.4)).springback(trim=trim)
     assert part.before.height.max() > 0.05 and part.height < 1e-7 and part.flange_angle > 10
     F = part.path.stress().at_quadrature_points().deformation_gradient
@@ -78,7 +78,7 @@ def test_fields_of_a_part_are_those_of_the_whole(path):
 
 
 @pytest.mark.parametrize("trim", [None, 0.8e-3])
-def test_a_set_block_keeps_the_exact_stretch(trim):
+def test_a_solidified_block_keeps_the_exact_stretch(trim):
     """Drawn to 1.5, chilled in its grip, let go and trimmed: the balance of rubber and glass."""
     scene = block(fx.Solidification(BASE, modulus=200.0, between=(75, 85)), air(20.0))
     path = fx.Process(scene).run([draw(0.5), fx.Stage("chill", duration=20.0)], progress=False)
@@ -88,7 +88,7 @@ def test_a_set_block_keeps_the_exact_stretch(trim):
     assert part.shrinkage == pytest.approx(1 - balance(200.0, 1.5) / 1.5, rel=1e-5)
 
 
-def test_what_is_refused(path):
+def test_wrong_springback_arguments_are_refused(path):
     for words, arguments in (("no heat=Cooling", {"temperature": 20.0}),
                              ("the part goes from", {"trim": 7.0}), ("must be", {"duration": -1.0})):
         with pytest.raises(fx.InputError, match=words):

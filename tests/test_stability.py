@@ -41,7 +41,7 @@ def contact_scene():
     (lambda: column(1.0, fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0))), fx.travel(-0.3)),
     (lambda: treloar(), fx.pole_height(1.0)), (contact_scene, fx.pressure(4.0))],
     ids=["Ogden", "follower pressure", "contact"])
-def test_no_waves_are_the_tangent(make, until):
+def test_second_variation_at_n_0_is_the_tangent(make, until):
     path = fx.trace(make(), until=until, progress=False)
     problem, variation = path.problem, SecondVariation(path.problem)
     with problem.state_context(path.last):
@@ -77,7 +77,7 @@ def test_rigid_motions_have_no_energy(material):
 @pytest.mark.parametrize("ogden, same", [
     (fx.Ogden(mu=2.0, alpha=2.0), fx.NeoHookean(c10=1.0)),
     (fx.Ogden(mu=(2.0, -0.6), alpha=(2.0, -2.0)), fx.MooneyRivlin(c10=1.0, c01=0.3))], ids=["neo-Hooke", "Mooney"])
-def test_ogden_is_what_it_should_be(ogden, same):
+def test_second_variation_of_ogden_equals_that_of_special_cases(ogden, same):
     """At rest, where all stretches coincide, and far from it, on the same state."""
     one, two = (Problem(column(1.0, material, (3, 4))) for material in (ogden, same))
     a, b = SecondVariation(one), SecondVariation(two)
@@ -91,7 +91,7 @@ def test_ogden_is_what_it_should_be(ogden, same):
 
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("material", ["Mooney", "Ogden"])
-def test_energy_in_space(n, material):
+def test_second_variation_equals_differences_of_the_energy_in_three_dimensions(n, material):
     """Second difference of the energy of a body in space, in Cartesian coordinates, along a mode."""
     c10, c01, mu, alpha = 1.0, 0.3, 1.7, 3.2
     law = fx.MooneyRivlin(c10=c10, c01=c01) if material == "Mooney" else fx.Ogden(mu=mu, alpha=alpha)
@@ -154,7 +154,7 @@ def test_energy_in_space(n, material):
 
 
 @pytest.mark.parametrize("nu, n", [(0.5, 1), (1.0, 1)])
-def test_cylinder(nu, n):
+def test_buckling_of_a_cylinder_is_exact(nu, n):
     path = fx.trace(column(nu, elements=(6, 24)), until=fx.travel(-0.35 * np.pi / nu), progress=False)
     loss = path.stability([n]).first
     assert loss.number == n and loss.solved
@@ -174,7 +174,7 @@ def test_modes_that_cross_in_one_long_step(n):
     assert len(path.states) < 10 and inner == pytest.approx(exact.inflated_tube(ratio, 2, n), rel=1e-4)
 
 
-def test_flipped_half_is_the_whole():
+def test_symmetric_and_antisymmetric_modes_of_a_half_are_those_of_the_whole():
     """What a half cylinder loses, with its image and against it, is what the whole one loses."""
     whole, half = (fx.trace(column(0.2, elements=e, half=h), until=fx.travel(-d), progress=False)
                    for e, h, d in (((2, 32), False, 1.0), ((2, 16), True, 0.5)))
@@ -201,7 +201,7 @@ def test_ring_under_outer_pressure():
         found.first.view3d("mode.png", scale=0)
 
 
-def test_what_is_formed_is_silent():
+def test_a_limit_point_is_no_bifurcation():
     """A hinged sheet through its maximum of pressure: a limit point is none that alarms."""
     path = fx.trace(treloar(elements=(10, 2)), until=fx.pole_stretch(4.0), progress=False)
     found = path.stability(range(5))
@@ -209,7 +209,7 @@ def test_what_is_formed_is_silent():
     assert "limit point" in str(found)
 
 
-def test_a_pot_and_a_parison_are_silent():
+def test_forming_a_pot_and_a_bottle_is_stable():
     """The pot of the README, plug and vacuum, and a bottle being blown: stretched everywhere, they stand."""
     pot = fx.tools.pot(mouth=38.0, base=28.0, depth=40.0, sheet=1.2, fillet=8.0, lip=3.0, nose=20.0)
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)),
@@ -231,7 +231,7 @@ def test_a_pot_and_a_parison_are_silent():
     assert path.stability(range(7), 12).bifurcations == []
 
 
-def test_membrane_and_loads_that_do_not_know():
+def test_membranes_and_loads_without_second_variation_are_refused():
     path = fx.trace(treloar(model=fx.Membrane()), until=fx.pole_height(1.0), progress=False)
     with pytest.raises(InputError, match="membrane"):
         path.stability([2])
@@ -331,7 +331,7 @@ def test_branch_points_are_those_that_a_run_warns_of(caplog):
     assert len(back.branch_points) == 6 and len(back.states) > len(path.states)
 
 
-def test_imperfections_knock_down(caplog):
+def test_imperfections_reduce_the_limit_load(caplog):
     """A tube that bulges from the start bears less, by the power 2/3 of its imperfection (Koiter, 1945)."""
     mesh = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=np.pi, elements=(2, 10))
     path = inflate(mesh, 2.02)

@@ -80,7 +80,7 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
             assert np.sqrt(np.mean((found.values[name] - values) ** 2)) < most * size, name
 
 
-def test_temperatures_and_the_lines_of_tools():
+def test_temperatures_of_body_and_tools_are_transferred():
     path, fine = press(pressed()), Problem(fx.Scene(**parts(pressed(), elements=(12, 2))))
     variables = path.last.history_variables
     T = variables[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
@@ -107,7 +107,7 @@ def parts(scene, elements):
 
 
 @pytest.mark.parametrize("points", ["nodes", 3])
-def test_contact_comes_back_as_it_was(points):
+def test_contact_state_is_restored_after_a_transfer(points):
     path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
     here, kept = Problem(path.problem.scene), path.last.history_variables[0]
     transfer_histories(path.problem, path.last, here, path.last.x, path.last.control)

@@ -39,7 +39,7 @@ def test_no_step_is_longer_than_the_largest(largest):
     assert max(curve.progress(a, b) for a, b in zip(path.states, path.states[1:])) <= largest * (1 + 1e-9)
 
 
-def test_time_goes_one_way(monkeypatch):
+def test_a_step_back_in_time_is_refused(monkeypatch):
     """A step in time that Newton's method ends behind its beginning, on a path that looks as if it went on, is none."""
     step, calls = Curve.step, []
 

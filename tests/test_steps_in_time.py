@@ -25,7 +25,7 @@ def run(scene, *stages, **options):
 
 
 @pytest.mark.parametrize("ramp", [1e-3, 1e-4, 3e-7])
-def test_a_hold_after_a_quick_ramp_does_not_move(ramp):
+def test_a_hold_after_a_quick_ramp_has_no_spurious_rate(ramp):
     """Round-off of a short ramp was taken for what drives the hold: steps of 1e-13, without an end."""
     table = [(0, 0), (1, 0), (1 + ramp, 0.6), (2, 0.6), (2 + ramp, 0.2), (4, 0.2)]
     path = run(block(SLOW), Stage("move", amplitudes={"pull": table}), accuracy="draft", max_steps=200)
@@ -175,7 +175,7 @@ def test_check_sees_a_modulus_that_pulls_a_cooling_body_back():
 
 
 @pytest.mark.parametrize("followed", ["pull", fx.travel], ids=["table", "flow"])
-def test_cutbacks_end(followed, monkeypatch):
+def test_cutbacks_end_at_the_smallest_step(followed, monkeypatch):
     """A run whose error in time does not fall with its steps ends in words at the smallest one."""
     asked = []
 

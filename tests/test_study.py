@@ -76,7 +76,7 @@ def test_effects_are_not_those_of_what_failed(here):
     assert effects["x"][1] - effects["x"][0] == pytest.approx(1) == effects["x"][1] - effects["x"][2]
 
 
-def test_a_run_that_fails_ends_nothing(here):
+def test_a_failed_run_does_not_stop_a_study(here):
     found = run(here, x=(3, 1))
     assert [bool(r.error) for r in found.runs] == [True, True, False, False]
     assert "ConvergenceError: no state was found" in str(found) and "2 failed" in str(found)
@@ -85,7 +85,7 @@ def test_a_run_that_fails_ends_nothing(here):
         _ = run(here, x=(3,)).best
 
 
-def test_a_folder_is_gone_on_with(here, tmp_path):
+def test_a_study_continues_from_its_folder(here, tmp_path):
     run(here, x=(0, 1), folder=tmp_path / "runs")
     assert len(RUNS) == 4
     found = run(here, x=(0, 1, 2), folder=tmp_path / "runs")
@@ -101,7 +101,7 @@ def test_a_folder_is_gone_on_with(here, tmp_path):
         run(here, folder=tmp_path / "other")
 
 
-def test_a_best_at_the_edge_says_so(here):
+def test_a_best_value_at_the_edge_of_its_range_is_reported(here):
     text = str(run(here, x=(0, 1, 2), y=(1, 1.5)))           # the best is at (1, 2)
     assert "the best is at the edge of y, which was run from 1 to 1.5: a better one may lie above" in text
     assert "edge of x" not in text and "edge" not in str(run(here, x=(0, 1, 2), y=(1, 2, 3)))
@@ -157,7 +157,7 @@ def test_refining_finds_what_lies_between(here):
     assert (best.values["x"], best.values["y"]) == (pytest.approx(1, abs=0.03), pytest.approx(2, abs=0.03))
 
 
-def test_what_cannot_be_run_is_refused():
+def test_wrong_arguments_of_studies_are_refused():
     for given, message in ((({"x": [1]}, {"f": lambda path: 1.0}), "importable by name"), (({}, {"f": f}), "variables"),
                            (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measure = {}")):
         with pytest.raises(fx.InputError, match=message):

@@ -30,7 +30,7 @@ def test_uniform_temperature_is_the_plain_material(model):
 
 
 @pytest.mark.parametrize("model", [fx.Membrane(), fx.MixedPressure()], ids=["membrane", "solid"])
-def test_it_is_the_constant_at_the_temperature_of_each_point(model):
+def test_constants_are_evaluated_at_the_temperature_of_each_point(model):
     """c10(T(R)) is a constant that varies with R."""
     c10 = fx.table(HOT)
 
@@ -128,7 +128,7 @@ def test_entropic_modulus():
     (fx.NeoHookean(c10=1.0), lambda R: R, r"the function of arrays \(R, Z\) fails: TypeError"),
 ])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_what_is_refused(material, temperature, words):
+def test_wrong_temperatures_are_refused(material, temperature, words):
     with pytest.raises(fx.InputError, match=words):
         scene(material, temperature)
 

@@ -291,7 +291,7 @@ def test_internal_variables_follow_the_strain():
     assert power == pytest.approx(4 * (e - q) ** 2, rel=1e-6)
 
 
-def test_a_memory_is_kept():
+def test_history_variables_are_saved_and_restored():
     """get, put, save and load give back what was there; what does not fit is refused."""
     problem = relaxing(fx.MixedPressure())
     history, (x, _) = problem.forms.histories[0], random_state(problem)
@@ -337,7 +337,7 @@ if problem.comm.rank == 0:
 """
 
 
-def test_a_memory_does_not_know_ranks():
+def test_saved_history_variables_do_not_depend_on_ranks():
     for (one, energy, sums), (two, energy_two, sums_two) in zip(run_json(MEMORY, 1), run_json(MEMORY, 2)):
         assert one["cells"] == two["cells"] and energy == pytest.approx(energy_two, rel=1e-12)
         assert sums == pytest.approx(sums_two, rel=1e-12)

@@ -60,7 +60,7 @@ def test_a_step_ends_before_the_closures_after_a_separation(caplog):
     assert "2 points that stuck to 'top' lifted off" in caplog.text
 
 
-def test_the_size_of_resticking(fine):
+def test_estimated_wall_error_of_points_that_stick_again(fine):
     """Zero where points stick once; else about the change of the wall by steps that are too long."""
     item = resticking.furthest(fine)
     assert 5e-3 < item.shift < 1e-2 and item.tool == "top" and resticking.findings(item)

@@ -256,7 +256,7 @@ def test_recovery_after_creep():
     assert stretch == pytest.approx([1.0906606, 1.1651652, 1.0951243], rel=2e-3)          # an ODE solver's
 
 
-def test_flow_ends_where_it_is_told():
+def test_a_stage_in_time_ends_at_its_target():
     path = run(block(), Stage("pull", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1), (3, 1)]},
                               until=fx.process_time(2)))
     assert path.last.time == 2.0 and path.last.measures["travel"] == pytest.approx(1.0, abs=1e-12)

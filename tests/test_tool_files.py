@@ -147,7 +147,7 @@ def hidden(space, **layer):
     space.add_line((0, 0), (5, 5), dxfattribs={"layer": "hidden"})
 
 
-def test_what_cannot_be_seen_is_no_curve(tmp_path):
+def test_hidden_drawing_entities_are_ignored(tmp_path):
     for hide in (lambda s: hidden(s, off=1), lambda s: hidden(s, freeze=1),
                  lambda s: s.add_line((0, 0), (5, 5), dxfattribs={"invisible": 1})):
         file = drawing(tmp_path, lambda s, hide=hide: (hide(s), s.add_line((3, 0), (0, 0))))
@@ -235,7 +235,7 @@ def test_units_of_step(tmp_path):
             tools.read(file)
 
 
-def test_a_step_file_that_lost_what_moves_a_part(tmp_path):
+def test_a_step_file_without_its_placement_is_refused(tmp_path):
     def two_parts(occ):
         points = [occ.addPoint(*p, 0) for p in ((0, 5), (9, 5), (9, 4), (10, 4))]
         occ.addLine(*points[:2]), occ.addCircleArc(*points[1:])

@@ -211,7 +211,7 @@ def test_gmsh_models(tmp_path, kind):
         tools.read(file, [5])
 
 
-def test_bounds():
+def test_bounding_boxes_of_tools():
     cup = fx.tools.cup(radius=2.0, depth=1.0, mouth=0.5, fillet=0.2).moved(z=1.0)
     assert cup.bounds == pytest.approx(np.array([[0.0, 1.5], [4.0, 2.5]]))
     ball = fx.tools.sphere(radius=1.0, z=-0.5, r=3.0)
@@ -225,7 +225,7 @@ IN_SPACE = {
 
 
 @pytest.mark.parametrize("name", [*SHAPES, *IN_SPACE])
-def test_surface(name):
+def test_surface_points_lie_on_the_tool(name):
     """Points on the tool, and pieces between them that cut its corners by no more than their sagitta; its bounds."""
     tool = (SHAPES | IN_SPACE)[name]
     points, pieces = tool.surface()

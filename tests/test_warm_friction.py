@@ -40,7 +40,7 @@ def test_uniform_temperature_gives_the_same_bits_as_the_number(points):
         assert np.array_equal(a.x, b.x) and a.control == b.control
 
 
-def test_what_is_cold_slides_and_what_is_hot_holds():
+def test_friction_depends_on_temperature():
     """The thesis' finding that friction keeps the base thick, by temperature; everywhere |T| <= mu(T) N."""
     flat = {}
     for T in (20.0, 150.0):
@@ -52,7 +52,7 @@ def test_what_is_cold_slides_and_what_is_hot_holds():
     assert flat[150.0] > 1.01 * flat[20.0]
 
 
-def test_it_is_that_of_each_point():
+def test_friction_has_the_temperature_of_each_point():
     """A sheet with a hot middle: mu follows T(R) point by point, and the limit of friction with it."""
     def temperature(R, Z):
         return 150 - 120 * R
@@ -65,7 +65,7 @@ def test_it_is_that_of_each_point():
     assert between[0] < path.profile().thickness_ratio[0] < between[1]
 
 
-def test_it_follows_a_face_that_cools():
+def test_friction_follows_a_face_that_cools():
     """mu is that of the last accepted state's face, comes back with a state, and goes on in a restart."""
     polymer = fx.ThermalProperties(conductivity=0.17, density=1.0, heat_capacity=1.0)
     cooling = fx.Cooling(polymer, unit="C", tools={"plug": (1.0, 30.0)}, tolerance=0.5)
@@ -79,7 +79,7 @@ def test_it_follows_a_face_that_cools():
     assert path.profile().thickness_ratio[0] < 0.995 * hot.profile().thickness_ratio[0]
 
 
-def test_it_is_told_in_files_and_reports():
+def test_friction_appears_in_files_and_reports():
     """A tool that is drawn from a file knows its friction in words."""
     path = pushed(RISING, 150.0, travel=0.05)[1]
     told = describe(path.problem)
@@ -96,7 +96,7 @@ def test_it_is_told_in_files_and_reports():
     (lambda R, Z: R, 150.0, "a number or, by temperature"),
     ("rough", 150.0, "must be 'stick', 'none' or a coefficient"),
 ])
-def test_what_is_refused(friction, temperature, words):
+def test_wrong_friction_tables_are_refused(friction, temperature, words):
     with pytest.raises(fx.InputError, match=words):
         pushed(friction, temperature, travel=0.01)
 
