@@ -78,7 +78,7 @@ class LocalSolve:
         self._status: list[Array] = []
         self.failed = 0
 
-    def look(self) -> None:
+    def mark_changes(self) -> None:
         """Mark the points whose gap closed, or whose status changed since the last call.
 
         Called once after each linearisation.
@@ -112,12 +112,12 @@ class LocalSolve:
                 self.failed += 1
                 return step
             correction, step_correction = change
-            if not self._others(dx.array_r + correction, step + step_correction):
+            if not self._mark_further(dx.array_r + correction, step + step_correction):
                 break
         dx.array_w += correction
         return step + step_correction
 
-    def _others(self, dx: Array, step: float) -> bool:
+    def _mark_further(self, dx: Array, step: float) -> bool:
         """Mark further points whose status changes in a Newton update, and return True if a rank has such points.
 
         Set the sense of sliding that the next linearisation assumes at the marked points.
@@ -233,7 +233,7 @@ class _Points:
             (change of dx, locally owned, shape (n,); change of step), or None if no consistent state was found.
         """
         y0 = self._gather(self._moved(dx.array_r, step))
-        f0, S0 = self._taken()
+        f0, S0 = self._linearised()
         laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
@@ -249,7 +249,7 @@ class _Points:
                 dy, halvings = dy / 2, halvings - 1
                 y = y - dy
                 continue
-            before, correction = miss, self._within(S - S0, R)
+            before, correction = miss, self._with_added_stiffness(S - S0, R)
             if correction is None:
                 return None
             new = y - correction
@@ -276,7 +276,7 @@ class _Points:
         Returns:
             (the stopped motions, True if the correction must not be halved: a point was stopped, or all points stick).
         """
-        (before, _), (depth, path) = (self._all(self._each(ramps, z), (), (self._c,)) for z in (y, new))
+        (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
         leaves, enters = (before > _LOCAL.least_depth) & (depth <= 0), (before <= 0) & (depth > 0)
         stopped = np.where(leaves, _LOCAL.kept_depth * np.minimum(before, 1.0),
                            np.where(enters, np.minimum(depth, entry_depth), depth))
@@ -296,13 +296,13 @@ class _Points:
             The updated solutions, shape (n, m), or None if the changed tangent is singular.
         """
         added = self._gather(np.concatenate(changes))
-        y = self._within(added, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
+        y = self._with_added_stiffness(added, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
         if y is None:
             return None
         forces = np.einsum("nij,njm->nim", added, y.reshape(len(added), self._c, -1)).reshape(y.shape)
         return V - self._columns.updates(self._scale[:, None] * forces)
 
-    def _within(self, added: Array, y: Array) -> Array | None:
+    def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
         """Return (1 + C S)^-1 y, the motions y of the points, changed by additional stiffnesses S.
 
         added: the stiffnesses S of k points, shape (k, c, c). None if the system is singular.
@@ -322,7 +322,7 @@ class _Points:
         """
         return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
-    def _taken(self) -> tuple[Array, Array]:
+    def _linearised(self) -> tuple[Array, Array]:
         """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.
         """
         return self._forces([c.increment.taken(i) for c, i in self._some])
@@ -332,15 +332,15 @@ class _Points:
 
         laws: for each face a function from motions of its points to their tractions.
         """
-        return self._forces([(tractions.force, tractions.stiffness) for tractions in self._each(laws, y)])
+        return self._forces([(tractions.force, tractions.stiffness) for tractions in self._at_faces(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
         """Gather pairs (forces, stiffnesses) of the faces from all ranks: forces, flat; stiffnesses, shape (k, c, c).
         """
-        force, stiffness = self._all(parts, (self._c,), (self._c, self._c))
+        force, stiffness = self._gather_pairs(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness
 
-    def _each(self, functions: list[Any], y: Array) -> list[Any]:
+    def _at_faces(self, functions: list[Any], y: Array) -> list[Any]:
         """Return for each face the value of its function in `functions` at the motions of its locally owned points.
 
         y: motions of the points of all ranks, flat, length.
@@ -348,7 +348,7 @@ class _Points:
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
-    def _all(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
+    def _gather_pairs(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
         """Gather pairs of values at the points of all faces and ranks.
 
         parts: the pair of each face. shapes: shapes of both values at one point, since a rank may have no points.

@@ -321,7 +321,7 @@ class BorderedNewton:
             problem.linearise(x, control, self.F)
             active.compare(moved)
             if points:
-                points.look()
+                points.mark_changes()
             self._check(history, active, moved)
             chord = self._modified.keeps(residual, self.tolerances.residual)
             if not self._solve(x, control, chord, rescale=not history):

@@ -34,9 +34,9 @@ class EventSettings:
         to_tools: number of contact iterations that project closed points onto curved tools.
         to_surface: maximum number of Newton iterations that locate a gap closure on the surface of the tool.
         changes: maximum number of status changes (slip, opening) between two gap closures.
-        taken_over: maximum number of sliding points at the start of the step that get contact forces of their own.
-        same_place: convergence tolerance of a sticking point: its motion over its tributary length.
-        about_there: the same tolerance for a point that may slide.
+        sliding_points: maximum number of sliding points at the start of the step that get contact forces of their own.
+        sticking: convergence tolerance of a sticking point: its motion over its tributary length.
+        sliding: the same tolerance for a point that may slide.
         simultaneous: fraction of the step within which two closures count as simultaneous.
         earlier: maximum number of times that an earlier closure replaces the one being located.
         late: largest change of an event's arc length in an iteration, relative to that arc length.
@@ -47,9 +47,9 @@ class EventSettings:
     to_tools: int = 4
     to_surface: int = 3
     changes: int = 100
-    taken_over: int = 80
-    same_place: float = 1e-3
-    about_there: float = 1e-2
+    sliding_points: int = 80
+    sticking: float = 1e-3
+    sliding: float = 1e-2
     simultaneous: float = 0.02
     earlier: int = 3
     late: float = 1.0
@@ -119,7 +119,7 @@ class _Segment(NamedTuple):
         return self._replace(begins=time, positions=[x + ds * w for x, w in zip(self.positions, self.speed)],
                              force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
 
-    def of(self, m: int) -> _Segment:
+    def extended(self, m: int) -> _Segment:
         """Return the segment extended to m points of known compliance; added points are open."""
         more = m - len(self.status)
         if not more:
@@ -165,7 +165,7 @@ class ContactEventSequence:
         self._end: _Segment | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # closures with a contact force; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
-        if not self._take_over():
+        if not self._free_sliding():
             self._pieces, self.ends = self._pieces[:1], 0.0
 
     @property
@@ -186,12 +186,12 @@ class ContactEventSequence:
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
                 return None
-            if self._taken < len(self._closures) and not self._hold(length):
+            if self._taken < len(self._closures) and not self._close(length):
                 self.ends = self._closures[-1].time
                 return None
-            if not self._find(length):
+            if not self._find_next(length):
                 return None
-            if not self._settle(length):
+            if not self._equilibrate(length):
                 self.ends = self._closures[-1].time
         return self._closures[k] if self._closures[k].time < length else None
 
@@ -210,7 +210,7 @@ class ContactEventSequence:
             f, i, time = closure.face, closure.point, closure.time
             if time < length and closure.rank == self._comm.rank:
                 times[f][i], positions[f][i], speeds[f][i] = time, closure.place, self._piece(time).speed[f][i]
-        self._points.spread(piece.of(len(self._points.point_ids)).status != ContactStatus.FREE, sure)
+        self._points.spread(piece.extended(len(self._points.point_ids)).status != ContactStatus.FREE, sure)
         return times, positions, sure, speeds
 
     def positions(self, length: float) -> list[np.ndarray]:
@@ -222,7 +222,7 @@ class ContactEventSequence:
         piece, m = self._piece(length), len(self._points.point_ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
-        piece = piece.of(m).after(length)
+        piece = piece.extended(m).after(length)
         if not len(piece.status):
             return None
         for _ in range(_SETTINGS.to_tools):
@@ -249,12 +249,12 @@ class ContactEventSequence:
         """Return the last segment that begins before an arc length."""
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
-    def _take_over(self) -> bool:
+    def _free_sliding(self) -> bool:
         """Give sliding points of the accepted state contact forces of their own; return False if this fails."""
         x, control = self._tangent[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
-        if not 0 < self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.taken_over:
+        if not 0 < self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.sliding_points:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
@@ -264,14 +264,14 @@ class ContactEventSequence:
         status[self._points.friction == 0] = ContactStatus.SLIDES
         slip = self._points.values_at([np.zeros(len(face.points)) if face.history is None else face.history.slip
                                        for face in self._faces])
-        piece, points = self._pieces[0].of(len(status)), self._points
+        piece, points = self._pieces[0].extended(len(status)), self._points
         place = points.values_at(piece.positions) - slip[:, None] * points.tool_frame(piece.positions, force).tangent
-        if not self._turn(piece._replace(status=status, force=force, place=place), status):
+        if not self._append(piece._replace(status=status, force=force, place=place), status):
             return False
         del self._pieces[0]
         return True
 
-    def _turn(self, piece: _Segment, status: np.ndarray) -> bool:
+    def _append(self, piece: _Segment, status: np.ndarray) -> bool:
         """Append a segment with new statuses, shape (m,), at the start of `piece`; return False if this fails."""
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         self._work += 1
@@ -289,20 +289,20 @@ class ContactEventSequence:
         self._pieces.append(piece)
         return True
 
-    def _hold(self, length: float) -> bool:
+    def _close(self, length: float) -> bool:
         """Append the segment after the last closure, with a contact force at its point; return False if that fails."""
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
             return False
         self._taken += 1
-        end, k = end.of(len(self._points.point_ids)), self._points.point_ids.index(closure.point_id)
+        end, k = end.extended(len(self._points.point_ids)), self._points.point_ids.index(closure.point_id)
         status, place = end.status.copy(), end.place.copy()
         slips = self._points.values_at(last.speed)[k] @ self._points.tool_frame(end.positions, end.force).tangent[k]
         status[k] = ContactStatus.STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
         place[k] = closure.place
-        return self._turn(end._replace(status=status, place=place), status)
+        return self._append(end._replace(status=status, place=place), status)
 
-    def _find(self, length: float) -> bool:
+    def _find_next(self, length: float) -> bool:
         """Find the next gap closure within an arc length; return False if there is none."""
         for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
@@ -315,35 +315,35 @@ class ContactEventSequence:
             after, status = self._points.change(last.status, frame, last.force, last.rate)
             if not after < min(first, length - last.begins):
                 break
-            if not self._turn(last.after(last.begins + after), status):
+            if not self._append(last.after(last.begins + after), status):
                 self.ends, self.stops = last.begins + after, True
                 return False
-        if self._first([last.begins + t for t in times], length, last):
+        if self._store_first([last.begins + t for t in times], length, last):
             return True
-        self._end = self._moved(length, last)
-        return self._end is not None and self._first(self._back(self._end, last), length, last)
+        self._end = self._iterated(length, last)
+        return self._end is not None and self._store_first(self._missed(self._end, last), length, last)
 
-    def _first(self, times: list[np.ndarray], length: float, segment: _Segment) -> bool:
+    def _store_first(self, times: list[np.ndarray], length: float, segment: _Segment) -> bool:
         """Store the earliest of the closures at arc lengths `times` before `length`; return False without one."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
         if not time < length:
             return False
-        self._closures.append(self._meets(rank, f, i, time, segment.after(time).positions))
+        self._closures.append(self._closure(rank, f, i, time, segment.after(time).positions))
         return True
 
-    def _meets(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
+    def _closure(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
         """Return the gap closure of point i of face f near an arc length, where the points have these positions."""
         closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
-            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.same_place, _SETTINGS.to_surface)
+            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.sticking, _SETTINGS.to_surface)
             closure = GapClosure(time + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
                                  bool(self._sticks[f][i]))
         return self._comm.bcast(closure, root=rank)
 
-    def _settle(self, length: float) -> bool:
+    def _equilibrate(self, length: float) -> bool:
         """Equilibrate the path at the last closure and locate the closure again; return False without convergence."""
         last, closure = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(closure.time)
@@ -353,29 +353,29 @@ class ContactEventSequence:
         for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
             if len(tried) == _SETTINGS.iterations or self.exhausted:
                 return False
-            closure, moved = self._closures[-1], self._moved(closure.time, end)
+            closure, moved = self._closures[-1], self._iterated(closure.time, end)
             if moved is None:
                 return False
-            found = self._meets(*closure.point_id, closure.time, moved.positions)
+            found = self._closure(*closure.point_id, closure.time, moved.positions)
             tried.append((end, moved.after(found.time)))
-            mixed = self._mixed(tried)
+            mixed = self._anderson_mixture(tried)
             if mixed is None:
                 return False
             end = mixed
-            found = self._meets(*closure.point_id, end.begins, end.positions)
+            found = self._closure(*closure.point_id, end.begins, end.positions)
             if not (found.time > last.begins and abs(found.time - closure.time) < _SETTINGS.late * closure.time):
                 return False
             self._closures[-1], self._end = found, (end := end.after(found.time))
-            near = (_SETTINGS.same_place if found.sticks else _SETTINGS.about_there) * found.length
+            near = (_SETTINGS.sticking if found.sticks else _SETTINGS.sliding) * found.length
             if np.linalg.norm(found.place - closure.place) < near:
-                times = self._back(end, last, found)
-                if not self._first(times, found.time, end):
+                times = self._missed(end, last, found)
+                if not self._store_first(times, found.time, end):
                     return True
                 self._closures.pop(-2)                      # another gap closed before
                 tried = []
         return False
 
-    def _back(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
+    def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
         """Return the arc lengths at which open points that are inside a tool at `end` passed its surface.
 
         For other points, and for the point of the closure `but`, it is the end of the segment.
@@ -391,7 +391,7 @@ class ContactEventSequence:
             t[inside] = last.begins + np.clip(left - back, 1e-3 * left, 0.999 * left)[inside]
         return times
 
-    def _mixed(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
+    def _anderson_mixture(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
         """Return the Anderson (1965) combination of equilibrium iterates, (before, after) each; None if they diverge.
 
         The stored LU factors make iterates without acceleration oscillate.
@@ -413,9 +413,9 @@ class ContactEventSequence:
             positions=[mean(list(x)) for x in zip(*(p.positions for p in after))], extra=mean([p.extra for p in after]),
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
-    def _moved(self, time: float, piece: _Segment) -> _Segment | None:
+    def _iterated(self, time: float, piece: _Segment) -> _Segment | None:
         """Return a path segment after one equilibrium iteration at the arc length `time`; None without LU factors."""
-        piece, points = piece.of(len(self._points.point_ids)).after(time), self._points
+        piece, points = piece.extended(len(self._points.point_ids)).after(time), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
         forces = [np.where(free[:, None], 0.0, np.full_like(y, np.nan)) for free, y in zip(self._free, piece.positions)]

@@ -31,7 +31,7 @@ class Response:
         self._x, self._F = x, F
 
     @property
-    def at_hand(self) -> bool:
+    def is_valid(self) -> bool:
         """True if the stored LU factors still belong to the tangent at the state."""
         return self._made == self._newton.solver.count
 
@@ -45,7 +45,7 @@ class Response:
             Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). The m columns run over the
             points of all ranks and their components. None without valid factors.
         """
-        return self._by(unit_forces(self._problem, self._problem.present, chosen)) if self.at_hand else None
+        return self._solve(unit_forces(self._problem, self._problem.present, chosen)) if self.is_valid else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """Return one modified Newton correction of (x, control) towards equilibrium with given contact forces.
@@ -60,7 +60,7 @@ class Response:
             Changes of x, locally owned entries, shape (n,), and of the control. None without valid factors or a finite
             result.
         """
-        if not self.at_hand:
+        if not self.is_valid:
             return None
         self._x.array_w[:] = x
         faces: list[ContactFace] = list(self._problem.present)
@@ -74,10 +74,10 @@ class Response:
         self._problem.begin()
         left = self._F.array_r.copy()
         left[self._problem.constrained] = 0.0
-        found = self._by(left[:, None])
+        found = self._solve(left[:, None])
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
-    def _by(self, E: Array) -> tuple[Array, Array] | None:
+    def _solve(self, E: Array) -> tuple[Array, Array] | None:
         """Return the changes of x, (n, m), and of the control, (m,), for right-hand sides E, shape (n, m)."""
         V = self._newton.solve_ahead(E)
         if V is None:
