@@ -40,11 +40,11 @@ class LocalContact:
         full_corrections: number of full corrections, which may cycle. Later corrections of sticking points stop near
             the outer edge of the ramp. Where a point slides, corrections are halved that increase the residual.
         most_halvings: largest number of halvings of a correction, which would stall at a kink.
-        kept_depth: part of its present depth at which a point stops that a correction would move out of the ramp.
-        least_depth: depth over the width of the ramp below which a point may leave the ramp.
-        entry_depth: depth over the width of the ramp at which a point stops that enters the ramp again.
+        kept_depth: if a correction would move a point out of the ramp, the point stops at this fraction of its depth.
+        least_depth: depth in the ramp, over its width, below which a point may leave the ramp.
+        entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp again.
         entry_growth: factor of `entry_depth` from one entry to the next.
-        accuracy: tolerance of the motions over the half-width of the ramp.
+        accuracy: tolerance of the motions of the points, over the half-width of the ramp.
     """
 
     most_points: int = 40
@@ -69,7 +69,7 @@ class LocalSolve:
         problem: the equations.
 
     Attributes:
-        failed: number of local solves that found no state consistent with the contact law.
+        failed: number of local solves without a solution that satisfies the contact law.
     """
 
     def __init__(self, problem: Equations):
@@ -81,7 +81,7 @@ class LocalSolve:
     def mark_changes(self) -> None:
         """Mark the points whose gap closed, or whose status changed since the last call.
 
-        Called once after each linearisation.
+        It is called once after each linearisation.
         """
         now = [contact.increment.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.newly_closed for contact in self._contacts]
@@ -90,7 +90,9 @@ class LocalSolve:
         self._status = now
 
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
-        """Correct a Newton update so that points whose status changes satisfy the contact law.
+        """Correct a Newton update so that marked points satisfy the contact law, with the compliance of the body.
+
+        Without marked points, with too many, or without a solution, the update stays as it is.
 
         Args:
             solver: solver with the LU factors of the tangent K.
@@ -118,11 +120,10 @@ class LocalSolve:
         return step + step_correction
 
     def _mark_further(self, dx: Array, step: float) -> bool:
-        """Mark further points whose status changes in a Newton update, and return True if a rank has such points.
+        """Mark further points whose status changes in a Newton update; return True if a rank has such points.
 
-        Set the sense of sliding that the next linearisation assumes at the marked points.
-
-        dx: update of x, locally owned entries, shape (n,). step: update of the control.
+        The sense of sliding that the next linearisation assumes at marked points is set, too. dx: update of x, locally
+        owned entries, shape (n,). step: update of the control.
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
@@ -140,8 +141,7 @@ V holds dx/dcontrol (then step is 1) or K^-1 E (then step is 0), locally owned r
 
 
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
-    """Return a function that updates solutions to a tangent that differs from the factorised one at a few contact
-    points.
+    """Return a function that updates solutions for changes of the tangent at a few contact points (Woodbury's formula).
 
     Args:
         problem: the equations.
@@ -164,7 +164,7 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
 
 def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
-    """Return the contributions to F of unit forces at contact points, in each component, as columns.
+    """Return the contributions to F of unit forces at contact points, a column for each component of each point.
 
     Args:
         problem: the equations.
@@ -172,8 +172,8 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
         chosen: for each face, local numbers of owned points.
 
     Returns:
-        Locally owned rows, shape (n, m), 0 at constrained unknowns. The m columns run over the points and components of
-        all ranks.
+        Locally owned rows, shape (n, m), 0 at constrained unknowns. The m columns run over ranks, points and
+        components.
     """
     unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
     own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
@@ -194,9 +194,10 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
 
 
 class _Points:
-    """A few contact points with the compliance of the body at these points.
+    """A few contact points of all ranks, with the compliance of the body at these points.
 
-    Arrays hold the points of all ranks, flat over points and components, shape (m,), unless called locally owned.
+    Unless called locally owned, an array has the components of the points of all ranks one after the other, shape (m,).
+    Such an array is called flat.
 
     Args:
         problem: the equations.
@@ -223,14 +224,14 @@ class _Points:
         self._C = self._gather(motions) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
-        """Solve the local problem of the points for a Newton update.
+        """Solve the contact law at the points, together with their compliance, for a Newton update.
 
         Args:
             dx: Newton update of x.
             step: Newton update of the control.
 
         Returns:
-            (change of dx, locally owned, shape (n,); change of step), or None if no consistent state was found.
+            Change of dx, locally owned entries, shape (n,); change of step. None if no solution was found.
         """
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._linearised()
@@ -262,19 +263,20 @@ class _Points:
     def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
         """Stop corrections of motions at the outer edge of the ramp.
 
-        The stiffness of a sticking point, k s g, falls with the slope s of the ramp, to zero at its outer edge. A point
-        that is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot from
-        either side.
+        The stiffness of a sticking point decreases with the slope of the ramp, to zero at its outer edge. A point that
+        is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot from both
+        sides.
 
         Args:
             ramps: for each face, function of motions that returns depth and path in the ramp (`Increment.in_ramp`).
-            y: motions before the correction.
-            new: motions after it.
-            entry_depth: depth over the width of the ramp at which a point stops that enters the ramp, shape (points,);
-                changed in place, as it grows for points that enter.
+            y: motions before the correction, flat, length.
+            new: motions after the correction, flat, length.
+            entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp, shape
+                (points,). It is changed in place: it grows for points that enter.
 
         Returns:
-            (the stopped motions, True if the correction must not be halved: a point was stopped, or all points stick).
+            Motions after the stopped correction, flat; True if the correction must not be halved, since a point was
+            stopped or all points stick.
         """
         (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
         leaves, enters = (before > _LOCAL.least_depth) & (depth <= 0), (before <= 0) & (depth > 0)
@@ -285,11 +287,11 @@ class _Points:
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Return solutions V = K^-1 E, or dx/dcontrol, updated to changed stiffnesses of the points.
+        """Return solutions updated to changed stiffnesses of the points, by Woodbury's formula.
 
         Args:
-            V: the solutions, locally owned rows, shape (n, m).
-            step: change of the control that belongs to V.
+            V: solutions K^-1 E, or dx/dcontrol, locally owned rows, shape (n, m).
+            step: change of the control in V: 0 for K^-1 E, 1 for dx/dcontrol.
             changes: for each face, changes of the stiffness per area of its points, shape (k, c, c), stress/length.
 
         Returns:
@@ -303,9 +305,9 @@ class _Points:
         return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
-        """Return (1 + C S)^-1 y, the motions y of the points, changed by additional stiffnesses S.
+        """Return (1 + C S)^-1 y, the motions y of the points with additional stiffnesses S; None if it is singular.
 
-        added: the stiffnesses S of k points, shape (k, c, c). None if the system is singular.
+        added: the stiffnesses S of k points, shape (k, c, c). y: motions, flat, or several as columns.
         """
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), added).reshape(n, n)
@@ -341,17 +343,17 @@ class _Points:
         return force.ravel(), stiffness
 
     def _at_faces(self, functions: list[Any], y: Array) -> list[Any]:
-        """Return for each face the value of its function in `functions` at the motions of its locally owned points.
+        """Return for each face the value of its function at the motions of its locally owned points.
 
-        y: motions of the points of all ranks, flat, length.
+        functions: function of each face. y: motions of the points of all ranks, flat, length.
         """
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _gather_pairs(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Gather pairs of values at the points of all faces and ranks.
+        """Gather both values of a pair at the points of all faces and ranks, shape (points, *shape) each.
 
-        parts: the pair of each face. shapes: shapes of both values at one point, since a rank may have no points.
+        parts: the pair of each face, for its owned points. shapes: shapes of both values at one point.
         """
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]

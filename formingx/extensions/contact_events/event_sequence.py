@@ -31,16 +31,16 @@ class EventSettings:
 
     Attributes:
         iterations: maximum number of equilibrium iterations per event.
-        to_tools: number of contact iterations that project closed points onto curved tools.
+        to_tools: number of projections of closed points onto curved tools.
         to_surface: maximum number of Newton iterations that locate a gap closure on the surface of the tool.
         changes: maximum number of status changes (slip, opening) between two gap closures.
-        sliding_points: maximum number of sliding points at the start of the step that get contact forces of their own.
-        sticking: convergence tolerance of a sticking point: its motion over its tributary length.
-        sliding: the same tolerance for a point that may slide.
+        sliding_points: maximum number of points that slide at the start whose contact forces become unknowns.
+        sticking: convergence tolerance of the position of a point that sticks, over its tributary length.
+        sliding: convergence tolerance of the position of a point that may slide, over its tributary length.
         simultaneous: fraction of the step within which two closures count as simultaneous.
         earlier: maximum number of times that an earlier closure replaces the one being located.
-        late: largest change of an event's arc length in an iteration, relative to that arc length.
-        work: maximum number of equilibrium iterations and status changes in a step; then the step takes one closure.
+        late: largest relative change of the arc length of an event in one equilibrium iteration.
+        work: maximum number of equilibrium iterations and status changes in a step; then the step closes one gap.
     """
 
     iterations: int = 8
@@ -63,13 +63,13 @@ class GapClosure(NamedTuple):
     """Contact event: an open point reaches the outer edge of the ramp of its tool. All ranks store the same value.
 
     Attributes:
-        time: arc length of the event.
+        time: arc length of the event from the accepted state.
         rank: rank that owns the point.
         face: number of the contact face.
         point: local number of the point.
         place: position of the point relative to the tool at the event, shape (2,), length.
         length: tributary length of the point, length.
-        sticks: True if the point sticks under any force.
+        sticks: True if the point sticks under any force (contact without slip).
     """
 
     time: float
@@ -90,16 +90,16 @@ class _Segment(NamedTuple):
     """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
 
     Attributes:
-        begins: arc length at the start of the segment.
-        positions: positions of all points relative to the tools at this start, for each face.
-        speed: their derivatives by arc length.
+        begins: arc length at the start of the segment, from the accepted state.
+        positions: for each face, positions of all points relative to the tool at the start, shape (n, 2), length.
+        speed: for each face, derivatives of the positions with respect to arc length, shape (n, 2), length.
         status: contact statuses, shape (m,).
         place: sticking positions, shape (m, 2), length.
-        force: contact forces at the start, shape (m, 2).
-        rate: their derivatives by arc length, shape (m, 2).
-        extra: part of the force outside the factorised tangent, shape (m, 2).
-        growth: its derivative by arc length, shape (m, 2).
-        correction: correction of (x, control) from equilibrium iterations.
+        force: contact forces in F at the start, shape (m, 2), dimensionless.
+        rate: derivatives of `force` with respect to arc length, shape (m, 2).
+        extra: change of `force` beyond the contact stiffness in the factorised tangent, shape (m, 2).
+        growth: derivatives of `extra` with respect to arc length, shape (m, 2).
+        correction: sum of the equilibrium corrections of (x, control).
     """
 
     begins: float
@@ -114,7 +114,7 @@ class _Segment(NamedTuple):
     correction: tuple[np.ndarray, float]
 
     def after(self, time: float) -> _Segment:
-        """Return the segment with its start moved along the segment to an arc length `time`."""
+        """Return the remaining segment, which starts at the arc length `time`."""
         ds = time - self.begins
         return self._replace(begins=time, positions=[x + ds * w for x, w in zip(self.positions, self.speed)],
                              force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
@@ -135,15 +135,15 @@ class ContactEventSequence:
 
     Args:
         faces: the active `FaceContact` objects.
-        n: number of locally owned field unknowns.
-        x, control: unknowns (locally owned entries) and control of the state.
-        direction, slope: derivatives of x and control by arc length.
+        n: number of locally owned unknowns of the fields, the first entries of x.
+        x, control: unknowns (locally owned entries) and control of the accepted state.
+        direction, slope: derivatives of x and of the control with respect to arc length.
         response: linearised response of the body to contact forces.
-        batch: number of points whose compliance is solved for at a time.
+        batch: number of points of a face whose compliance is computed at a time.
 
     Attributes:
         touching: number of closed points of each face at the state, on all ranks.
-        ends: arc length up to which the prediction holds.
+        ends: arc length up to which the prediction is valid; inf without a limit.
         stops: True if no admissible contact statuses were found at `ends`.
     """
 
@@ -174,10 +174,10 @@ class ContactEventSequence:
         return self._work >= _SETTINGS.work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """Return the gap closure number k (from 0) along the path.
+        """Return the gap closure number k along the path, at which the points of earlier closures carry contact forces.
 
         Args:
-            k: number of the closure. The contact forces of the earlier closures act.
+            k: number of the closure, from 0.
             length: arc length up to which closures are searched.
 
         Returns:
@@ -196,12 +196,13 @@ class ContactEventSequence:
         return self._closures[k] if self._closures[k].time < length else None
 
     def closures(self, length: float) -> tuple[list[np.ndarray], ...]:
-        """Return the gap closures within an arc length for each face.
+        """Return the gap closures within an arc length `length`, as four lists with an array for each face.
 
         Returns:
-            Arc lengths at which gaps of locally owned points close; `length` for other points. Their positions at these
-            lengths, relative to the tool. Mask of the points that carry a predicted contact force at the end.
-            Derivatives of the positions by arc length before the gaps close; 0 for other points.
+            Arc lengths at which the gaps of locally owned points close, shape (n,); `length` for other points.
+            Positions of the points relative to the tool at these arc lengths, shape (n, 2). Mask of the points that
+            carry a predicted contact force at `length`, shape (n,). Derivatives of the positions with respect to arc
+            length before the closure, shape (n, 2); 0 for other points.
         """
         piece = self._piece(length)
         times, positions = [np.full(len(x), length) for x in piece.positions], piece.after(length).positions
@@ -214,11 +215,13 @@ class ContactEventSequence:
         return times, positions, sure, speeds
 
     def positions(self, length: float) -> list[np.ndarray]:
-        """Return the positions of locally owned points of each face at an arc length, relative to the tool."""
+        """Return for each face the positions of its owned points relative to the tool at an arc length, shape (n, 2).
+        """
         return self._piece(length).after(length).positions
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the change of (x, control) from the tangent to the predicted path at an arc length; None: zero."""
+        """Return the deviation (x, control) of the predicted path from the tangent at an arc length; None if it is 0.
+        """
         piece, m = self._piece(length), len(self._points.point_ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
@@ -233,9 +236,9 @@ class ContactEventSequence:
                 piece.correction[1] - float(self._points.steps @ piece.extra.ravel()))
 
     def _projected(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
-        """Return a segment whose closed points are projected onto their tools or sticking positions at its start.
+        """Return a segment at whose start closed points are projected onto their tools or sticking positions.
 
-        Curved tools need a few iterations. `moved` is a first motion of the points of each face, (n, 2), length.
+        Curved tools need a few projections. moved: for each face, motion of its points before it, shape (n, 2), length.
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = points.values_at(moved) if moved else np.zeros_like(piece.force)
@@ -250,7 +253,7 @@ class ContactEventSequence:
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _free_sliding(self) -> bool:
-        """Give sliding points of the accepted state contact forces of their own; return False if this fails."""
+        """Make the contact forces of points that slide at the accepted state unknowns; return False if this fails."""
         x, control = self._tangent[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
@@ -272,7 +275,7 @@ class ContactEventSequence:
         return True
 
     def _append(self, piece: _Segment, status: np.ndarray) -> bool:
-        """Append a segment with new statuses, shape (m,), at the start of `piece`; return False if this fails."""
+        """Append a segment from the start of `piece`, with new statuses, shape (m,); False if none are admissible."""
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         self._work += 1
         found = points.rates(points.values_at(self._along), status, near, piece.force)
@@ -290,7 +293,8 @@ class ContactEventSequence:
         return True
 
     def _close(self, length: float) -> bool:
-        """Append the segment after the last closure, with a contact force at its point; return False if that fails."""
+        """Append the segment after the last closure, whose point carries a contact force; return False if this fails.
+        """
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
             return False
@@ -303,7 +307,7 @@ class ContactEventSequence:
         return self._append(end._replace(status=status, place=place), status)
 
     def _find_next(self, length: float) -> bool:
-        """Find the next gap closure within an arc length; return False if there is none."""
+        """Store the next gap closure within an arc length, after changes of status; return False if there is none."""
         for _ in range(_SETTINGS.changes):
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
@@ -324,7 +328,7 @@ class ContactEventSequence:
         return self._end is not None and self._store_first(self._missed(self._end, last), length, last)
 
     def _store_first(self, times: list[np.ndarray], length: float, segment: _Segment) -> bool:
-        """Store the earliest of the closures at arc lengths `times` before `length`; return False without one."""
+        """Store the earliest closure before `length`; return False if there is none. times: arc lengths, by face."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
         time, rank, f, i = min(self._comm.allgather(best))
@@ -334,7 +338,8 @@ class ContactEventSequence:
         return True
 
     def _closure(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
-        """Return the gap closure of point i of face f near an arc length, where the points have these positions."""
+        """Return the gap closure of point i of face f near the arc length `time`, for `positions` at this arc length.
+        """
         closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
@@ -376,9 +381,9 @@ class ContactEventSequence:
         return False
 
     def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return the arc lengths at which open points that are inside a tool at `end` passed its surface.
+        """Return for each face the arc lengths at which points passed its surface that are inside the tool at `end`.
 
-        For other points, and for the point of the closure `but`, it is the end of the segment.
+        For other points, and for the point of the closure `but`, the result is the arc length of `end`.
         """
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.positions, last.speed, self._free)):
@@ -392,9 +397,9 @@ class ContactEventSequence:
         return times
 
     def _anderson_mixture(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
-        """Return the Anderson (1965) combination of equilibrium iterates, (before, after) each; None if they diverge.
+        """Return the combination of equilibrium iterates by Anderson acceleration (1965); None if they diverge.
 
-        The stored LU factors make iterates without acceleration oscillate.
+        tried: pairs (segment before an iteration, segment after it).
         """
         changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.positions, y.positions)])
                             for x, y in tried])
@@ -414,7 +419,7 @@ class ContactEventSequence:
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
     def _iterated(self, time: float, piece: _Segment) -> _Segment | None:
-        """Return a path segment after one equilibrium iteration at the arc length `time`; None without LU factors."""
+        """Return the segment after an equilibrium iteration at the arc length `time`; None if it failed."""
         piece, points = piece.extended(len(self._points.point_ids)).after(time), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
@@ -432,7 +437,7 @@ class ContactEventSequence:
         return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
-        """Solve for the compliance of the last and of the expected next closures; return False without LU factors."""
+        """Compute the compliance at the points of the last and of likely next closures; False without LU factors."""
         last, closure, chosen = self._pieces[-1], self._closures[-1], []
         left = length - last.begins
         for f, face in enumerate(self._faces):

@@ -20,19 +20,23 @@ from .response import Response
 log = logging.getLogger("formingx")
 
 MAX_CLOSURES = 0.05
-"""Largest part of the points of a face that close their gaps in one step."""
+"""Largest fraction of the points of a face whose gaps close in one step."""
 
 
 class ContactEventPredictor:
-    """Predictor of the contact events of a `StepLimit`, which calls `active` and `predict`."""
+    """Predictor of the contact events in a step: gap closure, sliding and opening.
+
+    Args:
+        limit: limits of a step by contact, which calls `active` and `predict`.
+    """
 
     def __init__(self, limit: StepLimit):
         self._limit, self._vectors = limit, list[Any]()
 
     def allowed(self, approach: Approach) -> int:
-        """Return the number of points of a face that may close their gaps in one step.
+        """Return the number of points of a face whose gaps may close in one step.
 
-        The number exceeds `Approach.at_once` on faces with stick or friction whose contact has `nodes_per_step=None`.
+        It exceeds `Approach.at_once` only on faces with stick or friction whose contact has `nodes_per_step=None`.
 
         Args:
             approach: the contact of the face.
@@ -47,9 +51,7 @@ class ContactEventPredictor:
 
     @property
     def active(self) -> bool:
-        """True if a face sticks and all active contact laws are predictable.
-
-        With stick the result depends on the order of the gap closures.
+        """True if a face sticks, so that the result depends on the order of gap closures, and all laws are predictable.
         """
         present = self._limit.present
         return any(c.face.contact.sticks and self.allowed(c) > c.at_once for c in present) and all(
@@ -63,8 +65,8 @@ class ContactEventPredictor:
             state: the accepted state.
 
         Returns:
-            The prediction. None if the predictor is not active, if the tangent is singular, or at the start of a path
-            on which no point is in contact yet.
+            The prediction. None if the predictor is not `active`, if the tangent is singular, or at the start of a path
+            without a closed point.
         """
         n, present = curve.problem.n_owned, self._limit.present
         if not self.active or state.kind == "start" and not any(
@@ -76,12 +78,12 @@ class ContactEventPredictor:
 
 
 class ContactEventPrediction:
-    """Predicted contact events after one accepted state; `StepLimit` calls the methods for a step of a given length.
+    """Predicted contact events after an accepted state, for steps of different lengths.
 
     Args:
         present: active contacts.
-        allowed: number of points of each contact that may close their gaps in one step.
-        n: number of locally owned unknowns of the fields.
+        allowed: number of points of each contact whose gaps may close in one step.
+        n: number of locally owned unknowns of the fields, the first entries of x.
         state: the accepted state.
         response: linearised response of the body to contact forces at this state.
     """
@@ -92,9 +94,9 @@ class ContactEventPrediction:
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
-        """Return the arc length of a step that closes the allowed number of gaps.
+        """Return the arc length of a step in which the allowed number of gaps closes.
 
-        It is reduced if a point would pass through a tool.
+        The step is shorter if a point would pass through a tool.
 
         Args:
             length: largest arc length of the step.
@@ -112,8 +114,8 @@ class ContactEventPrediction:
     def _to_enough_closures(self, length: float) -> float | None:
         """Return the arc length, at most `length`, at which enough gaps have closed; None if the prediction fails.
 
-        The step ends before a gap closure if a point that sticks at its start separates earlier: the later closures
-        depend on this point, which the prediction keeps closed.
+        The step ends before a gap closure if a point that sticks at its start opens earlier. The prediction keeps this
+        point closed, so later closures would be wrong.
         """
         sequence, before, at_start = self._sequence, 0.0, LIMITS.closed_at_start * length
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
@@ -138,10 +140,10 @@ class ContactEventPrediction:
 
     @cached_property
     def _sticking(self) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Sticking points of the accepted state that may separate, a tuple for each face.
+        """Sticking points of the accepted state that may open, as a tuple for each face.
 
-        Number of the face, mask of these m points, their normal tractions N, positions x, shape (m, 2), length, and
-        derivatives dN/dx, shape (m, 2).
+        The tuple is (number of the face, mask of these m points, normal tractions N, shape (m,), positions x, shape (m,
+        2), length, derivatives dN/dx, shape (m, 2)).
         """
         found = []
         for f, (approach, x) in enumerate(zip(self._present, self._sequence.positions(0.0))):
@@ -154,7 +156,7 @@ class ContactEventPrediction:
         return found
 
     def _separates(self, length: float) -> bool:
-        """Return True if a sticking point of the accepted state is under tension at an arc length; collective."""
+        """Return True if a sticking point of the accepted state is in tension at an arc length; collective."""
         x = self._sequence.positions(length)
         tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
                       for f, closed, N, start, slope in self._sticking)
@@ -167,8 +169,8 @@ class ContactEventPrediction:
             length: arc length of the step.
 
         Returns:
-            For each active contact the arguments times, places, guessed and speeds of `Approach.prepare`; None if the
-            prediction failed.
+            For each active contact the arguments `times`, `places`, `guessed` and `speeds` of `Approach.prepare`; None
+            if the prediction failed.
         """
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
 

@@ -34,11 +34,11 @@ class StatusSearch:
     """Limits and tolerances of the active-set search for contact statuses that satisfy Coulomb's law.
 
     Attributes:
-        all_at_once: number of trials in which all violating statuses change; later only one changes at a time.
+        all_at_once: number of trials in which all statuses that violate the law change; later one changes at a time.
         tries: maximum number of status sets that are tried.
         none: fraction of the largest rate of force or motion below which a rate is negligible.
-        comparison_length: arc length over which rates of forces are compared with forces.
-        limit: relative distance from the Coulomb cone, or from zero pressure, below which a force counts as on it.
+        comparison_length: arc length by which rates of forces are multiplied to compare them with forces.
+        limit: relative distance from the Coulomb limit mu N, or from N = 0, below which a force counts as on it.
     """
 
     all_at_once: int = 6
@@ -60,7 +60,7 @@ class ToolFrame(NamedTuple):
         normal: unit normals, pointing into the tool, shape (m, 2).
         tangent: unit tangents of the tool, shape (m, 2).
         curvature: curvatures of the tool, shape (m,), 1/length.
-        beyond: penetration that gives the present contact force, less the actual penetration, shape (m,), length.
+        beyond: penetration for the present contact force less the actual penetration, shape (m,), length.
     """
 
     normal: np.ndarray
@@ -70,19 +70,19 @@ class ToolFrame(NamedTuple):
 
 
 class Points:
-    """Contact points of all ranks whose compliance is known: the motion of the body due to unit forces at them.
+    """Contact points of all ranks with known compliance, the motion of the body under unit forces at these points.
 
     Args:
         faces: the active `FaceContact` objects.
-        n: number of locally owned unknowns of the fields.
+        n: number of locally owned unknowns of the fields, the first entries of x.
         size: number of locally owned entries of x.
         response: linearised response of the body to contact forces.
 
     Attributes:
         point_ids: (rank, face, point) of each of the m points.
-        columns: changes of x by forces -1 at the points, locally owned rows, shape (size, 2 m).
-        steps: changes of the control by these forces, shape (2 m,).
-        motions: motion of all locally owned points of each face by these forces, shape (points, 2, 2 m).
+        columns: changes of x under unit forces of sign -1 at the points, locally owned rows, shape (size, 2 m).
+        steps: changes of the control under these forces, shape (2 m,).
+        motions: for each face, motion of its owned points under these forces, shape (points, 2, 2 m), length.
         friction: coefficient of friction, infinite for stick, shape (m,).
         elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
@@ -106,7 +106,7 @@ class Points:
             touched: True if the factorised tangent contains the contact stiffness of these points.
 
         Returns:
-            True; False if the stored factors no longer belong to the state.
+            False if the stored factors no longer belong to the state, and no point was added; else True.
         """
         found = self._response.to_points(chosen)
         if found is None:
@@ -166,12 +166,13 @@ class Points:
         return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
 
     def motion_to_targets(self, positions: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion of points along their tools to given positions, and normal to them to their contact depth.
+        """Return the motion that takes the m points to target positions along, and to their contact depth normal to
+        tools.
 
         Args:
             positions: for each face, present positions of its locally owned points relative to the tool, shape (n, 2),
                 length.
-            place: tangential target positions of the m points, shape (m, 2), length.
+            place: target positions of the m points, whose tangential components count, shape (m, 2), length.
             near: geometry of the tools at the m points.
 
         Returns:
@@ -188,7 +189,7 @@ class Points:
             force: present contact forces in F at the m points, shape (m, 2), which give the depth `ToolFrame.beyond`.
 
         Returns:
-            Normals, tangents, curvatures and missing penetrations.
+            Normals, tangents and curvatures, and the penetrations that are missing for the forces.
         """
         c = self._components
         found = np.zeros((len(self.point_ids), c + c + 2))
@@ -214,7 +215,7 @@ class Points:
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def motion_under(self, forces: np.ndarray, f: int) -> np.ndarray:
-        """Return the motion of all locally owned points of a face due to contact forces at the m points.
+        """Return the motion of all locally owned points of a face under contact forces at the m points.
 
         Args:
             forces: contact forces of sign -1, shape (m, 2).
@@ -238,8 +239,8 @@ class Points:
                 length. Sliding points are moved to the surface of their tools.
 
         Returns:
-            New forces F, and the change of force outside the factorised tangent, dF - S dx, shape (m, 2) each. If no
-            such forces exist, the second is NaN and F is `force`.
+            New forces F; change of force beyond the stiffness S in the factorised tangent, dF - S dx; shape (m, 2)
+            each. If no such forces exist, F is `force`, and the second array is NaN.
         """
         F, outside = np.empty(force.shape), np.empty(force.shape)
         good = compiled().forces_at_end(
@@ -260,8 +261,8 @@ class Points:
             force: present contact forces, shape (m, 2).
 
         Returns:
-            Rates of the forces F, shape (m, 2); rates outside the factorised tangent, dF - S dx, shape (m, 2);
-            statuses, shape (m,). None if no admissible statuses were found.
+            Rates of the forces F, shape (m, 2); their part beyond the stiffness S in the factorised tangent, dF - S dx,
+            shape (m, 2); statuses, shape (m,). None if no admissible statuses were found.
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
@@ -280,7 +281,7 @@ class Points:
             status: contact statuses, shape (m,).
             near: geometry of the tools.
             force: present contact forces, shape (m, 2).
-            rate: their derivatives by arc length, shape (m, 2).
+            rate: derivatives of the forces with respect to arc length, shape (m, 2).
 
         Returns:
             Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
@@ -294,6 +295,6 @@ class Points:
         return time, after
 
     def _given(self, near: ToolFrame) -> tuple:
-        """Return the points as the first arguments of the functions in C."""
+        """Return the arguments for the C structure `Points` (`compiled_contact`)."""
         return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
                 address(near.normal), address(near.curvature))

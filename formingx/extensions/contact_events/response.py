@@ -12,13 +12,18 @@ from ...solve.state import State
 
 
 class Response:
-    """Changes of the unknowns x and the control due to contact forces, orthogonal to the path at an accepted state.
+    r"""Response of the unknowns x and the control to contact forces, linearised at an accepted state.
 
-    The changes lie in the plane, normal to the tangent of the path, in which an arc-length step ends. The methods
-    return None once the stored LU factors belong to another tangent.
+    For right-hand sides E it is
+
+    .. math:: \Delta x = V - \dot x \, (n \cdot V), \qquad \Delta\lambda = - \dot\lambda \, (n \cdot V), \qquad
+              V = K^{-1} E
+
+    with the tangent K, the path tangent (dx/ds, dlambda/ds) and the normal n of the plane in which an arc-length step
+    ends (`Curve.plane_normal`). The methods return None once the stored LU factors belong to another tangent.
 
     Args:
-        curve: path solver (`solve.arc_length.Curve`) that has just factorised the tangent at the state.
+        curve: path solver (`formingx.solve.arc_length.Curve`) that has just factorised the tangent at the state.
         state: the accepted state.
         x: work vector for the unknowns.
         F: work vector for the residual.
@@ -36,7 +41,7 @@ class Response:
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return the response to forces -1 at contact points, one for each component of each point.
+        """Return the response to unit forces of sign -1 at contact points, one for each component of each point.
 
         Args:
             chosen: for each face, local numbers of locally owned points.
@@ -78,7 +83,8 @@ class Response:
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
     def _solve(self, E: Array) -> tuple[Array, Array] | None:
-        """Return the changes of x, (n, m), and of the control, (m,), for right-hand sides E, shape (n, m)."""
+        """Return the responses of x, shape (n, m), and of the control, shape (m,), to right-hand sides E, shape (n, m).
+        """
         V = self._newton.solve_ahead(E)
         if V is None:
             return None
