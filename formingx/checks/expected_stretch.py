@@ -16,10 +16,10 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
         body: the `Body` to be checked.
     """
     for face in body.pressurised_faces:
-        if not face.flat or not face.round:
+        if not face.flat or not face.axisymmetric:
             continue
-        for target in (*body.targets, *body.highest):
-            if (stretch := _of_cap(target, face.radius)) is not None:
+        for target in (*body.targets, *body.table_maxima):
+            if (stretch := _cap_stretch(target, face.radius)) is not None:
                 yield str(target), stretch
         if face.tools:
             points, ends = face.mould_points
@@ -27,7 +27,7 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
                 yield repr(face.tools[0]), float(np.sqrt(_area(ends) / _area(points)))
 
 
-def _of_cap(target: Any, radius: float) -> float | None:
+def _cap_stretch(target: Any, radius: float) -> float | None:
     """Return the pole stretch of a disc inflated to a spherical cap that meets a target, 1 + (height / radius)^2.
 
     This holds for a thin disc whose points move at right angles to the successive caps.

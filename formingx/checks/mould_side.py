@@ -16,7 +16,7 @@ _COVERED = 0.5  # fraction of a face with a tool in front of it, above which the
 
 def moulds(scene: Scene) -> list[Contact]:
     """Return the contacts of a scene with a mould: a fixed tool in front of at least half of the undeformed face."""
-    return [contact for contact in scene.contacts if contact.direction is None and _is_before(scene, contact)]
+    return [contact for contact in scene.contacts if contact.direction is None and _covers_face(scene, contact)]
 
 
 def sign_towards(contact: Contact, load: Any) -> float:
@@ -71,7 +71,7 @@ def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.nda
     return points[size > 0], directions[size > 0] / size[size > 0, None]
 
 
-def _is_before(scene: Scene, contact: Contact) -> bool:
+def _covers_face(scene: Scene, contact: Contact) -> bool:
     """Return True if the tool of a contact lies in front of at least half of the undeformed face of the contact."""
     opposite = _OPPOSITE.get(contact.on)
     if opposite is None or opposite not in scene.mesh.boundaries:

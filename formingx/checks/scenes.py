@@ -179,7 +179,7 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
 @register("start")
 def _units(body: Body) -> Iterator[Finding]:
     """Report target forces, gaps and sizes of tools whose orders of magnitude do not fit the body."""
-    natural = body.natural * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
+    natural = body.pressure_scale * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
     for target in body.targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
             product = "shear modulus x thickness" + " x length" * (body.scene.kinematics.dimension_of_volume == 3)

@@ -62,11 +62,11 @@ class Body(Triangles):
     Attributes:
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
-        natural: largest shear modulus x thickness / length, the magnitude of pressures that deform a sheet, stress.
+        pressure_scale: largest shear modulus x thickness / length, the order of pressures that deform a sheet, stress.
         prescribed: list of `PrescribedValue`: target pressures and travels, and largest values of the stages' tables.
-        goals: True if there are targets or stages.
+        has_targets: True if there are targets or stages.
         targets: all targets of the run and of its stages.
-        highest: largest value of each table that a controlled quantity follows, as a `Target` (`Stage.highest`).
+        table_maxima: largest value of each table that a controlled quantity follows, as a `Target` (`Stage.highest`).
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -74,15 +74,15 @@ class Body(Triangles):
         self.scene = scene
         self._units = units.per_depth() if scene.kinematics.dimension_of_volume == 2 else units
         self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
-        self.natural = max(self.moduli.values()) * self.thickness / self.length
-        self.prescribed = [entry for target in targets for entry in self._values_of(target, scene.driven)]
-        self.goals = bool(targets or stages)
+        self.pressure_scale = max(self.moduli.values()) * self.thickness / self.length
+        self.prescribed = [entry for target in targets for entry in self._prescribed_values(target, scene.driven)]
+        self.has_targets = bool(targets or stages)
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
-        self.highest = [stage.highest for stage in stages if stage.highest]
+        self.table_maxima = [stage.highest for stage in stages if stage.highest]
         for stage in stages:
             control = None if stage.control is None else scene.items[scene.number(stage.label, stage.control)]
             for target in (*stage.intermediate, stage.until):
-                self.prescribed += [] if target is None else self._values_of(target, control)
+                self.prescribed += [] if target is None else self._prescribed_values(target, control)
             for name, table in stage.tables:
                 item = scene.items[scene.number(stage.label, name)]
                 value = float(table[np.argmax(np.abs(table[:, 1])), 1])
@@ -99,7 +99,7 @@ class Body(Triangles):
         """
         return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
-    def _values_of(self, target: Target, control: Any) -> list[PrescribedValue]:
+    def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
         """Return the value of a target in a list; an empty list for a target that is no pressure and no travel.
 
         Args:
@@ -147,7 +147,7 @@ class PressurisedFace:
         tools: contacts of the opposite face with fixed tools.
         line: nodes (R, Z) of the face, shape (n, 2), length.
         length: length of the face in the section.
-        round: True for an axisymmetric body.
+        axisymmetric: True for an axisymmetric body.
         tall: True for a tube: the face is higher than twice its largest R.
         flat: True for a flat sheet: the face is lower than 0.05 times its largest R.
         radius: mean radius of a tube, or outer radius of another body, length.
@@ -157,7 +157,7 @@ class PressurisedFace:
         self.load, self.tools, self._body = load, tools, body
         self.length = float(np.hypot(*np.diff(line, axis=0).T).sum())
         high, wide = float(np.ptp(line[:, 1])), float(line[:, 0].max())
-        self.round = body.scene.kinematics.axisymmetric
+        self.axisymmetric = body.scene.kinematics.axisymmetric
         self.tall, self.flat = high > 2 * wide, high < 0.05 * wide
         self.radius = float(np.median(line[:, 0])) + body.thickness / 2 if self.tall else wide
         self.line = line
@@ -183,7 +183,7 @@ class PressurisedFace:
             The maximum; None if there is none, or if it is not known for this shape or material.
         """
         materials = self._body.scene.materials
-        if not self.round or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
+        if not self.axisymmetric or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
         blown = FreeInflation(self._layers(), self.radius)
         return first_peak(blown.tube if self.tall else blown.disc)
@@ -216,17 +216,18 @@ def _pressures(body: Body) -> Found:
     """Report pressures that are too small to deform the sheet, or larger than any sheet can bear."""
     stiff = max(body.moduli.values())
     for _, _, value, name in body.pressures():
-        if 0 < abs(value) < _SMALLEST_PRESSURE * body.natural:
+        if 0 < abs(value) < _SMALLEST_PRESSURE * body.pressure_scale:
             yield Finding("warning", name,
-                          f"it is {abs(value) / body.natural:.2g} times shear modulus x thickness / length ="
-                          f" {body.format(body.natural, 'pressure')} (shear modulus {body.format(stiff, 'stress')}),"
-                          f" and moves nothing: are the units of stress the same (Pa, kPa, MPa)?")
-        free = not body.scene.contacts and abs(value) > 1e3 * body.natural
+                          f"it is {abs(value) / body.pressure_scale:.2g} times shear modulus x thickness / length ="
+                          f" {body.format(body.pressure_scale, 'pressure')} (shear modulus"
+                          f" {body.format(stiff, 'stress')}), and moves nothing: are the units of stress the same (Pa,"
+                          f" kPa, MPa)?")
+        free = not body.scene.contacts and abs(value) > 1e3 * body.pressure_scale
         if free or abs(value) > _LARGEST_PRESSURE * stiff:
             size, what = stiff, "shear modulus"
             usual = "about ten times the shear modulus fills a corner as small as the wall"
             if free:
-                size, what = body.natural, "shear modulus x thickness / length"
+                size, what = body.pressure_scale, "shear modulus x thickness / length"
                 usual = "a free sheet bears about as much"
             yield Finding("warning", name,
                           f"it is {abs(value) / size:.2g} times {what} = {body.format(size, 'pressure')}; {usual}: are"
@@ -240,7 +241,7 @@ def _limit_pressures(body: Body) -> Found:
         if body.scene.contacts or (peak := face.peak()) is None:
             continue
         for _, _, value, name in body.pressures():
-            if _ABOVE_PEAK * peak.pressure < abs(value) <= 1e3 * body.natural:
+            if _ABOVE_PEAK * peak.pressure < abs(value) <= 1e3 * body.pressure_scale:
                 yield Finding("warning", name,
                               f"a free {'tube' if face.tall else 'sheet'} of {_names(body)} bears at most about"
                               f" {body.format(peak.pressure, 'pressure')} (at a stretch of {peak.stretch:.3g}). Give a"
@@ -255,7 +256,7 @@ def _blow_ratio(body: Body) -> Found:
     Such a tube is blown up more than 8-fold, or its pressure falls far below its maximum, so that it bulges locally.
     """
     for face in body.pressurised_faces:
-        if not (face.tools and face.tall and face.round):
+        if not (face.tools and face.tall and face.axisymmetric):
             continue
         points, ends = face.mould_points
         outer = points[:, 0].max()
@@ -290,7 +291,7 @@ def _open_moulds(body: Body) -> Found:
         depth = float((tool.surface()[0] - open_at.mean(0)).dot(_pressure_direction(face, open_at)).max())
         excessive = [entry for entry in body.pressures()
                      if peak is not None and abs(entry.value) > _ABOVE_PEAK * peak.pressure]
-        deep = not body.goals and depth > _MOULD_DEPTH * np.ptp(points, axis=0).max()
+        deep = not body.has_targets and depth > _MOULD_DEPTH * np.ptp(points, axis=0).max()
         if excessive or deep:
             reason = "a sheet bears little alone"
             if excessive and peak:
