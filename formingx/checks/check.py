@@ -18,10 +18,10 @@ __all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "ranges", 
 
 
 class Report:
-    """Findings of `check`; it prints as text, one finding a line.
+    """Findings of `check`. As text, it has one finding per line.
 
     Args:
-        findings: findings in any order; equal ones are kept once.
+        findings: findings in any order; of equal ones only one is kept.
 
     Attributes:
         findings: list of `Finding`, the worst first; empty for a sound scene.
@@ -43,7 +43,7 @@ class Report:
 
 def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequence[Stage] = (),
           units: Units = NONE) -> Report:
-    """Check a scene before its run; nothing is compiled or solved; collective.
+    """Check a scene before its run, or a finished run; no form is compiled and nothing is solved; collective.
 
     The check covers:
 
@@ -58,10 +58,11 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     `Scene` already. Examples are a body that is free to move, overlapping elements, and locking.
 
     Args:
-        scene: the scene, or the `Path` of a run. For a path, its warnings and its branch points are added.
-        targets: targets of the run; whether they can be reached is checked, too.
-        stages: stages of the process; their targets and tables are checked, too.
-        units: units of the script, for the numbers in the findings.
+        scene: the scene, or the `Path` of a finished run. The findings of the run at its end, and its branch points,
+            are then added.
+        targets: targets of the run. The check also covers whether the body can reach them.
+        stages: stages of the process. The check also covers their targets and tables.
+        units: units of the script, for the numbers in the findings; default none.
 
     Returns:
         A `Report`: the findings, the worst first.
@@ -90,7 +91,9 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:
-    """Return the findings of the checks that precede every run: on magnitudes and on paths of tools; collective.
+    """Return the findings of the checks that precede every run: on magnitudes, and on motions of tools; collective.
+
+    They are a part of the findings of `check`.
 
     Args:
         scene: the scene.
@@ -98,6 +101,6 @@ def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[St
         stages: stages of the process.
 
     Returns:
-        The findings, the worst first; `check` returns further ones.
+        The findings, the worst first; empty for a sound scene.
     """
     return findings_at("start", Body(scene, targets, stages, NONE))

@@ -7,13 +7,16 @@ import numpy as np
 
 
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
-    """Yield the stretches that a flat axisymmetric sheet is expected to reach, as (cause, stretch).
+    """Yield estimates of the stretches that a flat axisymmetric sheet will reach.
 
-    The cause is a target of the run or a mould, as text. A free dome has its largest stretch at the pole. In a mould,
-    the stretch is estimated as the root of the areal draw ratio.
+    For each target of the run, the sheet is taken as a free dome, whose largest stretch is at the pole. In a closed
+    mould, the stretch is the root of the areal draw ratio.
 
     Args:
         body: the `Body` to be checked.
+
+    Yields:
+        Pairs (target or mould as text, stretch).
     """
     for face in body.pressurised_faces:
         if not face.flat or not face.axisymmetric:
@@ -28,13 +31,16 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
 
 
 def _cap_stretch(target: Any, radius: float) -> float | None:
-    """Return the pole stretch of a disc inflated to a spherical cap that meets a target, 1 + (height / radius)^2.
+    r"""Return the pole stretch of a disc of radius a, inflated to a spherical cap of height H that meets a target.
 
-    This holds for a thin disc whose points move at right angles to the successive caps.
+    The points of the thin disc move at right angles to the successive caps, so
+
+    .. math::
+        \lambda = 1 + (H / a)^2
 
     Args:
         target: a `Target` that is a pole stretch, a pole height or an enclosed volume.
-        radius: radius of the disc, length.
+        radius: radius a of the disc, length.
 
     Returns:
         The stretch, or None for another target.

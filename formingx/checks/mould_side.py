@@ -15,19 +15,22 @@ _COVERED = 0.5  # fraction of a face with a tool in front of it, above which the
 
 
 def moulds(scene: Scene) -> list[Contact]:
-    """Return the contacts of a scene with a mould: a fixed tool in front of at least half of the undeformed face."""
+    """Return the contacts of a scene with moulds.
+
+    A mould is a fixed tool that lies in front of at least half of the undeformed face of its contact.
+    """
     return [contact for contact in scene.contacts if contact.direction is None and _covers_face(scene, contact)]
 
 
 def sign_towards(contact: Contact, load: Any) -> float:
-    """Return whether a positive pressure pushes a sheet towards a tool or away from it.
+    """Return the direction in which a positive pressure pushes a sheet: towards a tool or away from it.
 
     Args:
         contact: the `Contact` of one face of the sheet with the tool.
         load: the `Pressure` on the same face or on the opposite one.
 
     Returns:
-        1 towards the tool, -1 away from it, 0 if a boundary is not a face of a sheet.
+        1 towards the tool, -1 away from it, 0 if the contact or the pressure is not on a face of a sheet.
     """
     if contact.on not in _OPPOSITE or load.on not in _OPPOSITE:
         return 0.0
@@ -40,7 +43,7 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
     Args:
         tool: the tool.
         points: positions outside the tool, shape (n, c), length.
-        directions: unit vectors, shape (n, c).
+        directions: unit vectors along which the distances are measured, shape (n, c).
         limit: largest distance that is examined, length.
 
     Returns:
@@ -56,15 +59,17 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
 
 
 def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of a face of a sheet, and unit vectors there that point away from the opposite face.
+    """Return nodes of a face of a sheet, and unit vectors there that point away from the opposite face.
+
+    The unit vector at a node points to it from the nearest node of the opposite face.
 
     Args:
         points: nodes (R, Z) of the face, shape (n, 2), length.
         opposite: nodes (R, Z) of the opposite face, shape (m, 2), length.
 
     Returns:
-        The k nodes of the face that do not lie on the opposite face, shape (k, 2), length. The unit vectors point to
-        each of them from the nearest node of the opposite face, shape (k, 2).
+        The k nodes of the face that do not lie on the opposite face, shape (k, 2), length; the unit vectors, shape
+        (k, 2).
     """
     directions = points - opposite[np.argmin(np.hypot(*(points[:, None] - opposite).transpose(2, 0, 1)), axis=1)]
     size = np.hypot(*directions.T)

@@ -13,10 +13,10 @@ WITHOUT_GAIN = 1_150_000
 def unknowns(scene: Scene) -> int:
     """Return the approximate number of unknowns of a scene, without compiling its forms; collective.
 
-    Lagrange multipliers are left out, and pressure unknowns at an interface between layers count once.
+    Lagrange multipliers are not counted. A continuous pressure counts once at an interface between layers.
 
     Args:
-        scene: the scene. For an axisymmetric membrane, the displacements of the triangles of its mesh are counted.
+        scene: the scene. For an axisymmetric membrane, displacements at all nodes of its mesh of triangles are counted.
     """
     topology = scene.mesh.domain.topology
     topology.create_entities(1)
@@ -30,7 +30,7 @@ def unknowns(scene: Scene) -> int:
 
 @register("start")
 def _ranks(body: Body) -> Iterator[Finding]:
-    """Report a run on several ranks whose mesh is so small that one rank is as fast."""
+    """Report a run on several ranks with so few unknowns that one rank is as fast."""
     size, number = body.scene.mesh.comm.size, unknowns(body.scene)
     if size > 1 and number < WITHOUT_GAIN:
         yield Finding("note", "ranks", f"{size} ranks for {number} unknowns: up to {WITHOUT_GAIN} unknowns an iteration"

@@ -24,7 +24,7 @@ _SMALLEST_WEIGHT = 1e-10        # weight over shear modulus; below it has no eff
 
 @register("start")
 def moduli(body: Body) -> Iterator[Finding]:
-    """Report shear moduli outside the range of polymers in the usual systems of units."""
+    """Report shear moduli that no polymer has in one of the usual systems of units."""
     for layer, value in body.moduli.items():
         in_mm = _LONGEST_IN_METRES < body.length < _SHORTEST_IN_MICROMETRES
         largest = _LARGEST_MODULUS_IN_MM if in_mm else _LARGEST_MODULUS
@@ -37,7 +37,7 @@ def moduli(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def friction(body: Body) -> Iterator[Finding]:
-    """Report coefficients of friction above 5; rubber on dry steel has up to 4."""
+    """Report coefficients of friction above 5; rubber on dry steel reaches 4."""
     for contact in body.scene.contacts:
         if contact.sticks:
             continue
@@ -51,7 +51,7 @@ def friction(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def weight(body: Body) -> Iterator[Finding]:
-    """Report weights and centrifugal forces that are far too large or too small for the shear modulus of the body."""
+    """Report weights and centrifugal loads that are far too large or too small for the shear modulus of the body."""
     for load in body.scene.loads:
         if not isinstance(load, Gravity | CentrifugalLoad) or load.value is None:
             continue

@@ -30,7 +30,10 @@ def _driven(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _edges(body: Body) -> Iterator[Finding]:
-    """Report unsupported edges of a sheet in three dimensions; a flat membrane has no stiffness normal to its plane."""
+    """Report edges without a support of a sheet in three dimensions.
+
+    A flat membrane has no stiffness normal to its plane.
+    """
     if body.scene.kinematics.components == 3:
         supported = {support.on for support in body.scene.supports}
         for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - supported):
@@ -40,7 +43,7 @@ def _edges(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _elements(body: Body) -> Iterator[Finding]:
-    """Report elements whose longest edge is more than 110 times their height."""
+    """Report triangles whose longest edge is more than 110 times their height on that edge."""
     if not body.scene.model.solid:
         return
     worst = int(np.argmax(body.slenderness))
@@ -52,7 +55,7 @@ def _elements(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _locking(body: Body) -> Iterator[Finding]:
-    """Report elements that lock (`locking` of the model of the scene)."""
+    """Report elements of a shape with which the finite elements of the scene's model lock."""
     found = body.scene.model.locking(body.scene.mesh)
     if found is not None:
         yield Finding("warning", "mesh", str(found))
@@ -96,7 +99,7 @@ def _layers(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _fillets(body: Body) -> Iterator[Finding]:
-    """Report fillets of a tool that are shorter than two elements of the face that touches it."""
+    """Report fillets of a tool whose arc is shorter than two elements of the face that touches it."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -121,16 +124,16 @@ def _fillets(body: Body) -> Iterator[Finding]:
 
 
 def _n_owned(scene: Scene, facets: np.ndarray) -> int:
-    """Return how many of the given facets, local numbers of shape (n,), this rank owns."""
+    """Return the number of facets that this rank owns among given ones (local numbers, shape (n,))."""
     return int(np.sum(facets < scene.mesh.domain.topology.index_map(1).size_local))
 
 
 @register("scene")
 def _contact_penalties(body: Body) -> Iterator[Finding]:
-    """Report contact penalties that are too small, so that faces penetrate, or so large that round-off grows.
+    """Report contact penalties that are so small that faces penetrate, or so large that round-off grows.
 
-    The penetration over the thickness is about the traction over penalty x shear modulus. A contact ramp above 0.05
-    thicknesses is reported, too.
+    The penetration over the thickness is about the traction over penalty x shear modulus. A width of the contact ramp
+    above 0.05 times the thickness is reported, too.
     """
     stress = max(body.moduli.values())
     pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"
@@ -153,10 +156,13 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _volume_penalty(body: Body) -> Iterator[Finding]:
-    """Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
+    r"""Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
 
-    The change is about eps stretch^2 / 8: a pressure of about mu stretch^2 over the bulk modulus 8 mu/eps, where mu is
-    the shear modulus.
+    At a stretch lambda the pressure is about mu lambda^2, with the shear modulus mu, and the bulk modulus is 8 mu/eps.
+    So the relative change of volume is about
+
+    .. math::
+        \epsilon \lambda^2 / 8
     """
     model = body.scene.model
     if not model.solid:
@@ -178,7 +184,7 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
 
 @register("start")
 def _units(body: Body) -> Iterator[Finding]:
-    """Report target forces, gaps and sizes of tools whose orders of magnitude do not fit the body."""
+    """Report target forces, distances of tools, and sizes of tools whose magnitudes do not fit the body."""
     natural = body.pressure_scale * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
     for target in body.targets:
         if target.name.endswith("force") and not 1e-4 < (abs(target.value) or natural) / natural < 1e6:
@@ -205,7 +211,7 @@ def _units(body: Body) -> Iterator[Finding]:
 
 @register("scene")
 def _targets(body: Body) -> Iterator[Finding]:
-    """Report targets that cannot be reached."""
+    """Report targets that the body cannot reach, or whose magnitude does not fit it."""
     for target in body.targets:
         reason = unreachable(body.scene, target)
         if reason is not None:                                  # a stage may have made an obstacle inactive

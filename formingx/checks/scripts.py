@@ -35,11 +35,11 @@ def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
     """Check the first scene that a script runs; nothing is solved.
 
     Args:
-        script: a Python file. Its code before the first run is executed, heating (`heat`) included.
+        script: name of a Python file. The code before its first run is executed, calls of `formingx.heat` included.
         arguments: command line arguments of the script.
 
     Returns:
-        The findings on the scene.
+        The findings on the scene and the targets of this run.
 
     Raises:
         InputError: there is no such file, it is not Python, it runs no scene, or `check` refuses the scene or a target.
@@ -76,9 +76,9 @@ def _check_python(file: Path) -> None:
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
-    """Replace `trace`, `solve`, `Process.run` and similar functions within a block by a check of their scene.
+    """Replace functions that run a scene, such as `trace`, by a check of the scene within a `with` block.
 
-    The check raises `_DryRun`.
+    After the check, the replacement raises `_DryRun`.
     """
     def trace(scene, *, until, intermediate=(), **_):
         raise _DryRun(check(scene, targets=[*intermediate, until]))

@@ -35,13 +35,13 @@ _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an ex
 
 
 class PrescribedValue(NamedTuple):
-    """Pressure or travel that a run aims at, or a constant pressure of the scene.
+    """Pressure or travel that a user gives: as a target of the run, in a table of a stage, or as a constant load.
 
     Attributes:
-        item: the load, support or tool of the scene; None if it is not known.
+        item: the load, support or tool of the scene that has the pressure or travel; None if it is not known.
         quantity: "pressure" or "travel".
         value: the pressure, stress, or the travel, length.
-        text: name of the target, load or table in findings.
+        text: text that names the target, load or table in findings.
     """
 
     item: Any
@@ -51,7 +51,7 @@ class PrescribedValue(NamedTuple):
 
 
 class Body(Triangles):
-    """Body before its run, with the targets of the run: the subject of the checks "scene" and "start".
+    """Body before its run, with the targets of the run: the argument of the checks before a run ("scene", "start").
 
     Args:
         scene: the scene.
@@ -63,10 +63,12 @@ class Body(Triangles):
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
         pressure_scale: largest shear modulus x thickness / length, the order of pressures that deform a sheet, stress.
-        prescribed: list of `PrescribedValue`: target pressures and travels, and largest values of the stages' tables.
+        prescribed: list of `PrescribedValue`: target pressures and travels, and the value of largest magnitude of each
+            table of a load, support or tool.
         has_targets: True if there are targets or stages.
         targets: all targets of the run and of its stages.
-        table_maxima: largest value of each table that a controlled quantity follows, as a `Target` (`Stage.highest`).
+        table_maxima: for each stage in which an output quantity follows a table, the largest value of the table as a
+            `Target` (`Stage.highest`).
     """
 
     def __init__(self, scene: Scene, targets: Sequence[Target], stages: Sequence[Stage], units: Units):
@@ -94,13 +96,13 @@ class Body(Triangles):
 
         Args:
             value: the number.
-            kind: "pressure", "travel" (a length), "force" or "stress".
+            kind: quantity that determines the unit: "pressure", "travel" (a length), "force" or "stress".
             digits: number of significant digits.
         """
         return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
     def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
-        """Return the value of a target in a list; an empty list for a target that is no pressure and no travel.
+        """Return a list with the pressure or travel at which a target is met; empty for targets of other quantities.
 
         Args:
             target: the target.
@@ -114,14 +116,14 @@ class Body(Triangles):
         return [PrescribedValue(item, quantity, target.value, str(target))]
 
     def pressures(self) -> list[PrescribedValue]:
-        """Return all pressures of the run: constants, targets, and largest values of tables."""
+        """Return all pressures of the run: constants, targets, and values of largest magnitude of tables."""
         fixed = [PrescribedValue(load, "pressure", load.value, repr(load)) for load in self.scene.loads
                  if load.quantity == "pressure" and not load.driven]
         return [*fixed, *(entry for entry in self.prescribed if entry.quantity == "pressure")]
 
     @cached_property
     def pressurised_faces(self) -> list[PressurisedFace]:
-        """Faces of the sheet on which a pressure acts; empty if the body is not a sheet."""
+        """Faces of the sheet on which a pressure acts, one for each `Pressure`; empty if the body is not a sheet."""
         found = []
         for load in (load for load in self.scene.loads if load.quantity == "pressure"):
             try:
@@ -137,16 +139,16 @@ class PressurisedFace:
     """Face of a sheet on which a pressure acts, with the fixed tools on the other side of the sheet.
 
     Args:
-        body: the `Body`.
-        load: the `Pressure`.
-        line: nodes of the face, shape (n, 2), length.
+        body: the `Body` with the face.
+        load: the `Pressure` on the face.
+        line: nodes (R, Z) of the face in order, shape (n, 2), length.
         tools: contacts of the opposite face with fixed tools.
 
     Attributes:
-        load: the `Pressure`.
+        load: the `Pressure` on the face.
         tools: contacts of the opposite face with fixed tools.
-        line: nodes (R, Z) of the face, shape (n, 2), length.
-        length: length of the face in the section.
+        line: nodes (R, Z) of the face in order, shape (n, 2), length.
+        length: arc length of the face in the section, length.
         axisymmetric: True for an axisymmetric body.
         tall: True for a tube: the face is higher than twice its largest R.
         flat: True for a flat sheet: the face is lower than 0.05 times its largest R.
@@ -164,10 +166,10 @@ class PressurisedFace:
 
     @cached_property
     def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the opposite face, and the points at which they would meet the tools, shapes (n, 2), length.
+        """Points of the opposite face, and the points at which they would meet the tools, shape (n, 2) each, length.
 
-        The points move normal to the sheet, away from the face under pressure. Where no tool is met, the second array
-        is infinite.
+        Each point is moved along the normal of the sheet, away from the face under pressure. If it meets no tool, its
+        row in the second array is infinite.
         """
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         points, directions = outward_directions(points, self.line)
@@ -177,10 +179,11 @@ class PressurisedFace:
         return points, np.where(found, points + np.where(found, distance, 0.0) * directions, np.inf)
 
     def peak(self) -> Peak | None:
-        """Return stretch and pressure of the free sheet or tube at its first pressure maximum, without tools.
+        """Return the first pressure maximum in the inflation of the flat sheet or tube without tools.
 
         Returns:
-            The maximum; None if there is none, or if it is not known for this shape or material.
+            Pressure and stretch at the maximum: pole stretch of a sheet, hoop stretch of a tube. None without a
+            maximum, and for other shapes, plane strain, or materials that vary over the body.
         """
         materials = self._body.scene.materials
         if not self.axisymmetric or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
@@ -189,14 +192,13 @@ class PressurisedFace:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the lowest pressure of a free tube beyond its limit point, over the pressure at the limit point.
+        """Return the lowest pressure of a free tube between its pressure maximum and a blow ratio.
 
         Args:
-            blow_ratio: largest hoop stretch of the tube: radius of the mould over radius of the parison.
+            blow_ratio: hoop stretch of the tube in the mould: radius of the mould over radius of the parison.
 
         Returns:
-            The ratio for stretches up to `blow_ratio`, and the limit point. None if there is no limit point below
-            the blow ratio.
+            The lowest pressure over the maximum, and the maximum. None if there is no maximum below the blow ratio.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -205,7 +207,7 @@ class PressurisedFace:
         return float(pressures.min()) / peak.pressure, peak
 
     def _layers(self) -> list[tuple[Any, float]]:
-        """Return (material, mean thickness, length) of each layer."""
+        """Return for each layer a pair (material, mean thickness as a length)."""
         body = self._body
         return [(material, float(body.area[body.layer == name].sum()) / self.length)
                 for name, material in body.scene.materials.items()]
@@ -213,7 +215,7 @@ class PressurisedFace:
 
 @register("start")
 def _pressures(body: Body) -> Found:
-    """Report pressures that are too small to deform the sheet, or larger than any sheet can bear."""
+    """Report pressures that are too small to deform a sheet, or larger than any sheet can bear."""
     stiff = max(body.moduli.values())
     for _, _, value, name in body.pressures():
         if 0 < abs(value) < _SMALLEST_PRESSURE * body.pressure_scale:
@@ -236,7 +238,10 @@ def _pressures(body: Body) -> Found:
 
 @register("scene")
 def _limit_pressures(body: Body) -> Found:
-    """Report pressures above the limit point of a free sheet of a material that does not stiffen."""
+    """Report pressures above the pressure maximum of a sheet or tube without tools.
+
+    Materials that stiffen enough have no such maximum.
+    """
     for face in body.pressurised_faces:
         if body.scene.contacts or (peak := face.peak()) is None:
             continue
@@ -251,9 +256,9 @@ def _limit_pressures(body: Body) -> Found:
 
 @register("scene")
 def _blow_ratio(body: Body) -> Found:
-    """Report a tube blown into a mould that is too wide for it.
+    """Report a tube that is blown into a mould that is too wide for it.
 
-    Such a tube is blown up more than 8-fold, or its pressure falls far below its maximum, so that it bulges locally.
+    Its radius grows more than 8-fold, or its pressure falls below 0.8 times its maximum, so that it bulges locally.
     """
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.axisymmetric):
@@ -278,7 +283,7 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _open_moulds(body: Body) -> Found:
-    """Report an open mould: where a sheet meets no tool, it bears only the pressure of a free sheet."""
+    """Report an open mould: a part of the sheet meets no tool there, and bears only the pressure of a free sheet."""
     for face in body.pressurised_faces:
         if not face.tools:
             continue
@@ -305,9 +310,13 @@ def _open_moulds(body: Body) -> Found:
 
 
 def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray:
-    """Return the unit vector (r, z) in which the pressure pushes given points (n, 2) of the opposite face.
+    """Return the direction in which a pressure pushes the sheet, as a unit vector (r, z).
 
-    It is radial for a tube and axial for other bodies.
+    It is radially outward for a tube and axial for other bodies.
+
+    Args:
+        face: the face under pressure.
+        points: points (r, z) of the opposite face, shape (n, 2), length.
     """
     offset = points.mean(0) - face.line.mean(0)
     return np.array([0.0, np.sign(offset[1])]) if not face.tall else np.array([1.0, 0.0])
@@ -315,7 +324,7 @@ def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray
 
 @register("start")
 def _mould_sizes(body: Body) -> Found:
-    """Report a flat sheet that is many times wider or narrower than its mould."""
+    """Report a flat sheet that is more than 4 times wider or narrower than its mould."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue
@@ -373,21 +382,23 @@ def _tool_paths(body: Body) -> Found:
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) -> float:
-    """Return the smallest gap between tools and faces after a travel of the tools, length.
+    """Return the smallest distance between tools and undeformed faces after a travel of the tools, length.
+
+    It is negative if a tool lies inside the body.
 
     Args:
-        faces: pairs (tool, nodes of the face that it touches, shape (n, c)).
-        direction: direction of motion of all tools, shape (c,).
-        travel: the travel, length for a unit vector.
+        faces: pairs (tool, nodes of the face that it touches, shape (n, c), length).
+        direction: displacement of all tools per travel, shape (c,).
+        travel: the travel, length.
     """
     return min(float(-tool.signed_distance(nodes - travel * np.array(direction)).max()) for tool, nodes in faces)
 
 
 @register("scene")
 def _sharp_edges(body: Body) -> Found:
-    """Report convex sharp edges of moving tools over which the body slides, if there are two or more rows of elements.
+    """Report sharp convex edges of moving tools over which a body with two or more rows of elements may slide.
 
-    The force there depends on the positions of the nodes (tests/test_check.py).
+    The tool force then depends on the positions of the nodes (tests/test_check.py).
     """
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
@@ -409,5 +420,5 @@ def _sharp_edges(body: Body) -> Found:
 
 
 def _names(body: Body) -> str:
-    """Return the materials of a body as text."""
+    """Return the names of the materials of a body as text, separated by commas."""
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))

@@ -17,12 +17,12 @@ _GAP_GROWTH = 1.1  # smallest ratio of the mean distances of a face from its mou
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
-    """Report tools that never touched the body while they were active, and moulds from which the body moved away.
+    """Report tools that the body never touched while they were active, and moulds from which the body moved away.
 
     Collective.
 
     Args:
-        path: the `Path` of the run. A remeshed run is not examined.
+        path: the `Path` of the run. There are no findings on a remeshed run.
     """
     segment = path.segments[-1]
     problem, states = segment.problem, segment.states
@@ -56,10 +56,10 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states in which a tool may touch the body.
+    """Return states in which the contact of a tool with the body is to be examined.
 
-    This is the last state with a force on the tool. Without a force, all states with contact of any tool are returned,
-    because the side walls of a mould bear no force along Z.
+    It is the last state with a force on the tool. If no state has a force, all states in which any tool touches the
+    body are returned, because the side walls of a mould bear no force along Z.
 
     Args:
         path: the `Path` of the run.
@@ -73,16 +73,16 @@ def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    """Return True if one of the given `FaceContact` objects has closed points in a state."""
+    """Return True if a contact point of one of the given `FaceContact` objects touches its tool in a state."""
     with problem.state_context(state):
         return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
                    if contact in problem.present)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Return the gaps at the n contact points of given `FaceContact` objects in a state, all ranks, shape (n,), length.
+    """Return the gaps at all contact points of given `FaceContact` objects in a state, shape (n,), length.
 
-    A gap is negative inside the tool.
+    A gap is negative inside the tool. The points of all ranks are included; collective.
     """
     with problem.state_context(state):
         found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
