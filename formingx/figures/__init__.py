@@ -21,7 +21,7 @@ class Axes(Protocol):
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return an empty matplotlib figure with a grid of plots; `savefig` needs no screen.
+    """Return an empty matplotlib figure with one or several plots in a grid; saving it needs no screen.
 
     Args:
         columns: number of plots side by side.
@@ -31,7 +31,8 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
         rows: number of plots one above the other.
 
     Returns:
-        The figure, and an array of its axes, row by row; a single plot gives its axes alone.
+        The figure, and an array of the axes of its plots, row by row. For a single plot, its axes are returned instead
+        of the array.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -72,13 +73,13 @@ class _LoadedWhenUsed(types.ModuleType):
 
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
-    """Draw rigid tools in grey, as far as they reach into a box.
+    """Draw the sections of rigid tools in grey, within a box.
 
     Args:
         axes: matplotlib axes.
         placed: for each tool the pair (`Tool`, its displacement (r, z), length).
-        low: lower corner (r, z) of the box, length.
-        high: upper corner (r, z) of the box, length.
+        low: lower left corner (r, z) of the box, length.
+        high: upper right corner (r, z) of the box, length.
         mirror: True to draw the mirror images of the tools at r = 0, too.
     """
     box = np.array([low, high], dtype=float)

@@ -19,7 +19,7 @@ class ShownFigure(Figure):
 
 
 class ShownAxes(Axes):
-    """Axes of matplotlib for which a notebook shows the figure that contains them."""
+    """Axes of matplotlib; for them, a notebook shows the figure that contains them as a PNG picture."""
 
     def _repr_png_(self) -> bytes | None:
         show = getattr(self.figure, "_repr_png_", None)

@@ -21,8 +21,8 @@ class Table(NamedTuple):
     """Columns of numbers with n rows, from a CSV file or from arrays.
 
     Attributes:
-        name: name of the file, for messages.
-        columns: {name of the column: values, shape (n,)}; nan where the cell is empty or no number.
+        name: name of the file or of the arrays, for messages.
+        columns: {name of the column: values, shape (n,)}; nan for a cell that is empty or holds no number.
         units: {name of the column: its unit in the header, or None}.
         kinds: the n cells of the column "kind" that `Path.to_csv` writes, or None without this column.
     """
@@ -33,18 +33,20 @@ class Table(NamedTuple):
     kinds: list[str] | None = None
 
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
-        """Return a column as it is in the file, or converted to another unit.
+        """Return the values of a column, converted to a unit.
 
         Args:
             column: name of the column.
-            requested: name of the unit of the returned values, or a factor that multiplies the values. A name needs a
-                unit in the header. None: the values of the file, whose header must state no unit.
+            requested: unit of the returned values, to which they are converted from the unit in the header; or a factor
+                by which the values are multiplied. None: the values are returned as they are, if the header states
+                no unit.
 
         Returns:
             The values, shape (n,).
 
         Raises:
-            InputError: there is no such column, a cell is empty or not a number, or a unit is unknown or missing.
+            InputError: there is no such column, or a cell is empty or not a finite number. A unit is unknown, is
+                missing in the header, or stands there although `requested` is None.
         """
         known(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]
@@ -65,7 +67,7 @@ class Table(NamedTuple):
 
 
 def conversion(unit: str, requested: str) -> float:
-    """Return the factor that converts numbers from one unit to another; 10 from "cm" to "mm".
+    """Return the factor that converts numbers from one unit to another, for example 10 from "cm" to "mm".
 
     Args:
         unit: name of the unit of the numbers.
@@ -87,16 +89,16 @@ def conversion(unit: str, requested: str) -> float:
 
 
 def read(file: Any) -> Table:
-    """Return the table in a CSV file; columns without numbers are left out.
+    """Return the table in a CSV file with its units; columns without any number are left out.
 
-    The header names the columns, with units in brackets, as in "pressure [psi]".
+    The first row is the header: it names the columns, with units in brackets, as in "pressure [psi]".
 
     Args:
         file: name of the file.
 
     Raises:
-        InputError: the file cannot be read (`records`). There is no header, fewer than two rows, or a row of another
-            length.
+        InputError: the file cannot be read (`records`), has no header or fewer than two rows of data, names a column
+            twice, or has a row with more or fewer cells than the header.
     """
     name = os.fspath(file_path("table", file))
     cells = records(name)
@@ -122,8 +124,8 @@ def read(file: Any) -> Table:
 def records(file: Any) -> list[tuple[int, list[str]]]:
     """Return the cells of a CSV file as text; decimal commas are replaced by points.
 
-    Semicolons or tabs separate cells if the first line contains one outside quotes; otherwise commas do. Lines that
-    begin with # are skipped. Decimal commas are recognised in cells between semicolons, tabs or quotes.
+    Cells are separated by semicolons or tabs if the first line contains one outside quotes, otherwise by commas. Empty
+    lines, and lines that begin with #, are skipped. Between commas, a number with a decimal comma must be in quotes.
 
     Args:
         file: name of the file.
@@ -163,9 +165,9 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """Return pairs (line number, line) of the lines of a file without empty lines and comments.
+    """Return pairs (line number, line) of the lines of a file, without empty lines and comments.
 
-    A comment is a line that begins with #. Inside quotes all lines are kept.
+    A comment is a line that begins with #. Between a quote and its end, all lines are kept.
     """
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
@@ -201,7 +203,11 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
 def name_and_unit(cell: str) -> tuple[str, str | None]:
     """Return the name and the unit of a column from its cell in the header.
 
-    "pressure [psi]" gives ("pressure", "psi"). The unit is None without brackets, and for "", "-" and "1" in them.
+    For example, "pressure [psi]" gives ("pressure", "psi"). The unit is None without brackets, and if the brackets are
+    empty or contain "-" or "1".
+
+    Args:
+        cell: text of the cell.
     """
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
     if not found or not found[1]:

@@ -11,7 +11,11 @@ _NUMBER = re.compile(rf"(?:{_WHOLE}(?:\.[0-9]*)?|[+-]?\.[0-9]+)(?:[eE]{_WHOLE})?
 
 
 def is_number(word: str) -> bool:
-    """Return True if a text without spaces is a number; "nan" and "inf" are numbers."""
+    """Return True if a text is a number: decimal digits with a point and an exponent, "nan" or "inf".
+
+    Args:
+        word: text without spaces.
+    """
     return _NUMBER.fullmatch(word) is not None
 
 

@@ -20,7 +20,7 @@ def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
 
     Args:
         file: name of the file; missing folders are created.
-        write: function that writes the content to the stream given to it.
+        write: function that writes the content to a stream, its argument.
         mode: "w" for text (UTF-8), "wb" for bytes.
 
     Raises:

@@ -10,12 +10,15 @@ from .output import replace
 
 
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the volume inside closed surfaces of triangles, length^3.
+    r"""Return the volume inside closed surfaces of triangles with the corners a, b and c, length^3.
+
+    .. math::
+        V = \frac{1}{6} \sum a \cdot (b \times c)
 
     Args:
         points: corners of the triangles, shape (n, 3), length.
-        triangles: for each triangle the rows of its corners in `points`, shape (m, 3), counter-clockwise seen from
-            outside.
+        triangles: for each triangle the row numbers of its corners in `points`, shape (m, 3), counter-clockwise seen
+            from outside. If they are clockwise, the volume is negative.
     """
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
@@ -26,8 +29,8 @@ def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
 
     Args:
         points: corners of the triangles, shape (n, 3), length.
-        triangles: for each triangle the rows of its corners in `points`, shape (m, 3), counter-clockwise seen from
-            outside.
+        triangles: for each triangle the row numbers of its corners in `points`, shape (m, 3), counter-clockwise seen
+            from outside.
         file: name of the file.
 
     Raises:

@@ -11,21 +11,22 @@ _MAX_POINTS = 2000  # a discontinuous or noisy function needs more
 
 def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
               ) -> list[tuple[float, float]]:
-    """Return a table of a function of time, for `Stage(amplitudes={item: ...})`.
+    """Return a table of a function of time, as `Stage(amplitudes={item: ...})` needs it.
+
+    Points are added until the table, linear between its points, agrees with the function amid each interval.
 
     Args:
-        function: function of time that returns the controlled quantity. It is called with an array of times, or with a
-            number if it does not accept arrays.
-        until: last process time.
-        start: first process time.
-        tolerance: largest difference between the function and the table, which is linear between its points, over the
-            range of the values.
+        function: function of the time that returns the value of a load, support or tool. It is called with an array of
+            times, or with a number if it does not accept arrays.
+        until: last time of the table.
+        start: first time of the table.
+        tolerance: largest difference between function and table, over the range of the function's values.
 
     Returns:
-        [(time, value), ...].
+        The table: pairs (time, value) in ascending order of time.
 
     Raises:
-        InputError: the times are in the wrong order, a value is not finite, or more than 2000 points are needed.
+        InputError: `until` is not after `start`, a value is not finite, or more than 2000 points are needed.
 
     >>> stroke = fx.amplitude(lambda t: 20 * (1 - np.cos(np.pi * t)), until=1.0)
     >>> len(stroke), stroke[0], round(stroke[-1][1], 6)
@@ -51,5 +52,5 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
 
 
 def _evaluate(function: Callable, t: np.ndarray) -> np.ndarray:
-    """Return the values of the user's function at times t, shape (n,)."""
+    """Return the values of the user's function at n times t, shape (n,)."""
     return values("amplitude: function", function, {"t": t})

@@ -7,7 +7,14 @@ from ..errors import fraction
 
 def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], points: int, confidence: float
                 ) -> dict[str, tuple[float, float]]:
-    """Return the confidence intervals of constants of a least-squares fit by Student's t distribution.
+    r"""Return confidence intervals of the constants of a least-squares fit.
+
+    With the fitted value c of a constant, its standard error s, n measured points and m constants, the ends are
+
+    .. math::
+        c \pm t_{n-m} \, s
+
+    Here t is the quantile of Student's t distribution with n - m degrees of freedom, at least one.
 
     Args:
         constants: {constant: fitted value}.
@@ -16,10 +23,10 @@ def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], poi
         confidence: confidence level, between 0 and 1.
 
     Returns:
-        {constant: (lowest, highest)}.
+        {constant: (lower end, upper end)}.
 
     Raises:
-        InputError: a confidence outside (0, 1).
+        InputError: the confidence level does not lie between 0 and 1.
     """
     from scipy.stats import t
     width = t.ppf((1 + fraction("intervals: confidence", confidence)) / 2, max(points - len(constants), 1))

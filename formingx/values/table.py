@@ -12,19 +12,19 @@ from ..errors import InputError, finite
 
 
 class Table:
-    """Smooth curve through points, monotone between successive points (see `table`).
+    """Smooth curve y(x) through n points, monotone between successive points (see `table`).
 
-    Call it with numbers, shape (...), for values of this shape, or with a UFL expression for an expression. Numbers
-    outside the table are refused. An expression is extrapolated linearly, because an iteration may leave the table;
-    `check` is called before a state is accepted.
+    A table is called with numbers, shape (...), and returns values of this shape; or with a UFL expression,
+    and returns an expression. Numbers outside the table are refused. Beyond the table an expression is extrapolated
+    linearly, because an iteration may leave the table; `check` is called before a state is accepted.
 
     Args:
         points: {x: y}, at least two points.
 
     Attributes:
-        x: arguments of the points in ascending order, shape (n,).
-        y: values at these arguments, shape (n,).
-        limits: smallest and largest argument.
+        x: arguments x of the points in ascending order, shape (n,).
+        y: values y at these arguments, shape (n,).
+        limits: smallest and largest argument x.
     """
 
     def __init__(self, points: Mapping[float, float]):
@@ -58,7 +58,7 @@ class Table:
             name: name of x in the message.
 
         Raises:
-            InputError: a number lies outside.
+            InputError: a number lies outside the table.
         """
         x = np.asarray(x, dtype=float)
         tolerance = 1e-9 * (self.x[-1] - self.x[0])
@@ -94,13 +94,13 @@ class Table:
 
 
 def table(points: Mapping[float, float]) -> Table:
-    """Return a smooth curve through points, such as a modulus that depends on the temperature.
+    """Return a smooth curve y(x) through points, such as a modulus that depends on the temperature.
 
     Between two points it is a monotone cubic without overshoot (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5
     (1984) 300).
 
     Args:
-        points: {x: y}.
+        points: {x: y}, such as {temperature: modulus}.
 
     Raises:
         InputError: there are fewer than two points, or one is not two finite numbers.

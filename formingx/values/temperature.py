@@ -21,15 +21,17 @@ GAS_CONSTANT = 8.31446261815324
 
 
 class FunctionOfTemperature:
-    """Function f(T) of the temperature of the scene, for arrays of shape (n,).
+    """Function f(T) of the temperature T, in the unit of the scene. It is called with arrays of temperatures.
 
     Args:
-        function: the function f, a `Table` or a function of arrays of temperatures, shape (n,).
-        words: name of the function in messages.
-        limits: lowest and highest temperature at which f is known; default the limits of f, if it has any.
+        function: the function f: a `Table`, or a function of an array of temperatures, shape (n,), that returns values
+            of this shape.
+        words: name of the function in messages; default a name made from the function.
+        limits: lowest and highest temperature at which f is known; default the limits of f, or none.
 
     Attributes:
-        limits: lowest and highest temperature; infinite if unlimited.
+        function: the function f.
+        limits: lowest and highest temperature at which f is known; infinite without limits.
     """
 
     def __init__(self, function: Callable, words: str | None = None, limits: tuple[float, float] | None = None):
@@ -50,10 +52,13 @@ class FunctionOfTemperature:
         return values(f"the constant {self!r}", self.function, {"temperature": T})
 
     def clamped(self, temperature: ArrayLike) -> np.ndarray:
-        """Return the values at temperatures, of their shape; beyond `limits` the value at the nearer limit.
+        """Return the values of the function at temperatures, of their shape; beyond `limits`, the value at the limit.
 
-        It is used during a run, in which the temperature of a body changes. A scene refuses an initial temperature
-        beyond the limits. A check before the run reports temperatures of tools and air beyond them.
+        A run uses it for a body whose temperature changes. A scene refuses an initial temperature beyond the limits. A
+        check before the run reports temperatures of tools and air beyond them.
+
+        Args:
+            temperature: temperatures, any shape, in the unit of the scene.
         """
         return self(np.clip(temperature, *self.limits))
 
@@ -62,22 +67,22 @@ class FunctionOfTemperature:
 
 
 class WLF:
-    r"""Shift factor of Williams, Landel and Ferry (J. Am. Chem. Soc. 77 (1955) 3701).
+    r"""Shift factor aT of Williams, Landel and Ferry (J. Am. Chem. Soc. 77 (1955) 3701), a function of temperature.
 
-    Relaxation times at the temperature T are aT times those at the reference temperature Tr.
+    At the temperature T, relaxation times are aT times their values at the reference temperature Tr.
 
     .. math:: \log_{10} a_T = -\frac{c_1 (T - T_r)}{c_2 + T - T_r}
 
-    Call it with numbers, shape (...), or with a UFL expression of the temperature. It is defined above Tr - c2, where
-    aT becomes infinite. In a run, a colder body has the value at the lower limit, 1e30, and does not relax.
+    It is called with numbers, shape (...), or with a UFL expression of the temperature. It is defined above Tr - c2,
+    where aT becomes infinite. In a run, aT is at most 1e30, at the lower limit: a colder body does not relax.
 
     Attributes:
-        limits: the temperature at which aT is 1e30, and infinity.
+        limits: lowest and highest temperature in a run: the temperature at which aT is 1e30, and infinity.
 
     Args:
         c1: dimensionless constant for logarithms to base 10, above 0.
-        c2: temperature difference, above 0.
-        reference: reference temperature Tr.
+        c2: temperature difference, above 0, in the unit of the scene.
+        reference: reference temperature Tr, in the unit of the scene.
 
     >>> slower = fx.WLF(c1=17.44, c2=51.6, reference=100.0)
     >>> round(float(np.log10(slower(110.0))), 4)
@@ -106,13 +111,14 @@ class WLF:
 
 
 class Arrhenius:
-    r"""Shift factor of Arrhenius, with absolute temperatures T and Tr.
+    r"""Shift factor aT of Arrhenius, a function of temperature.
 
-    Relaxation times at the temperature T are aT times those at the reference temperature Tr.
+    At the absolute temperature T, relaxation times are aT times their values at the reference temperature Tr.
 
     .. math:: \ln a_T = \frac{E}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
 
-    R is the molar gas constant. Call it with numbers, shape (...), or with a UFL expression of the temperature.
+    R is the molar gas constant. The factor is called with numbers, shape (...), or with a UFL expression of the
+    temperature, both in the unit `unit`.
 
     Args:
         activation_energy: activation energy E, J/mol, above 0.
@@ -148,12 +154,12 @@ class Arrhenius:
 
 
 def _difference(shift: Any, temperature: Any, limit: float, what: str) -> Any:
-    """Return a temperature minus the limit above which a shift factor is defined.
+    """Return temperatures minus the lower limit of the range in which a shift factor is defined.
 
     Args:
         shift: the `WLF` or `Arrhenius`, for messages.
-        temperature: numbers, shape (...), or a UFL expression.
-        limit: the limit.
+        temperature: temperatures, numbers of shape (...) or a UFL expression.
+        limit: the lower limit, in the same unit.
         what: name of the limit, for messages.
 
     Raises:
