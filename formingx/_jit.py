@@ -175,8 +175,8 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 
     Args:
         name: first part of the file name of the library.
-        code: C source.
-        flags: flags of the compiler.
+        code: C source of the functions.
+        flags: options of the compiler.
 
     Raises:
         RuntimeError: there is no compiler, or it failed.

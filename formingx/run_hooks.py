@@ -60,6 +60,9 @@ class MeshAdaptation(Protocol):
         Args:
             path: the first run.
             options: {name: value} of arguments of `formingx.mesh.adapted`; the caller has checked the names.
+
+        Returns:
+            The adapted mesh.
         """
 
 

@@ -103,6 +103,9 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
         allow_inadmissible: argument of `trace`.
         found: findings of the checks before the run, which this function logs.
         timed: True if the process time is a column.
+
+    Returns:
+        The path.
     """
     record = Record(curve.problem, curve)
     record.findings = found

@@ -325,7 +325,10 @@ def load(folder: Any, scene: Scene, state: int | None = None) -> Path:
     Args:
         folder: folder written by `trace(..., checkpoint=folder)` or `Path.save(folder)`, on any number of ranks.
         scene: the same scene, made by the same script.
-        state: number of the last state to be read (0: the start); default all.
+        state: number of the last state to be read (0: the start); None: all states.
+
+    Returns:
+        The path with its states.
 
     Raises:
         InputError: there is no checkpoint, it is damaged, or it is of another mesh or scene; the message names the

@@ -105,6 +105,9 @@ class Units:
             volume: volume, length^3; in cm^3 if the unit of length is not given.
             density: density, g/cm3.
 
+        Returns:
+            The mass, g; in plane strain g per unit of depth.
+
         Raises:
             InputError: a number is not finite, or the density is above 25 g/cm3.
         """

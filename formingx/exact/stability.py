@@ -156,6 +156,9 @@ def clamped_plate(n: int) -> float:
     Args:
         n: number of waves round the axis, 0 or larger.
 
+    Returns:
+        N a^2/D.
+
     >>> from formingx.exact.stability import clamped_plate
     >>> round(clamped_plate(0), 2)
     14.68

@@ -215,6 +215,9 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
         grading: size of the element at the equator over the size of the element at the axis, along the meridian.
         comm: MPI communicator.
 
+    Returns:
+        The mesh, of quadratic triangles.
+
     Raises:
         InputError: as in `disc`.
 
@@ -251,6 +254,9 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
             default (60, 2).
         grading: size of the element at the neck over the element at the axis.
         comm: MPI communicator.
+
+    Returns:
+        The mesh, of quadratic triangles.
 
     Raises:
         InputError: as in `disc`; there are fewer than two elements along the meridian.
@@ -312,6 +318,9 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
         layers: {layer name: thickness of the layer relative to the other layers} from `inner` to `outer`; default one
             layer, `wall`.
         comm: MPI communicator.
+
+    Returns:
+        The mesh, of quadratic triangles.
 
     Raises:
         InputError: points are not finite, are fewer than 2, or differ in number between the lines. The lines cross or

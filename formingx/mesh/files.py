@@ -22,6 +22,9 @@ def read(file: str | os.PathLike, comm: MPI.Comm = MPI.COMM_WORLD) -> Mesh:
         file: name of the file.
         comm: MPI communicator.
 
+    Returns:
+        The mesh, distributed over the ranks of `comm`.
+
     Raises:
         InputError: the file is missing or not in this format, has no named group of dimension 2, or contains an invalid
             mesh (`Mesh.check`).

@@ -99,7 +99,10 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
     Args:
         make: function that returns the grid; rank 0 calls it and checks the grid.
         comm: MPI communicator.
-        what: name of the mesh in messages.
+        what: name of the mesh, for error messages.
+
+    Returns:
+        The mesh, distributed over the ranks of `comm`.
 
     Raises:
         InputError: `make` raised it, or the elements are invalid. All ranks raise it.

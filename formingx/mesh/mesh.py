@@ -127,6 +127,9 @@ class Mesh:
                 `concentrate` of `disc`), unless the boundary ends before.
             along: coordinate that `within` limits, "r" or "z".
 
+        Returns:
+            A mesh that shares the elements of this mesh.
+
         Raises:
             InputError: `of` is unknown, `name` is not new, no facet lies between the coordinates, or a facet is cut.
         """
