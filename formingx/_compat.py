@@ -7,6 +7,7 @@ from typing import Any
 
 import dolfinx
 import ffcx
+import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem, jit, la
 from dolfinx.fem import petsc as fem_petsc
@@ -22,6 +23,9 @@ if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
 
 # DOLFINx's own compilation waits for another process with the same form; its limit of 10 s is short for that.
 JIT_OPTIONS = {"timeout": 120}
+
+_add_to_array = fem.assemble_vector.dispatch(np.ndarray)
+"""Variant of `assemble_vector` of DOLFINx that adds to an array."""
 
 _compiled: dict[str, Any] = {}
 """Compiled forms and expressions of this process, by their keys."""
@@ -150,10 +154,11 @@ def assemble_vector(vector: Any, form: Any) -> Any:
     Returns:
         Locally owned entries, shape (n,), a view of the vector.
     """
-    vector.array[:] = 0
-    fem.assemble_vector(vector.array, form)
+    values = vector.array
+    values[:] = 0
+    _add_to_array(values, form)
     vector.scatter_reverse(la.InsertMode.add)
-    return vector.array[: vector.index_map.size_local * vector.block_size]
+    return values[: vector.index_map.size_local * vector.block_size]
 
 
 def interpolation_points(space: Any) -> Any:

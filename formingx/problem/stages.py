@@ -79,7 +79,7 @@ class Stages(Vectors):
     @property
     def control(self) -> float:
         """Present control of the forms; inside `state_context` the control of the state."""
-        return float(self.forms.control.value)
+        return float(self._control)
 
     @property
     def constrained(self) -> np.ndarray:
@@ -103,7 +103,7 @@ class Stages(Vectors):
         Yields:
             The problem.
         """
-        fields, control, clock = self.forms.w.x.array.copy(), self.control, self.forms.clock
+        fields, control, clock = self._fields.copy(), self.control, self.forms.clock
         stage, variables, x, predicted = self._stage, self.history_variables, self.x.array_r.copy(), self._predicted
         try:
             self.restore(state)
@@ -115,8 +115,7 @@ class Stages(Vectors):
             self._take(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
-            self.forms.w.x.array[:] = fields
-            self.forms.control.value = control
+            self._fields[:], self._control[()] = fields, control
 
     def restore(self, state: Any) -> None:
         """Restore step data, history variables and process time of an accepted state, to start a step from it.
@@ -163,12 +162,14 @@ class Stages(Vectors):
         Returns:
             Lagrange multipliers of the constrained means, shape (means,), the same on all ranks.
         """
-        self.forms.control.value = control
-        self.set_fields(x.array_r)
-        multipliers, last = np.zeros(len(self._stage.active.rows)), self.comm.size - 1
+        values, last = x.array_r, self.comm.size - 1
+        self.set_fields_and_control(values, control)
+        if not last:
+            return values[self._n:].copy()
+        multipliers = np.zeros(len(self._stage.active.rows))
         if self.comm.rank == last:
-            multipliers[:] = x.array_r[self._n:]
-        if last and len(multipliers):
+            multipliers[:] = values[self._n:]
+        if len(multipliers):
             self.comm.Bcast(multipliers, root=last)
         return multipliers
 

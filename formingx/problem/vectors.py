@@ -31,6 +31,16 @@ class Vectors(Histories):
         return int(self._n)
 
     @cached_property
+    def _fields(self) -> np.ndarray:
+        """Fields of the forms on this rank, with ghosts: the memory of `forms.w`."""
+        return np.asarray(self.forms.w.x.array)
+
+    @cached_property
+    def _control(self) -> np.ndarray:
+        """Control of the forms, shape (): the memory of `forms.control`."""
+        return np.asarray(self.forms.control.value)
+
+    @cached_property
     def _metric(self) -> np.ndarray:
         """Lumped mass matrix of the displacement for density 1/V, locally owned diagonal entries, shape (n,)."""
         return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
@@ -42,7 +52,7 @@ class Vectors(Histories):
             x: unknowns, locally owned entries, shape (n,).
             control: load parameter (control), dimensionless.
         """
-        self.forms.control.value = control
+        self._control[()] = control
         self.set_fields(x)
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
@@ -68,9 +78,8 @@ class Vectors(Histories):
         Args:
             x: unknowns, locally owned entries, shape (n,).
         """
-        w = self.forms.w.x
-        w.array[: self._n] = x[: self._n]
-        w.scatter_forward()
+        self._fields[: self._n] = x[: self._n]
+        self.forms.w.x.scatter_forward()
         self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:
@@ -97,7 +106,8 @@ class Vectors(Histories):
         Returns:
             Value of the form.
         """
-        return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
+        own = float(fem.assemble_scalar(form))
+        return own if self.comm.size == 1 else float(self.comm.allreduce(own, MPI.SUM))
 
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
         """Set a vector from locally owned field values and multipliers.

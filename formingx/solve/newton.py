@@ -387,7 +387,7 @@ class BorderedNewton:
             self.solver.solve(self.F, self.a)
             self.a.scale(-1)
             return bool(np.isfinite(self.a.norm()))
-        both = self.solver.solve_all(np.column_stack([self.F.array_r, self.F_control.array_r]))
+        both = self.solver.solve_all(np.array([self.F.array_r, self.F_control.array_r]).T)
         self.a.array_w[:], self.b.array_w[:] = -both[:, 0], -both[:, 1]
         return bool(np.isfinite(self.b.norm()))
 
