@@ -182,7 +182,7 @@ def _look_at(path: Any) -> None:
     for state in path.states:
         profile = path.profile(state)
         with path.problem.state_context(state) as problem:
-            travels = [contact.travelled(state.control) for contact in problem.contacts]
+            travels = [contact.tool_displacement(state.control) for contact in problem.contacts]
         for contact, travel in zip(scene.contacts, travels):
             inside = float(contact.tool.signed_distance(profile.top - travel).max())
             if inside > INSIDE * thickness:

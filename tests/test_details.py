@@ -94,7 +94,7 @@ def test_a_step_that_closes_a_whole_region_is_refused():
     x = np.zeros(problem.n_owned)
     near, far = (d / problem.forms.length for d in (0.05, 0.11))
     rest, close, deep = (TrialStep(x, control, x, 0.0, 1.0) for control in (0.0, near, far))
-    assert problem.limit.check(rest, close, 1.0) is None and "too many" in problem.limit.check(close, deep, 1.0).why
+    assert problem.limit.check(rest, close, 1.0) is None and "too many" in problem.limit.check(close, deep, 1.0).reason
 
 
 def test_rest_is_free_of_stress_under_the_penalty():

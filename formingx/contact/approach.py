@@ -72,7 +72,7 @@ LIMITS = StepLimits()
 class Approach:
     """Contact of one face during a step: prediction of gap closures before the solve, checks after it.
 
-    `StepLimit` calls `reach`, `closures` and `prepare` before the solve of a step, and the other methods after it.
+    `StepLimit` calls `step_length`, `closures` and `prepare` before the solve of a step, the other methods after it.
 
     Args:
         face: the contact.
@@ -80,15 +80,15 @@ class Approach:
 
     Attributes:
         points: number of points of the face on all ranks.
-        at_once: number of points that may come into contact in one step along the tangent. It is ten times larger if
-            the result does not depend on the order of the gap closures.
+        max_closures: number of points that may come into contact in one step along the tangent. It is ten times larger
+            if the result does not depend on the order of the gap closures.
     """
 
     def __init__(self, face: FaceContact, conducts: bool):
         self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
         self.points = face.comm.allreduce(len(face.rule.points))
         share = max(self.points // 100, 1) if face.contact.lagged else 1
-        self.at_once = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
+        self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
@@ -103,13 +103,14 @@ class Approach:
         """
         return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
 
-    def reach(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float, length: float) -> float:
+    def step_length(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                    length: float) -> float:
         """Return the admissible arc length of a step along a tangent.
 
-        The step ends where `at_once` new points have come into contact. If at most one point was in contact before, it
-        ends at the first gap closure. If a whole region came into contact in one step, its sticking positions would
-        depend on the step length. In lagged contact the motion of the points and the change of the friction pressure
-        are limited too.
+        The step ends where `max_closures` new points have come into contact. If at most one point was in contact
+        before, it ends at the first gap closure. If a whole region came into contact in one step, its sticking
+        positions would depend on the step length. In lagged contact the motion of the points and the change of the
+        friction pressure are limited too.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
@@ -134,7 +135,7 @@ class Approach:
         ahead = (times > LIMITS.closed_at_start * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
         touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
-        allowed = self.at_once if touching > 1 else 1
+        allowed = self.max_closures if touching > 1 else 1
         return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -185,11 +186,11 @@ class Approach:
         elif ends and self.lags:
             face.set_closures(places)
 
-    def grew_too_much(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+    def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if too many points came into contact in a step.
 
-        The limit is about twice `at_once`, or twice the predicted number of gap closures. In lagged contact the limit
-        concerns the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts
+        The limit is about twice `max_closures`, or twice the predicted number of gap closures. In lagged contact the
+        limit concerns the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts
         without history variables have no limit.
 
         Args:
@@ -209,7 +210,7 @@ class Approach:
             deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
-        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.at_once, self._foreseen) + 2)
+        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.max_closures, self._foreseen) + 2)
 
     @property
     def lags(self) -> bool:
@@ -346,11 +347,11 @@ class Approach:
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            True if a path cuts the tool deeper than allowed, see `cuts`.
+            True if a path cuts the tool deeper than allowed, see `cuts_tool`.
         """
-        return self.cuts(self.face.positions(old, old_control), self.face.positions(new, control))
+        return self.cuts_tool(self.face.positions(old, old_control), self.face.positions(new, control))
 
-    def cuts(self, a: np.ndarray, b: np.ndarray) -> bool:
+    def cuts_tool(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Return True if the straight path of a point between two positions penetrates the tool too deeply.
 
         The depth on the path may exceed the larger depth of its ends by `StepLimits.largest_cut` times the tributary

@@ -124,9 +124,9 @@ class FaceContact:
         Returns:
             Reference position plus displacement minus travel of the tool, shape (n, components), length.
         """
-        return self.points + self._length * self.displacement(fields) - self.travelled(control)
+        return self.points + self._length * self.displacement(fields) - self.tool_displacement(control)
 
-    def travelled(self, control: float) -> np.ndarray:
+    def tool_displacement(self, control: float) -> np.ndarray:
         """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
 
@@ -277,7 +277,7 @@ class FaceContact:
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         """Return dimensionless stiffness by unknowns, shape (n, m, m), from traction derivatives, shape (n, c, c)."""
-        return self.rule.between_unknowns((self._scale * self._length)[:, None, None] * stiffness)
+        return self.rule.nodal_stiffness((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
     def _penalty_at_rest(self) -> float:

@@ -83,7 +83,7 @@ def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
     return np.asarray(face.comm.allreduce(total, MPI.SUM))
 
 
-def pressing(face: FaceContact, fields: np.ndarray, control: float) -> float:
+def normal_force(face: FaceContact, fields: np.ndarray, control: float) -> float:
     """Return the sum of the normal contact forces at all points, as a scalar.
 
     Args:

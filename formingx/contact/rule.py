@@ -62,7 +62,7 @@ class Rule(Protocol):
             forces: forces at the points, shape (n, components), in the unit of `values`.
         """
 
-    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+    def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
         """Return the stiffness of each point with respect to the unknowns that move the point.
 
         Args:
@@ -104,7 +104,7 @@ class _Nodes:
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         values[self.dofs] += forces
 
-    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+    def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
         return stiffness
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
@@ -292,7 +292,7 @@ class Gauss:
         unknowns.scatter_reverse(la.InsertMode.add)
         values[:n] += unknowns.array[:n]
 
-    def between_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
+    def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
         blocks = np.einsum("na,nb,nij->naibj", self.shapes, self.shapes, stiffness)
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 

@@ -125,16 +125,16 @@ class TrialStep(NamedTuple):
     events: EventPrediction | None = None
 
 
-class Cut(NamedTuple):
+class StepRejection(NamedTuple):
     """Rejection of a step that is too long.
 
     Attributes:
-        why: the reason, as text for the log.
-        part: admissible fraction of the step length; 0 if unknown.
+        reason: the reason, as text for the log.
+        fraction: admissible fraction of the step length; 0 if unknown.
     """
 
-    why: str
-    part: float = 0.0
+    reason: str
+    fraction: float = 0.0
 
 
 class StepLimit:
@@ -147,13 +147,13 @@ class StepLimit:
         problem: the `Problem`.
 
     Attributes:
-        several: True if several gaps may close in one step, in the predicted order.
+        several_closures: True if several gaps may close in one step, in the predicted order.
     """
 
     def __init__(self, problem: Any):
         self._n, heat = problem.n_owned, problem.scene.heat
         self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
-        self.several = not problem.scene.one_node_per_step
+        self.several_closures = not problem.scene.one_node_per_step
         make = type(self).make_predictor
         self._predictor = make(self) if make else None
 
@@ -181,9 +181,9 @@ class StepLimit:
         """True if contact events after an accepted state are predicted."""
         return self._predictor is not None and self._predictor.active
 
-    def one_by_one(self) -> None:
-        """End each step at the next gap closure from now on, without prediction of contact events."""
-        self.several = False
+    def end_at_closures(self) -> None:
+        """End each further step at the next gap closure, without prediction of contact events."""
+        self.several_closures = False
 
     def predict(self, curve: Curve, state: State) -> EventPrediction | None:
         """Return the predicted contact events after an accepted state.
@@ -200,8 +200,8 @@ class StepLimit:
     def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length of a step along a tangent.
 
-        The step ends where the allowed number of points has closed their gaps (`Approach.at_once`; more if events are
-        predicted). If at most one point is in contact, it ends at the first gap closure.
+        The step ends where the gaps of `Approach.max_closures` points have closed, or of more points if events are
+        predicted. If at most one point is in contact, it ends at the first gap closure.
 
         Args:
             trial: the trial step, with the wanted arc length.
@@ -213,7 +213,7 @@ class StepLimit:
         if found is not None:
             return found
         n = self._n
-        return min([c.reach(trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
+        return min([c.step_length(trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
                     for c in self.present], default=trial.length)
 
     def prepare(self, trial: TrialStep, ends: bool = False) -> tuple[np.ndarray, float] | None:
@@ -236,7 +236,7 @@ class StepLimit:
             approach.prepare(times, places, trial.length, ends, *predicted)
         return trial.events.bend(trial.length) if trial.events and found else None
 
-    def check(self, old: Any, new: Any, length: float, ends: bool = False) -> Cut | None:
+    def check(self, old: Any, new: Any, length: float, ends: bool = False) -> StepRejection | None:
         """Check after the solve whether a step was too long for the contacts.
 
         Args:
@@ -250,20 +250,20 @@ class StepLimit:
             Reason and admissible fraction of the step; None if the step is accepted.
         """
         n, contacts = self._n, self.present
-        if any([c.grew_too_much(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
-            return Cut("too many points came into contact in one step")
+        if any([c.has_too_many_closures(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
+            return StepRejection("too many points came into contact in one step")
         if self.passes_through(old, new):
-            return Cut("a tool would pass through the face that it touches")
+            return StepRejection("a tool would pass through the face that it touches")
         change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
         if change > LIMITS.rejected_change * LIMITS.pressure_change and length > LIMITS.shortest:
-            return Cut("the pressure that limits friction changes", LIMITS.pressure_change / change)
+            return StepRejection("the pressure that limits friction changes", LIMITS.pressure_change / change)
         if length > LIMITS.shortest_mixed and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
-            return Cut("points lift off while others come into contact", 0.5)
+            return StepRejection("points lift off while others come into contact", 0.5)
         if ends and length > LIMITS.shortest:
             part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
                         for c in contacts], default=1.0)
             if part < 1:
-                return Cut("gap closure", part)
+                return StepRejection("gap closure", part)
         return None
 
     @property
@@ -326,7 +326,7 @@ class StepLimit:
 
         Returns:
             True if the straight path of a point relative to its tool cuts the tool deeper than allowed
-            (`Approach.cuts`).
+            (`Approach.cuts_tool`).
         """
         n = self._n
         return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.present])

@@ -120,9 +120,9 @@ class QuantityRun(Run):
         if limit:
             limit.prepare(trial)
         new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
-        cut = limit and limit.check(old, new, 1.0)
-        if cut:
-            raise Failure(cut.why, [])
+        rejection = limit and limit.check(old, new, 1.0)
+        if rejection:
+            raise Failure(rejection.reason, [])
         return new
 
     def _limit_before(self, old: State, new: State) -> State:

@@ -282,10 +282,10 @@ class Run:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _PassedState("the target was met on a distant part of the path", [])
             new.met = target
-        cut = limit and limit.check(old, new, reach, ends=True)
-        if cut:
-            part = min(max(cut.part, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
-            raise Cutback(cut.why, part) if cut.part else _PassedState(cut.why, [])
+        rejection = limit and limit.check(old, new, reach, ends=True)
+        if rejection:
+            part = min(max(rejection.fraction, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
+            raise Cutback(rejection.reason, part) if rejection.fraction else _PassedState(rejection.reason, [])
         if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):

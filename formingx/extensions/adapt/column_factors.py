@@ -96,7 +96,7 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
             for contact, face in zip(problem.contacts, faces):
                 if not contact.present:
                     continue
-                positions = points[face] - contact.travelled(state.control)
+                positions = points[face] - contact.tool_displacement(state.control)
                 nearest = contact.contact.tool.nearest(positions.reshape(-1, positions.shape[-1]))
                 bend = np.abs(nearest.curvature)
                 radius = np.divide(1, bend, out=np.zeros(len(bend)), where=bend > 0) + np.sign(

@@ -36,7 +36,7 @@ class ContactEventPredictor:
     def allowed(self, approach: Approach) -> int:
         """Return the number of points of a face whose gaps may close in one step.
 
-        It exceeds `Approach.at_once` only on faces with stick or friction whose contact has `nodes_per_step=None`.
+        It exceeds `Approach.max_closures` only on faces with stick or friction whose contact has `nodes_per_step=None`.
 
         Args:
             approach: the contact of the face.
@@ -44,8 +44,9 @@ class ContactEventPredictor:
         Returns:
             Number of points on all ranks.
         """
-        face, most = approach.face, approach.at_once
-        if not self._limit.several or not face.law.has_friction or face.contact.nodes_per_step or face.contact.lagged:
+        face, most = approach.face, approach.max_closures
+        one_by_one = not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
+        if one_by_one or not face.law.has_friction:
             return most
         return max(most, round(MAX_CLOSURES * approach.points))
 
@@ -54,7 +55,7 @@ class ContactEventPredictor:
         """True if a face sticks, so that the result depends on the order of gap closures, and all laws are predictable.
         """
         present = self._limit.present
-        return any(c.face.contact.sticks and self.allowed(c) > c.at_once for c in present) and all(
+        return any(c.face.contact.sticks and self.allowed(c) > c.max_closures for c in present) and all(
             c.face.law.predictable for c in present)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
@@ -106,7 +107,8 @@ class ContactEventPrediction:
         """
         found, sequence = self._to_enough_closures(length) if self._known else None, self._sequence
         while found is not None and found > LIMITS.shortest and any(
-                [c.cuts(a, b) for c, a, b in zip(self._present, sequence.positions(0.0), sequence.positions(found))]):
+                [c.cuts_tool(a, b)
+                 for c, a, b in zip(self._present, sequence.positions(0.0), sequence.positions(found))]):
             found /= 2
         self._known = found is not None
         return found

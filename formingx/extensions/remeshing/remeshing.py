@@ -169,7 +169,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
     poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
     failed: list[State] = []
     while not (poor and done()):
-        record.problem.limit.one_by_one()                    # check the mesh at each gap closure
+        record.problem.limit.end_at_closures()                    # check the mesh at each gap closure
         if poor:
             try:
                 _start_new_mesh(path, remesh, tolerances)
@@ -311,7 +311,8 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
         edges = outline.edges()
         masks = {name: outline.mask(name) for name in scene.mesh.boundaries}
         x_old = old.x.array_r[: old.n_owned].copy()
-        contacts = [(c, ContactState.of(c, x_old, state.control), c.travelled(state.control)) for c in old.contacts]
+        contacts = [(c, ContactState.of(c, x_old, state.control), c.tool_displacement(state.control))
+                    for c in old.contacts]
     touched = [(c.contact.on, before.position[before.touches] + travel) for c, before, travel in contacts]
     order = outline.ordered("remesh")
     names = [frozenset(name for name, mask in masks.items() if mask[k]) for k in order]
@@ -325,7 +326,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
                     lambda x, names: _moved_out_of_tools(x, names, contacts))
     new_scene = scene_on_new_mesh(mesh, Preformed.of(old, state))
     problem = Problem(new_scene)
-    problem.limit.one_by_one()
+    problem.limit.end_at_closures()
     setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
     curve = Curve(problem, tolerances)
     x = new_scene.preformed.unknowns(problem)

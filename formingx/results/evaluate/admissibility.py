@@ -209,7 +209,7 @@ class AdmissibilityCheck:
         with self._problem.state_context(state) as problem:
             for contact in problem.present:
                 x = contact.positions(state.x, state.control)
-                depth, place = contact.law.distance(x), x + contact.travelled(state.control)
+                depth, place = contact.law.distance(x), x + contact.tool_displacement(state.control)
                 rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))
                 k = int(np.argmax(rows[:, 0]))
                 if rows[k, 0] > 1:
@@ -243,7 +243,7 @@ def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
         points: deformed positions, shape (m, n, components), length.
         state: the state.
     """
-    positions = points - contact.travelled(state.control)
+    positions = points - contact.tool_displacement(state.control)
     return contact.contact.tool.signed_distance(positions.reshape(-1, positions.shape[-1])).reshape(positions.shape[:2])
 
 
@@ -282,7 +282,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     h = _LIMITS.difference_step
     states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-h, 0.0, h)]
     backward, force, forward = (resultants.force(contact, *point) @ direction for point in states)
-    travel = (contact.travelled(states[2][1]) - contact.travelled(states[0][1])) @ direction
+    travel = (contact.tool_displacement(states[2][1]) - contact.tool_displacement(states[0][1])) @ direction
     if not force or not travel:
         return share
     return min(2 * energy * abs((forward - backward) / travel) / force**2, _LIMITS.largest_energy_ratio * share)
@@ -309,7 +309,7 @@ def _pulled(contact: Any, state: State) -> bool:
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
     force = resultants.force(contact, state.x, state.control) @ law.travel_vector / np.hypot(*law.travel_vector)
-    return bool(force > _LIMITS.tensile_force * resultants.pressing(contact, state.x, state.control))
+    return bool(force > _LIMITS.tensile_force * resultants.normal_force(contact, state.x, state.control))
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:

@@ -62,7 +62,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             turn = 2 * np.degrees(np.arcsin(np.minimum(np.hypot(*normal_change.T) / 2, 1.0)))
             turn *= adjacent & sliding & convex
             for k in np.argsort(turn)[-1:]:
-                r, z = x[k] + steps[k] / 2 + contact.travelled(state.control)
+                r, z = x[k] + steps[k] / 2 + contact.tool_displacement(state.control)
                 found.append(Edge(float(turn[k]), contact.contact.label, (float(r), float(z))))
     return max((edge for edge in found if edge.turn > 0), default=None)
 
