@@ -152,7 +152,7 @@ class Admissible:
                    for quantity, values in found.items())
         return all(self._forms.comm.allgather(mine))
 
-    def inside_out(self) -> tuple[int, int, tuple[float, float]]:
+    def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
         """Count the inverted elements of a solid for the current field; collective.
 
         Returns:

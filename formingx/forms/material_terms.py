@@ -63,7 +63,7 @@ class MaterialTerms:
         return value.expression(self) if isinstance(value, Varying) else self.forms.constant(value)
 
     @property
-    def follows_temperature(self) -> bool:
+    def depends_on_temperature(self) -> bool:
         """True if a constant depends on the temperature."""
         return bool(self._coefficients)
 

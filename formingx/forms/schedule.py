@@ -54,7 +54,7 @@ class StepData:
         return cls([0.0] * len(rate), rate, [])
 
     @property
-    def leading(self) -> int | None:
+    def controlled(self) -> int | None:
         """Index in `rate` of the quantity that the control changes; None if nothing changes.
 
         This is the process time if it changes, else the first item whose amplitude changes.
@@ -64,7 +64,7 @@ class StepData:
         return next((i for i, rate in enumerate(self.rate) if rate), None)
 
     @property
-    def rests(self) -> bool:
+    def is_constant(self) -> bool:
         """True if the control changes no amplitude, at most the process time."""
         return not any(self.rate[:-1])
 
@@ -80,7 +80,7 @@ class StepData:
         """
         return self.base[number] + self.rate[number] * control
 
-    def acting(self, number: int, control: float) -> float:
+    def acting_amplitude(self, number: int, control: float) -> float:
         """Return the amplitude of a load that acts on the body.
 
         Args:
@@ -119,7 +119,7 @@ class StepData:
             Step data and control on the next mesh.
         """
         ratio = [b / n for b, n in zip(before, now, strict=True)]
-        of_control = 1.0 if self.leading is None else ratio[self.leading]
+        of_control = 1.0 if self.controlled is None else ratio[self.controlled]
         return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],
                        rate=[r * b / of_control for r, b in zip(ratio, self.rate, strict=True)],
                        mesh=self.mesh + 1), of_control * control

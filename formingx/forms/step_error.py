@@ -39,7 +39,7 @@ class StepError:
         forms = self._forms
         self._materials = problem.materials
         heat = len(self._materials) < len(forms.histories)
-        terms = [terms for terms in forms.terms if terms.has_history or heat and terms.follows_temperature]
+        terms = [terms for terms in forms.terms if terms.has_history or heat and terms.depends_on_temperature]
         self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
         systematic = any(entry.material.motion_variables or entry.material.integral for entry in terms)
         self._weight = _SYSTEMATIC_WEIGHT if systematic else 1.0

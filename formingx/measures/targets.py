@@ -47,7 +47,7 @@ class Amplitude(Quantity):
         if self._number is None:
             return control
         setting = self._problem.setting
-        return (setting.acting if self._acts else setting.amplitude)(self._number, control)
+        return (setting.acting_amplitude if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
         """Return the quantity at a value of the control.

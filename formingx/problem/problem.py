@@ -239,14 +239,14 @@ class Problem(Stages, Units):
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
-    def inside_out(self) -> tuple[int, int, tuple[float, float]]:
+    def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
         """Count the inverted elements at the state last set; collective.
 
         Returns:
             Number of elements with a point where J <= 0, number of all elements, reference position (R, Z) of the
             smallest J.
         """
-        return self.admissible.inside_out()
+        return self.admissible.inverted_elements()
 
     def begin(self, old: Any = None) -> None:
         for contact in self.present:

@@ -35,18 +35,18 @@ class Units:
         return ", or ".join(["an element turned inside out", *strained])
 
     def shown(self, control: float) -> tuple[str, float]:
-        number, items = self.setting.leading, self.scene.items
+        number, items = self.setting.controlled, self.scene.items
         if number is None:
             return "control", control
         name = "process time" if number == len(items) else self.scene.column(items[number]).replace("_", " ")
         return name, self.forms.scales[number] * self.setting.amplitude(number, control)
 
-    def absurd(self, control: float) -> str | None:
+    def implausible(self, control: float) -> str | None:
         return implausible(self.scene, self.control_kind, self.shown(control)[1])
 
     @property
     def control_kind(self) -> str | None:
-        number, items = self.setting.leading, self.scene.items
+        number, items = self.setting.controlled, self.scene.items
         return None if number is None else "time" if number == len(items) else items[number].quantity
 
     @property

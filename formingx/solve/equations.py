@@ -430,7 +430,7 @@ class Units(Protocol):
         """Return the name of the controlled quantity and its value in the user's units."""
         return "control", control
 
-    def absurd(self, control: float) -> str | None:
+    def implausible(self, control: float) -> str | None:
         """Return the reason, as text, for which no process reaches this value of the control; None if it may."""
         return None
 

@@ -336,7 +336,7 @@ class Run:
         try:
             return [self._jump(old, 0.0, work_sign=work_sign)]
         except Failure as failure:
-            if not self.problem.setting.rests:              # the controlled quantity should have changed further
+            if not self.problem.setting.is_constant:        # the controlled quantity should have changed further
                 controlled = "enclosed volume" if work_sign else self._control_name
                 self._give_up(f"the {controlled} has a limit point here, and {failure.reason}", failure.attempt)
             self.record.ended = f"the body snaps at {self.record.describe(old)}, and no equilibrium follows"
@@ -384,10 +384,10 @@ class Run:
     def _check_progress(self) -> None:
         """Give up if many states came no nearer to the target, or no process reaches such a value of the control."""
         control = self.record.last.control
-        absurd = self.problem.absurd(control)
-        if absurd is not None:
+        reason = self.problem.implausible(control)
+        if reason is not None:
             value = self.problem.shown(control)[1]
-            self._give_up(f"the {self._control_name} has come to {value:.4g}, beyond any process: {absurd}")
+            self._give_up(f"the {self._control_name} has come to {value:.4g}, beyond any process: {reason}")
         self._stop_if(self.targets.stalled())
 
     def _stop_if(self, why: str) -> None:

@@ -321,7 +321,7 @@ class Execution:
         Raises:
             ConvergenceError: a target that ends the stage was not met within its duration.
         """
-        if self.problem.setting.rests and not self.problem.relaxes:     # only time passes, without an effect
+        if self.problem.setting.is_constant and not self.problem.relaxes:   # only time passes, without an effect
             if not begun:
                 self._accept_known(self._resumed(0.0))
             if self.record.last.control < 1.0:

@@ -115,7 +115,7 @@ def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[L
         return []
     joint = (p + d * t + q - d * s) / 2
     first, last = _arc_from(p, t, joint), _arc_from(q, -s, joint)
-    return [first, last.backwards] if d > 0 and first is not None and last is not None else []
+    return [first, last.reversed] if d > 0 and first is not None and last is not None else []
 
 
 def _arc_from(p: np.ndarray, t: np.ndarray, q: np.ndarray) -> Line | Arc | None:

@@ -109,7 +109,7 @@ def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
 
 def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
     """Return the lines and arcs of curve `tag`, in reverse order and direction if `tag` is negative."""
-    return pieces if tag > 0 else [piece.backwards for piece in reversed(pieces)]
+    return pieces if tag > 0 else [piece.reversed for piece in reversed(pieces)]
 
 
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:

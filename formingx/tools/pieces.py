@@ -38,7 +38,7 @@ class Line(NamedTuple):
         return angle, angle
 
     @property
-    def backwards(self) -> Line:
+    def reversed(self) -> Line:
         """The line from its last point to its first."""
         return Line(self.b, self.a)
 
@@ -72,7 +72,7 @@ class Arc(NamedTuple):
         return self.start + quarter, self.start + self.sweep + quarter
 
     @property
-    def backwards(self) -> Arc:
+    def reversed(self) -> Arc:
         """The arc from its last point to its first."""
         return self._replace(start=self.start + self.sweep, sweep=-self.sweep)
 

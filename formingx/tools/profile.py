@@ -179,7 +179,7 @@ class Tool:
 
     def reversed(self) -> Tool:
         """Return the tool whose solid lies on the other side of the same profile."""
-        return self._with_pieces([p.backwards for p in reversed(self.pieces)])
+        return self._with_pieces([p.reversed for p in reversed(self.pieces)])
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
         """Return points along the profile for drawing, shape (n, 2), length.
