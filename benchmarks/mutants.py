@@ -46,7 +46,7 @@ MUTANTS = [Mutant(*row) for row in [
      "contact plugs jumps"),
     ("contact/face.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
      "contact derivatives"),
-    ("contact/approach.py", "> 2 * max(self.max_closures, self._foreseen) + 2", "> 10**6", "details"),
+    ("contact/approach.py", "> 2 * max(self.max_closures, self._predicted_closures) + 2", "> 10**6", "details"),
     ("contact/approach.py", "return times, start + times[:, None] * velocity",
      "return times, start + length * velocity", "contact plugs"),
     ("contact/face.py", "        self._start_at(self.positions(fields, control))", "        pass", "details"),

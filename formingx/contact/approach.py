@@ -89,7 +89,7 @@ class Approach:
         self.points = face.comm.allreduce(len(face.rule.points))
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
-        self._foreseen = 0                                  # number of predicted gap closures of the step, all ranks
+        self._predicted_closures = 0                        # number in the step, on all ranks
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """Return True if any point of the face is in contact with the tool.
@@ -130,7 +130,7 @@ class Approach:
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
-            length = self._within_lag(start, velocity, length)
+            length = self._within_pressure_change(start, velocity, length)
         times = gap_closures(face.law, start, velocity, free, length)
         ahead = (times > LIMITS.closed_at_start * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
@@ -139,7 +139,7 @@ class Approach:
         return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
-              length: float) -> tuple[np.ndarray, np.ndarray]:
+                 length: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the gap closures of the points if they move along a tangent.
 
         Args:
@@ -175,7 +175,7 @@ class Approach:
                 None: unknown.
         """
         face = self.face
-        self._foreseen = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
+        self._predicted_closures = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (times >= LIMITS.frictionless_from * length)
             if speeds is not None and at_end.any():
@@ -183,7 +183,7 @@ class Approach:
                 slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - times[at_end])
                 at_end[at_end] = slip <= LIMITS.largest_slip * face.rule.lengths[at_end]
             face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
-        elif ends and self.lags:
+        elif ends and self.has_lagged_friction:
             face.set_closures(places)
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
@@ -210,10 +210,10 @@ class Approach:
             deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
             return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
-        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.max_closures, self._foreseen) + 2)
+        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
 
     @property
-    def lags(self) -> bool:
+    def has_lagged_friction(self) -> bool:
         """True if friction is lagged: the pressure of the last accepted state limits the friction in the step."""
         return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
 
@@ -227,7 +227,7 @@ class Approach:
         Returns:
             Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
         """
-        return self._part_of_pressure(self.face.tractions(new, control).normal) if self.lags else 0.0
+        return self._pressure_difference(self.face.tractions(new, control).normal) if self.has_lagged_friction else 0.0
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
         """Update the pressure that limits lagged friction to the pressure at the end of the step.
@@ -240,11 +240,11 @@ class Approach:
             True if the pressure was updated. False if both pressures agree to `StepLimits.pressure_difference`, or
             friction is not lagged.
         """
-        if not self.lags:
+        if not self.has_lagged_friction:
             return False
         face, law = self.face, self.face.law
         now = face.tractions(new, control).normal
-        if self._part_of_pressure(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
+        if self._pressure_difference(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
             return False
         face.set_closures(law.at_pressure(face.history, now))
         return True
@@ -275,7 +275,7 @@ class Approach:
         face.put(variables._replace(history=history))
         return True
 
-    def _within_lag(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
+    def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
         """Return the arc length of a step in which the contact pressure changes by `StepLimits.pressure_change`.
 
         The pressure that limits lagged friction is extrapolated linearly.
@@ -288,14 +288,14 @@ class Approach:
         Returns:
             Arc length, at most `length`; `length` without lagged friction.
         """
-        if not self.lags:
+        if not self.has_lagged_friction:
             return length
         law, history = self.face.law, self.face.history
         rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
-        change = self._part_of_pressure(law.pressure(history) + length * rate)
+        change = self._pressure_difference(law.pressure(history) + length * rate)
         return length * min(LIMITS.pressure_change / change, 1.0) if change else length
 
-    def _part_of_pressure(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
+    def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference between two pressure fields in the area-weighted 1-norm.
 
         The difference is summed over the points that were under pressure at the last accepted state. It is divided by
@@ -365,13 +365,13 @@ class Approach:
             True if a path on any rank is too deep.
         """
         law, lengths = self.face.law, self.face.rule.lengths
-        way, most = np.linalg.norm(b - a, axis=1), LIMITS.largest_cut * lengths
+        path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.largest_cut * lengths
         ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
-        between = (law.distance(a) + law.distance(b) + way) / 2            # bound of the depth on the path
+        between = (law.distance(a) + law.distance(b) + path_length) / 2          # bound of the depth on the path
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):
-            parts = int(min(np.ceil((way / most)[far].max() * 2), LIMITS.most_positions)) + 1
+            parts = int(min(np.ceil((path_length / most)[far].max() * 2), LIMITS.most_positions)) + 1
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(self._comm.allreduce(found, MPI.LOR))

@@ -189,7 +189,7 @@ class FaceContact:
             control: load parameter (control) of the accepted state, dimensionless.
         """
         if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
-            self._harden(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
+            self._set_penalty(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         start = None if old is None else self.positions(old, control)
         self.increment, self._guessed = Increment(self.law, self.history, start, self._guessed), None
 
@@ -280,19 +280,19 @@ class FaceContact:
         return self.rule.nodal_stiffness((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
-    def _penalty_at_rest(self) -> float:
+    def _reference_penalty(self) -> float:
         """Penalty of the contact in the reference configuration, stress/length."""
         return self.contact.penalty * self._solid.stress / self.thickness
 
     def _law(self, penalty: np.ndarray | float) -> Any:
         """Return the contact law at the points; penalty: present over reference penalty, shape () or (n,)."""
-        law: Any = self.contact.law(self._penalty_at_rest * penalty, self.thickness, self.points,
+        law: Any = self.contact.law(self._reference_penalty * penalty, self.thickness, self.points,
                                     self._temperatures())
         if self.shift is not None:
             law.shift = self.shift
         return law
 
-    def _harden(self, penalty: np.ndarray) -> None:
+    def _set_penalty(self, penalty: np.ndarray) -> None:
         """Set the ratio of the present to the reference penalty, shape (n,), and update the law."""
         if not np.array_equal(penalty, self._penalty):
             self._penalty, self.law = penalty, self._law(penalty)
@@ -400,7 +400,7 @@ class FaceContact:
         """Set the history variables, and begin an increment that evaluates states."""
         self._stored = variables
         if self.contact.present_area and variables is not None:
-            self._harden(variables.penalty)
+            self._set_penalty(variables.penalty)
         self.increment = Increment(self.law, self.history)
 
     def save(self, variables: FaceHistory) -> dict[str, np.ndarray]:

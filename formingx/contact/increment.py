@@ -122,7 +122,7 @@ class Increment:
             their `Tractions`, linearised at the distances and slips predicted to first order.
         """
         history = self._history and ContactHistory(*(part[points] for part in self._history))
-        law, x, predicted = self._law.part(points), self._now[0][points], self._foreseen(points)
+        law, x, predicted = self._law.part(points), self._now[0][points], self._predicted_motion(points)
         return lambda motion: law.tractions(x, history, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -148,7 +148,7 @@ class Increment:
             return before.distance_at(x + motion) / width + 0.5, width * sticks * before.normal
         return depth_and_path
 
-    def _foreseen(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
+    def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
         """Return a function that maps motions of some points, shape (m, c), length, to their first-order `Motion`."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]

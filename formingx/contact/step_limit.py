@@ -229,7 +229,7 @@ class StepLimit:
         """
         n, found = self._n, trial.events.closures(trial.length) if trial.events else None
         for k, approach in enumerate(self.present):
-            if approach.face.contact.lagged and not (ends and approach.lags):
+            if approach.face.contact.lagged and not (ends and approach.has_lagged_friction):
                 continue                                    # such a contact uses no predicted gap closures
             times, places, *predicted = found[k] if found else approach.closures(
                 trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
@@ -272,7 +272,7 @@ class StepLimit:
 
         The step control does not count them. Friction is lagged on tools in three dimensions.
         """
-        return LIMITS.settling if any(c.lags for c in self.present) else 0
+        return LIMITS.settling if any(c.has_lagged_friction for c in self.present) else 0
 
     def separate(self, new: Any) -> bool:
         """Open the contact points under tension at tools in three dimensions, at a converged state.
@@ -301,7 +301,7 @@ class StepLimit:
         """
         n, again = self._n, sweep < LIMITS.corrections
         late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.negligible_gap * c.face.thickness)
-                for c in self.present if at_target or c.lags]
+                for c in self.present if at_target or c.has_lagged_friction]
         return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
 
     def renew_pressure(self, new: Any) -> bool:

@@ -65,11 +65,11 @@ class MaterialHistory:
             start: not used.
         """
         self._now = None
-        for name, values in self._after(self._cells).items():
+        for name, values in self._values_at_end(self._cells).items():
             self._set(name, self._cells, values)
         self._terms.start.value = self._forms.time_at(control)
 
-    def _after(self, cells: np.ndarray) -> dict[str, np.ndarray]:
+    def _values_at_end(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """Return the internal variables at the end of the step in some cells.
 
         The result is {name: values, shape (cells, points, components)}.
@@ -92,7 +92,7 @@ class MaterialHistory:
             The variables and the process time; the arrays are read-only.
         """
         if self._now is None:
-            values = {name: self._array(name)[self._points(name, self._own)] for name in self._sizes}
+            values = {name: self._array(name)[self._rows(name, self._own)] for name in self._sizes}
             self._now = _unchangeable(InternalVariables(float(self._terms.start.value), values))
         return self._now
 
@@ -191,13 +191,13 @@ class MaterialHistory:
         """
         return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
 
-    def _points(self, name: str, cells: np.ndarray) -> np.ndarray:
+    def _rows(self, name: str, cells: np.ndarray) -> np.ndarray:
         """Return the rows of `_array` that belong to some cells, shape (cells, points)."""
         return self._terms.internal[name].function_space.dofmap.list[cells]
 
     def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
         """Set an internal variable in some cells to values of shape (components,) or (cells, points, components)."""
-        self._array(name)[self._points(name, cells)] = values
+        self._array(name)[self._rows(name, cells)] = values
 
 
 def _unchangeable(variables: InternalVariables) -> InternalVariables:

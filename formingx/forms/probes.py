@@ -182,8 +182,8 @@ class MidSurfaceProbe(Probe):
         self._ends = at, self._dofs_of(cells), _basis(element, 1, end[:, None].astype(float)) / speed
         self._meet = meet[self._mine]
         both = self._at_ends(tangent / speed)[self._mine]
-        self._shorter = np.where(self._meet, np.hypot(*both.T), 1.0)[:, None]               # the mean of two directions
-        self._tangent = np.where(self._meet[:, None], both / self._shorter, self._tangent)
+        self._mean_length = np.where(self._meet, np.hypot(*both.T), 1.0)[:, None]     # of the mean of unit vectors
+        self._tangent = np.where(self._meet[:, None], both / self._mean_length, self._tangent)
 
     def _at_ends(self, values: np.ndarray) -> np.ndarray:
         """Return the means of values on both sides of the points where elements meet, shape (n, 2), all ranks."""
@@ -230,7 +230,7 @@ class MidSurfaceProbe(Probe):
         u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)
         forms = self._problem.forms
         _, dofs, slopes = self._ends
-        both = self._at_ends(np.einsum("kj,kij->ki", slopes, forms.w.x.array[dofs]))[self._mine] / self._shorter
+        both = self._at_ends(np.einsum("kj,kij->ki", slopes, forms.w.x.array[dofs]))[self._mine] / self._mean_length
         du = np.where(self._meet[:, None], both, du)
         t = self._tangent + forms.length * du
         l1 = np.hypot(*t.T)

@@ -13,7 +13,7 @@ import sys
 
 
 def main(file: str, kind: str, seconds: int) -> None:
-    """Read the file, then answer questions from standard input until it ends.
+    """Read the file, print its curves, then evaluate curves as lines of standard input request, until these end.
 
     Args:
         file: name of the file.

@@ -37,6 +37,9 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
     """Return the curves of a .geo file.
 
+    Args:
+        file: name of the file.
+
     Returns:
         {number: a line or an arc, or the kind of another curve}.
 

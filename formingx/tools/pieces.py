@@ -33,7 +33,7 @@ class Line(NamedTuple):
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Angles between the line and the R axis at its first and last point, which are equal, radians."""
+        """Polar angles of the direction of the line at its first and last point, which are equal, radians."""
         angle = math.atan2(self.b[1] - self.a[1], self.b[0] - self.a[0])
         return angle, angle
 
@@ -49,7 +49,7 @@ class Arc(NamedTuple):
     Attributes:
         centre: centre (R, Z), length.
         radius: radius, length; 0 for a sharp corner.
-        start: polar angle of the first point, radians.
+        start: polar angle of the first point as seen from the centre, radians.
         sweep: angle of the arc, positive if it turns left, radians.
     """
 
@@ -67,7 +67,7 @@ class Arc(NamedTuple):
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Angles between the tangent of the arc and the R axis at its first and last point, radians."""
+        """Polar angles of the direction along the arc at its first and last point, radians."""
         quarter = math.copysign(math.pi / 2, self.sweep)
         return self.start + quarter, self.start + self.sweep + quarter
 
@@ -94,7 +94,7 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
     for (i, j), length in lengths.items():
         if length <= 1e-9 * size:
-            raise InputError(f"Tool: points {i} and {j} are the same, {show(points[i])}")
+            raise InputError(f"Tool: points {i} and {j} are the same, {text(points[i])}")
     angle = {e: math.atan2(*(points[e[1]] - points[e[0]])[::-1]) for e in edges}
     before = {j: (i, j) for i, j in edges}
     after = {i: (i, j) for i, j in edges}
@@ -163,14 +163,14 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
     for (i, j), length in lengths.items():
         if cut[i] + cut[j] > length * (1 + 1e-9):
             k = i if cut[i] >= cut[j] else j
-            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {show(points[k])}:"
-                             f" the edge from {show(points[i])} to {show(points[j])} is {length:.6g} long and its"
+            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {text(points[k])}:"
+                             f" the edge from {text(points[i])} to {text(points[j])} is {length:.6g} long and its"
                              f" fillets take {cut[i] + cut[j]:.6g}; at most"
                              f" {radii[k] * max(length - cut[i] - cut[j] + cut[k], 0) / cut[k]:.6g} fits")
 
 
 def checked(piece: Line | Arc, i: int) -> Line | Arc:
-    """Return piece i of a profile with its numbers as floats.
+    """Return a piece of a profile with its numbers as floats; i: its number, for messages.
 
     Raises:
         InputError: the piece is neither a line nor an arc, is not finite, or has no length.
@@ -179,7 +179,7 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)
         if not math.dist(a, b) > 1e-12 * max(np.abs(a).max(), np.abs(b).max()):
-            raise InputError(f"{caller}: a line from {show(a)} to {show(b)} has no length")
+            raise InputError(f"{caller}: a line from {text(a)} to {text(b)} has no length")
         return Line(a, b)
     if not isinstance(piece, Arc):
         raise InputError(f"{caller} = {piece!r}: must be a Line or an Arc")
@@ -192,7 +192,12 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
 
 
 def turn_angle(incoming: float, outgoing: float) -> float:
-    """Return the angle from a direction to the next one along the profile, radians, in (-pi, pi]."""
+    """Return the angle from a direction to the next one along the profile, positive to the left, radians, in (-pi, pi].
+
+    Args:
+        incoming: polar angle of the first direction, radians.
+        outgoing: polar angle of the second direction, radians.
+    """
     return math.pi - (math.pi - (outgoing - incoming)) % TURN
 
 
@@ -209,6 +214,6 @@ def number_of_chords(piece: Line | Arc) -> int:
     return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
 
 
-def show(point: np.ndarray) -> str:
+def text(point: np.ndarray) -> str:
     """Return a point, shape (2,), as text for messages."""
     return f"({point[0]:.6g}, {point[1]:.6g})"

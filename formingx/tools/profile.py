@@ -16,7 +16,7 @@ from .._jit import address
 from ..errors import InputError, as_points, finite, instance, non_negative, pair, several
 from ..mesh.boxes import overlapping
 from .nearest import nearest
-from .pieces import FLAT, TURN, Arc, Line, checked, number_of_chords, rounded, sampled, show, turn_angle
+from .pieces import FLAT, TURN, Arc, Line, checked, number_of_chords, rounded, sampled, text, turn_angle
 
 
 class Nearest(NamedTuple):
@@ -117,10 +117,10 @@ class Tool:
                                                               default=0.0)))
         for i, (p, q) in enumerate(zip(pieces, pieces[1:] + (pieces[:1] if closed else []))):
             if math.dist(p.ends[1], q.ends[0]) > 1e-6 * self.size:
-                raise InputError(f"Tool: piece {i} ends at {show(p.ends[1])}, the next begins at {show(q.ends[0])}:"
+                raise InputError(f"Tool: piece {i} ends at {text(p.ends[1])}, the next begins at {text(q.ends[0])}:"
                                  f" the pieces of a profile must follow one another")
             if math.pi - abs(turn_angle(p.angles[1], q.angles[0])) < 1e-6:
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {show(p.ends[1])}")
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {text(p.ends[1])}")
         self._check_crossing()
         self._tabulate()
 
@@ -140,6 +140,9 @@ class Tool:
 
         Args:
             x: points, shape (n, 2), length.
+
+        Returns:
+            Distances, positive inside the tool; gradients; curvatures (`Nearest`).
         """
         return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
 
@@ -212,7 +215,7 @@ class Tool:
         kinds = " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in numbers if n)
         ends = np.array([self.pieces[0].ends[0], self.pieces[-1].ends[1]])
         first, last = np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends)
-        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {show(first)} to {show(last)})"
+        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {text(first)} to {text(last)})"
 
     def _with_pieces(self, pieces: list) -> Tool:
         """Return a tool of other lines and arcs, closed if this tool is closed."""
@@ -282,14 +285,14 @@ class Tool:
             crosses = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s)
             if crosses.any():
                 k = int(np.argmax(crosses))
-                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {show(a[i[k]] + s[k] * u[k])}")
+                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {text(a[i[k]] + s[k] * u[k])}")
             length = np.maximum(np.hypot(*u.T), 1e-300)
             ends = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
             distance, position = np.abs(_cross(u, ends)) / length, (u * ends).sum(-1) / length
             overlaps = (distance.max(0) < tolerance) & (position.max(0) > tolerance)
             overlaps &= position.min(0) < length - tolerance
             if overlaps.any():
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {show(a[j[np.argmax(overlaps)]])}")
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {text(a[j[np.argmax(overlaps)]])}")
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
