@@ -21,13 +21,14 @@ RAMP_EDGE = 1e-7
 
 
 class Law(NormalLaw):
-    r"""Contact law with a penalty k, a regularised ramp F and friction, eqs. (5.7) to (5.14) of Song (1993).
+    r"""Contact law with a penalty k, a regularised ramp F and friction with an elastic slip.
 
     .. math:: N = k F(d), \qquad T_{stick} = k F'(d)\, g, \qquad
               T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g
 
     N and T are the normal and tangential traction, d is the signed distance (positive inside the tool), and g the
-    elastic slip. `ramp` states F.
+    elastic slip. `ramp` states F. N is that of Song (1993), eqs. (5.7) and (5.13); T tends to mu N, eq. (5.9), for a
+    small g_s.
 
     Args:
         tool: the tool, which gives the signed distance.
