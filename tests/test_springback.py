@@ -12,7 +12,7 @@ from test_solidification import BASE, air, balance, block, draw
 import formingx as fx
 from formingx.extensions.heat import cooling
 from formingx.extensions.release.part import trimmed_mesh
-from formingx.forms.transfer import take_fields
+from formingx.forms.transfer import restrict_fields
 from formingx.problem.problem import Problem
 
 
@@ -59,7 +59,7 @@ def test_fields_of_a_part_are_those_of_the_whole(path):
     line = np.column_stack([np.linspace(0, 1, 13), np.full(13, 0.05)])
     here = Problem(fx.Scene(mesh=trimmed_mesh(mesh, line, 9), materials=source.scene.materials,
                             supports=[fx.Symmetry("axis"), fx.PinnedNode(0.0, 0.0)]))
-    take_fields(source, path.last, here)
+    restrict_fields(source, path.last, here)
     assert set(here.scene.mesh.boundaries) == set(mesh.boundaries)
     assert here.scene.mesh.nodes_of("rim")[:, 0] == pytest.approx(0.75)
     both = []

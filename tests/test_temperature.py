@@ -84,10 +84,10 @@ def test_constants_follow_a_temperature_that_changes():
     c10 = problem.forms.terms[0].constants["c10"]
     assert np.allclose(c10.x.array, 0.6)
     problem.temperature.T.x.array[:] = 130.0
-    problem.forms.take_temperature()
+    problem.forms.update_temperature()
     assert np.allclose(c10.x.array, 2.0)
     problem.temperature.T.x.array[:] = 120.0
-    problem.forms.take_temperature()
+    problem.forms.update_temperature()
     assert np.allclose(c10.x.array, 2.0)
 
 

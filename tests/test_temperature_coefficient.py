@@ -35,7 +35,7 @@ def test_values_at_earlier_temperatures_are_used_again_with_their_rates_only():
 
     def check(now, before, heat_time, time_before):
         heat.time, heat.time_before = heat_time, time_before
-        coefficient.take([np.array([T] if before is None else [T, before[k]]) for k, T in enumerate(now)])
+        coefficient.update([np.array([T] if before is None else [T, before[k]]) for k, T in enumerate(now)])
         t.value = heat_time + 0.3
         expected = 0.0
         for k, law in enumerate(LAWS):

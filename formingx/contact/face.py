@@ -96,7 +96,7 @@ class FaceContact:
         """Return the temperatures at the points, shape (n,); None if friction does not depend on the temperature."""
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
-    def take_temperature(self) -> None:
+    def update_temperature(self) -> None:
         """Update the coefficient of friction at the points to the present temperature of the body.
 
         Raises:
@@ -319,8 +319,8 @@ class FaceContact:
 
     def _start_at(self, x: np.ndarray) -> None:
         """Set the history variables of points that begin at positions x relative to the tool, shape (n, c), length."""
-        n = len(x)
-        self._take(FaceHistory(self.law.start(x), np.zeros(n, dtype=bool), np.ones(n)) if self.has_history else None)
+        none, ones = np.zeros(len(x), dtype=bool), np.ones(len(x))
+        self._set_history(FaceHistory(self.law.start(x), none, ones) if self.has_history else None)
 
     def set_closures(self, closure: np.ndarray, guessed: np.ndarray | None = None) -> None:
         """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.closure`).
@@ -331,7 +331,7 @@ class FaceContact:
         """
         self._guessed = guessed
         if self._stored is not None:
-            self._take(self._stored._replace(history=self._stored.history._replace(closure=closure)))
+            self._set_history(self._stored._replace(history=self._stored.history._replace(closure=closure)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Update the history variables to an accepted state; they do not change while the tool is inactive.
@@ -350,7 +350,7 @@ class FaceContact:
         if self.contact.lagged:                             # no point has moved since a stage began here
             moved = np.abs(history.closure - old.closure).max(1, initial=0.0)
             newly_closed |= self._stored.newly_closed & (moved < 1e-12 * self._length)
-        self._take(FaceHistory(history, newly_closed, penalty))
+        self._set_history(FaceHistory(history, newly_closed, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
         """Open the points under tension at a tool in three dimensions; return True if there are any. Collective."""
@@ -360,7 +360,7 @@ class FaceContact:
         free = self.law.pulling(x, history) & ~self._stored.newly_closed
         found = bool(self.comm.allreduce(int(free.sum())))
         if found:
-            self._take(self._stored._replace(history=history._replace(
+            self._set_history(self._stored._replace(history=history._replace(
                 position=np.where(free[:, None], x, history.position),
                 distance=np.where(free, -2 * self.law.theta, history.distance))))
         return found
@@ -378,7 +378,7 @@ class FaceContact:
         found = bool(self.comm.allreduce(int(late.sum())))
         if found:
             new = self.law.tractions(x, old).history
-            self._take(self._stored._replace(history=ContactHistory(*(
+            self._set_history(self._stored._replace(history=ContactHistory(*(
                 np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
         return found
 
@@ -394,9 +394,9 @@ class FaceContact:
     def put(self, variables: FaceHistory | None) -> None:
         """Restore history variables that `get` returned."""
         if variables is not self._stored:
-            self._take(variables)
+            self._set_history(variables)
 
-    def _take(self, variables: FaceHistory | None) -> None:
+    def _set_history(self, variables: FaceHistory | None) -> None:
         """Set the history variables, and begin an increment that evaluates states."""
         self._stored = variables
         if self.contact.present_area and variables is not None:

@@ -112,11 +112,11 @@ class Formulation(BodyModel):
         self.scales = [load.unit(body) if load.driven else self.length for load in scene.loads]
         self.scales += [self.length] * (len(scene.items) - len(self.scales)) + [1.0]
         self.control_scale = next((s for s, t in zip(self.scales, scene.items) if t is scene.driven), self.length)
-        self._take_materials()
-        self._take_supports(body)
+        self._add_materials()
+        self._add_supports(body)
         self.residual, self.control_derivative, self.time_derivative = self._residual(body)
 
-    def _take_materials(self) -> None:
+    def _add_materials(self) -> None:
         """Set the coefficients, histories and energies of the materials."""
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
@@ -134,7 +134,7 @@ class Formulation(BodyModel):
                    for terms in changing if terms not in timed]
         self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
 
-    def _take_supports(self, body: LoadedBody) -> None:
+    def _add_supports(self, body: LoadedBody) -> None:
         """Add the energies of elastic supports."""
         self.elastic_supports: list[tuple[Any, fem.Constant]] = []
         for support in self.scene.supports:
@@ -184,14 +184,14 @@ class Formulation(BodyModel):
         """
         return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
 
-    def take_temperature(self) -> None:
+    def update_temperature(self) -> None:
         """Update the material constants to a changed temperature, with unchanged `length` and `stress`; collective.
 
         Raises:
             InputError: a material constant has no value at a temperature.
         """
         following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
-        call_on_all_ranks(self.comm, [entry.take_temperature for entry in following])
+        call_on_all_ranks(self.comm, [entry.update_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
         """Return the cells of some layers.

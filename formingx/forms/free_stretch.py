@@ -41,9 +41,9 @@ class FreeStretch:
         self._coefficient = TemperatureCoefficient(forms, stretch, laws, map(self._temperatures, self._cells))
         self.stretch = self._coefficient.at_time(forms.time)
 
-    def take_temperature(self) -> None:
+    def update_temperature(self) -> None:
         """Update the stretch to a changed temperature of the body."""
-        self._coefficient.take(map(self._temperatures, self._cells))
+        self._coefficient.update(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:
         """Return the elastic part of a deformation gradient.

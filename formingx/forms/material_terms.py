@@ -119,7 +119,7 @@ class MaterialTerms:
         self._coefficients.append(coefficient)
         return coefficient.at_time(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
-    def take_temperature(self) -> None:
+    def update_temperature(self) -> None:
         """Update the constants to a changed temperature.
 
         Raises:
@@ -127,7 +127,7 @@ class MaterialTerms:
         """
         temperatures = [self.forms.temperatures(self)] if self._coefficients else []
         for coefficient in self._coefficients:
-            coefficient.take(temperatures)
+            coefficient.update(temperatures)
 
     def of_mesh(self, expression: Any) -> Any:
         """Return a coefficient that is a UFL expression on the scene's mesh, if the fields live on this mesh.

@@ -167,9 +167,9 @@ class MidSurfaceProbe(Probe):
             far = int(np.argmax(nodes[k, :2, 0]))      # leave an error of the fourth order
             h = nodes[k, far, 0]
             self._slopes[k, 0, [far, 2]] = -1 / (3 * h), 8 / (3 * h)
-        self._take_ends(element, geometry)
+        self._average_slopes(element, geometry)
 
-    def _take_ends(self, element: Any, geometry: Any) -> None:
+    def _average_slopes(self, element: Any, geometry: Any) -> None:
         """Average the slopes of both elements at points where two elements meet."""
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))

@@ -15,7 +15,7 @@ class Temperature:
         given: temperature of the scene (`GivenTemperature`).
 
     Attributes:
-        T: DOLFINx `Function` (P2) of the temperature. After a change call `take_temperature` of the `Problem`.
+        T: DOLFINx `Function` (P2) of the temperature. After a change call `update_temperature` of the `Problem`.
         before: nodal values of T at an earlier time, with ghosts, shape (n,), or None.
         time: process time of `T`.
         time_before: process time of `before`.

@@ -25,7 +25,7 @@ class TemperatureCoefficient:
         forms: the `Formulation`.
         values: `Function` of a quadrature element, set to f(T).
         parts: list of (local numbers of cells, function f), a pair for each group of cells.
-        temperatures: temperatures at the q points of the cells of each group, shape (1 or 2, cells, q); see `take`.
+        temperatures: temperatures at the q points of the cells of each group, shape (1 or 2, cells, q); see `update`.
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],
@@ -35,7 +35,7 @@ class TemperatureCoefficient:
         self._known: dict[tuple, list[np.ndarray]] = {}      # values and rates at the last two temperatures
         if forms.scene.heat is not None:
             self._rate, self._since = fem.Function(values.function_space), forms.constant(0.0)
-        self.take(temperatures)
+        self.update(temperatures)
 
     def at_time(self, time: Any) -> Any:
         """Return the coefficient at a time of the step.
@@ -48,7 +48,7 @@ class TemperatureCoefficient:
         """
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
-    def take(self, temperatures: Iterable[np.ndarray]) -> None:
+    def update(self, temperatures: Iterable[np.ndarray]) -> None:
         """Update the coefficient to changed temperatures.
 
         Args:
@@ -77,7 +77,7 @@ class TemperatureCoefficient:
         return [self._values] if self._rate is None else [self._values, self._rate]
 
     def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
-        """Evaluate the coefficient and its rate at temperatures, as in `take`."""
+        """Evaluate the coefficient and its rate at temperatures, as in `update`."""
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]

@@ -76,7 +76,7 @@ class MovingLeastSquares:
         return gathered(self._comm, values)
 
 
-def take_fields(source: Any, state: Any, problem: Any) -> None:
+def restrict_fields(source: Any, state: Any, problem: Any) -> None:
     """Set the fields of a problem on part of a mesh from a state on the whole mesh; collective.
 
     The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear.

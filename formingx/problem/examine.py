@@ -44,17 +44,17 @@ class Examination:
             self.facts["touching"] = problem.comm.allreduce(
                 sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
             if self._shape:
-                self._take_worst(self._shape)
-                self._take_shortened(self._shape)
+                self._find_worst(self._shape)
+                self._find_compressed(self._shape)
         if attempt is not None:
-            self._take_attempt(x, attempt)
+            self._examine_attempt(x, attempt)
         x.destroy()
         self._tools: list = []
         if last is not None:
             tooling = Tooling.of_problem(problem)
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
-    def _take_worst(self, shape: Body) -> None:
+    def _find_worst(self, shape: Body) -> None:
         """Find the smallest J, the worst element shape and the point nearest to its largest I1 in the last state."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
@@ -68,7 +68,7 @@ class Examination:
             facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
             self._marks.append(("nearest to the material's limit", shape.moved[at]))
 
-    def _take_shortened(self, shape: Body) -> None:
+    def _find_compressed(self, shape: Body) -> None:
         """Find the longest piece of a sheet that is compressed along its section in the last good state."""
         columns = self._problem.scene.mesh.columns
         if columns is None:
@@ -87,7 +87,7 @@ class Examination:
             self.facts["shortened"] = (float(found[piece] @ lengths[piece] / lengths[piece].sum()),
                                        tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
-    def _take_attempt(self, x: Any, attempt: Any) -> None:
+    def _examine_attempt(self, x: Any, attempt: Any) -> None:
         """Find the smallest J, the residual and the changes of contact status of the failed attempt."""
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x

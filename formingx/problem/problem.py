@@ -292,14 +292,14 @@ class Problem(Stages, Units):
         if self._stage.unbalanced is not None:
             out.array_w += self._stage.unbalanced
 
-    def take_temperature(self) -> None:
+    def update_temperature(self) -> None:
         """Update constants and friction to a changed temperature; collective.
 
         Raises:
             InputError: a constant or friction has no value at a temperature.
         """
-        call_on_all_ranks(self.comm, [self.forms.take_temperature,
-                                      *(contact.take_temperature for contact in self.contacts)])
+        call_on_all_ranks(self.comm, [self.forms.update_temperature,
+                                      *(contact.update_temperature for contact in self.contacts)])
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

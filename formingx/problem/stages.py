@@ -112,7 +112,7 @@ class Stages(Vectors):
             yield self
         finally:
             self.history_variables, self._predicted = variables, predicted
-            self._take(stage)
+            self._set_stage(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
             self._fields[:], self._control[()] = fields, control
@@ -182,7 +182,7 @@ class Stages(Vectors):
         rate = np.append(setting.rate, 0.0)[active.driver][active.owned]
         place = x[active.dofs[active.owned]] - rate * control
         stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
-        self._take(stage)
+        self._set_stage(stage)
         if setting.fading and control < 1:
             unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()
             unknowns.array_w[:] = x
@@ -191,7 +191,7 @@ class Stages(Vectors):
             unknowns.destroy()
             unbalanced.destroy()
 
-    def _take(self, stage: _Stage) -> None:
+    def _set_stage(self, stage: _Stage) -> None:
         """Set the loads of the forms, the active contacts and the constraints of the matrix from `stage`."""
         before, self._stage = self._stage, stage
         if before is stage:

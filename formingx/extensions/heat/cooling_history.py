@@ -312,7 +312,7 @@ class CoolingHistory:
                 earlier.x.array[: self._n] = before[1]
                 earlier.x.scatter_forward()
                 field.time_before, field.before = before[0], earlier.x.array
-            self._problem.take_temperature()
+            self._problem.update_temperature()
 
 
 def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import ConvergenceError, InputError, finite, positive
 from ...forms.schedule import StepData
-from ...forms.transfer import take_fields, transfer_histories
+from ...forms.transfer import restrict_fields, transfer_histories
 from ...mesh.mesh import Mesh
 from ...physics.supports import Constrained, PinnedNode, Support, Symmetry
 from ...problem.problem import Problem
@@ -278,7 +278,7 @@ def _transferred_unknowns(source: Any, state: Any, problem: Problem) -> np.ndarr
     Returns:
         Unknowns of `problem`, locally owned entries.
     """
-    take_fields(source, state, problem)
+    restrict_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
     transfer_histories(source, state, problem, x, 0.0)
