@@ -27,9 +27,9 @@ def by_hand(law, i, near, x, old, sense, expected):
     k, mu, d = np.broadcast_to(law.k, len(x))[i], np.broadcast_to(law.mu, len(x))[i], near.distance[i]
     n, t = near.normal[i], near.tangent[i]
     touched = old.distance[i] > -THETA
-    bonded = law.pulls and touched
+    bonded = law.adhesive and touched
     at = d if expected is None else expected.distance[i]
-    F, slope = ramp(at, law.pulls, bonded)
+    F, slope = ramp(at, law.adhesive, bonded)
     N, T, sliding, kept = k * (F + slope * (d - at)), 0.0, 0.0, 0.0
     if law.has_friction:
         came = (old.position if touched else old.closure)[i]
@@ -37,7 +37,7 @@ def by_hand(law, i, near, x, old, sense, expected):
         predicted = g if expected is None else expected.slip[i]
         if mu >= STICKS:
             s = k * slope
-            rising = k / (2 * THETA) if abs(at) < THETA and not law.pulls else 0.0
+            rising = k / (2 * THETA) if abs(at) < THETA and not law.adhesive else 0.0
         else:
             s, rising = mu * k * F / SLIP, mu * k * slope / SLIP
         T = s * g + rising * (d - at) * predicted

@@ -40,7 +40,7 @@ def test_force_is_derivative_of_energy():
 
 class Bond(NormalLaw):
     """k d exp(-|d|/THETA): pulls and presses."""
-    pulls = True
+    adhesive = True
 
     def ramp(self, d, bonded=False):
         fades = np.exp(-np.abs(d) / THETA)
@@ -94,7 +94,7 @@ def test_stiffness_is_derivative_of_force(mu, slip, touched):
 @pytest.mark.parametrize("touched", [True, False])
 def test_stiffness_of_an_adhering_tool_is_the_derivative_of_its_force(mu, touched):
     """Stiffness is the derivative of the force; what has touched is pulled back, what has not is free."""
-    law = Law(TOOL, mu, K, THETA, SLIP, pulls=True)
+    law = Law(TOOL, mu, K, THETA, SLIP, adhesive=True)
     x, tangent = points_near(TOOL, [-5 * THETA, -(1 + 1e-3) * THETA, -0.5 * THETA, 2 * THETA])
     before = x - 0.01 * tangent
     distance = np.full(len(x), -0.5 * THETA if touched else -2 * THETA)
@@ -443,7 +443,7 @@ def test_coulomb_friction_that_never_slides_equals_stick():
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1000.0])
 def test_open_points_carry_nothing_alone_or_beside_closed_ones(mu, pulls):
     """Forces, stiffness, sense and history variables of open points are the same whether another point touches."""
-    law = Law(TOOL, mu, K, THETA, SLIP, pulls=pulls and not 0 < mu < 1000)
+    law = Law(TOOL, mu, K, THETA, SLIP, adhesive=pulls and not 0 < mu < 1000)
     random = np.random.default_rng(5)
     outside = random.uniform(-3, 3, (200, 2))
     outside = outside[law.distance(outside) < -2 * THETA][:20]

@@ -327,7 +327,7 @@ class Approach:
             True if both happened in the step, on any ranks.
         """
         face, theta, history = self.face, self.face.law.theta, self.face.history
-        if history is None or not face.contact.sticks or face.law.pulls or face.contact.lagged:
+        if history is None or not face.contact.sticks or face.law.adhesive or face.contact.lagged:
             return False
         x, area = face.positions(new, control), face.rule.area > 0
         near = face.law.nearest(x)

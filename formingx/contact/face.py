@@ -237,16 +237,16 @@ class FaceContact:
         """Return the derivative of the contact forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
         return self._of_unknowns(self._stiffness(fields, control, False))
 
-    def stiffness_round(self, fields: np.ndarray, control: float) -> np.ndarray:
+    def hoop_stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the derivative of circumferential contact forces by circumferential motions, shape (n, m/2, m/2).
 
-        The second variation of non-axisymmetric modes uses this stiffness; see `ContactLaw.stiffness_round`.
+        The second variation of non-axisymmetric modes uses this stiffness; see `ContactLaw.hoop_stiffness`.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
             radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
         both = np.zeros_like(self._in_tangent)
-        both[:, 0, 0] = self.law.stiffness_round(self.positions(fields, control), self.history, radius)
+        both[:, 0, 0] = self.law.hoop_stiffness(self.positions(fields, control), self.history, radius)
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -357,7 +357,7 @@ class FaceContact:
         if self._stored is None or not (self.contact.lagged and self.contact.separates):
             return False
         history, x = self._stored.history, self.positions(fields, control)
-        free = self.law.pulling(x, history) & ~self._stored.newly_closed
+        free = self.law.in_tension(x, history) & ~self._stored.newly_closed
         found = bool(self.comm.allreduce(int(free.sum())))
         if found:
             self._set_history(self._stored._replace(history=history._replace(

@@ -142,7 +142,8 @@ class Increment:
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
         before = Motion(*(part[points] for part in self._before))
-        sticks = np.reshape(self._law.has_friction and not self._law.pulls and self._law.part(points).sticks, (-1, 1))
+        law = self._law.part(points)
+        sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
 
         def depth_and_path(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return before.distance_at(x + motion) / width + 0.5, width * sticks * before.normal

@@ -145,7 +145,7 @@ class ContactLaw:
         shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
         has_friction: True if tractions depend on the slip.
         has_history: True if tractions depend on the history variables (`ContactHistory`).
-        pulls: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
+        adhesive: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
         predictable: True if the law has `friction` and `depth`, as `formingx.physics.penalty.Law`; several gaps may
             then close in one step.
     """
@@ -155,7 +155,7 @@ class ContactLaw:
     shift: np.ndarray | float = 0.0
     has_friction: bool = False
     has_history: bool = False
-    pulls: bool = False
+    adhesive: bool = False
     predictable: bool = False
 
     @property
@@ -236,7 +236,7 @@ class ContactLaw:
         """
         return self.tractions(x, old).stiffness
 
-    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
+    def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         """Return the derivative of the circumferential traction with respect to the circumferential displacement.
 
         The second variation of non-axisymmetric modes of an axisymmetric body uses this stiffness.
@@ -400,7 +400,7 @@ class NormalLaw(ContactLaw):
         return Tractions(N[:, None] * n, N, zero, zero, lambda: outer(n, (self.k * slope)[:, None] * n)
                          + outer(t, (self.k * F * near.curvature)[:, None] * t), lambda: self.start(x))
 
-    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
+    def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         r"""Return the derivative of the circumferential traction with respect to the circumferential displacement.
 
         .. math:: \frac{N n_r}{r}

@@ -37,7 +37,7 @@ class Law(NormalLaw):
         theta: half-width of the ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip g_s at which a point begins to slide, length; not used by stick.
         shift: reduction of the signed distances, length, shape () or (n,).
-        pulls: True if points in contact never separate and can carry tension.
+        adhesive: True if points in contact never separate and can carry tension.
         shear_limit: function of pressure and mu that returns the shear stress at which points slide and its derivative,
             see `Contact.shear_limit`; None for Coulomb's mu p.
     """
@@ -45,11 +45,11 @@ class Law(NormalLaw):
     predictable = True
 
     def __init__(self, tool: PlaneTool, mu: np.ndarray | float, k: np.ndarray | float, theta: float,
-                 elastic_slip: float, shift: np.ndarray | float = 0.0, pulls: bool = False,
+                 elastic_slip: float, shift: np.ndarray | float = 0.0, adhesive: bool = False,
                  shear_limit: Callable | None = None):
         super().__init__(tool, k, theta, shift)
         self.shear_limit = shear_limit
-        self.elastic_slip, self.pulls = elastic_slip, pulls
+        self.elastic_slip, self.adhesive = elastic_slip, adhesive
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
         self._constants: tuple | None = None
@@ -71,7 +71,7 @@ class Law(NormalLaw):
         """Set the coefficients of friction and the flags that depend on them."""
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
-        self.has_history = self.has_friction or self.pulls
+        self.has_history = self.has_friction or self.adhesive
 
     def _with(self, **other: Any) -> Self:
         return super()._with(_constants=None, **other)
@@ -79,7 +79,7 @@ class Law(NormalLaw):
     def _given(self) -> tuple:
         """Return the constants of the law as arguments of the C function `tractions`, stored for repeated calls."""
         if self._constants is None:
-            flags = (self.pulls, self.has_friction, self._slides)
+            flags = (self.adhesive, self.has_friction, self._slides)
             each = [(np.array(value, dtype=float, ndmin=1), np.ndim(value)) for value in (self.k, self.mu)]
             self._constants = (address(np.array([self.theta, self.elastic_slip, *flags, STICKS])),
                                *(argument for value, stride in each for argument in (address(value), stride)))
@@ -99,7 +99,7 @@ class Law(NormalLaw):
 
     def _bonded(self, old: ContactHistory | None) -> np.ndarray | bool:
         """Return the mask of the points that were in contact and cannot separate, shape (n,); False for no point."""
-        return False if not self.pulls or old is None else old.distance > -self.theta
+        return False if not self.adhesive or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         r"""Return the contact ramp F(d), eq. (5.13) of Song (1993), and its derivative.
@@ -119,7 +119,7 @@ class Law(NormalLaw):
         """
         F, slope = np.empty(len(d)), np.empty(len(d))
         mask = NULL if bonded is False else address(bonded)
-        compiled().ramp(len(d), self.theta, self.pulls, address(d), mask, address(F), address(slope))
+        compiled().ramp(len(d), self.theta, self.adhesive, address(d), mask, address(F), address(slope))
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
@@ -136,7 +136,7 @@ class Law(NormalLaw):
             Signed distance, positive inside the tool, shape (n,), length.
         """
         over = pressure / (self.k * self.theta)
-        return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.pulls else over - 1)
+        return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
 
     @property
     def sticks(self) -> np.ndarray | bool:
@@ -170,7 +170,7 @@ class Law(NormalLaw):
             Energy per unit reference area, shape (n,), stress times length.
         """
         d, theta = self.distance(x), self.theta
-        if self.pulls:
+        if self.adhesive:
             return self.k * np.where(self._bonded(old) | (d > -theta), (d + theta) ** 2 / 2, 0.0)
         inside = np.clip(d + theta, 0.0, 2 * theta)
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
@@ -185,7 +185,7 @@ class Law(NormalLaw):
             The history variables.
         """
         d = self.distance(x)
-        if self.pulls:                                      # at the outer edge of the ramp it sticks, free of stress
+        if self.adhesive:                                   # at the outer edge of the ramp it sticks, free of stress
             d = np.where(np.abs(d / self.theta + 1) < RAMP_EDGE, -(1 - RAMP_EDGE) * self.theta, d)
         return _history(x.copy(), d, np.zeros(len(x)))
 
@@ -235,7 +235,7 @@ class Law(NormalLaw):
                              limit, grows, address(out))
         return out
 
-    def stiffness_round(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
+    def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
         r"""Return the derivative of the circumferential traction with respect to the circumferential displacement.
 
         .. math:: \frac{N n_r}{r}
@@ -251,7 +251,7 @@ class Law(NormalLaw):
         Returns:
             Stiffness, shape (n,), stress/length.
         """
-        turned = super().stiffness_round(x, old, radius)
+        turned = super().hoop_stiffness(x, old, radius)
         if not self.has_friction:
             return turned
         n, out = len(x), self._evaluate(x, old)

@@ -122,7 +122,7 @@ class Points:
         self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
         ones = [np.ones(len(face.points)) for face in self._faces]
         more = self.values_at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
-                                         face.law.elastic_slip * unit, face.scale, face.law.pulls * unit])
+                                         face.law.elastic_slip * unit, face.scale, face.law.adhesive * unit])
                         for face, unit in zip(self._faces, ones)], new)
         friction, slip, scale, pulls = more.T
         self.friction = np.append(self.friction, np.where(friction < FAR, friction, np.inf))
@@ -196,7 +196,7 @@ class Points:
         for f, k, i, law in self._owned:
             near = law.nearest(positions[f][i])
             N = np.einsum("ni,ni->n", force[k], near.normal) / self._scale[k]
-            depth = law.depth(N if law.pulls else np.maximum(N, 0.0))
+            depth = law.depth(N if law.adhesive else np.maximum(N, 0.0))
             found[k, :c], found[k, c:-2], found[k, -2] = near.normal, near.tangent, near.curvature
             found[k, -1] = depth - near.distance
         found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)

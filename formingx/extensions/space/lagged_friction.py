@@ -83,7 +83,7 @@ class LaggedFriction(LaggedStick):
         """
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
-    def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
+    def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of the points in contact that are in tension: the points outside the tool.
 
         Args:

@@ -44,10 +44,10 @@ class LaggedStick(ContactLaw):
         tool: tool with a method `signed_distance`.
         k: penalty, stress/length.
         theta: a point sticks where its signed distance exceeds -theta, length.
-        separates: True if points in tension separate at the end of a step, see `pulling`.
+        separates: True if points in tension separate at the end of a step, see `in_tension`.
     """
 
-    has_history = pulls = sticks = True
+    has_history = adhesive = sticks = True
     mu = np.inf
 
     def __init__(self, tool: RigidTool, k: Any, theta: float, separates: bool = False):
@@ -76,7 +76,7 @@ class LaggedStick(ContactLaw):
         """
         return old.distance > -self.theta
 
-    def pulling(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
+    def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of the sticking points in tension, which separate at the end of a step.
 
         A point is in tension if its distance outside the tool exceeds 0.01 of its distance from the sticking position,

@@ -374,7 +374,7 @@ class SecondVariation:
         """
         control = self.problem.control
         plane = contact.stiffness(fields, control)
-        plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.stiffness_round(fields, control)
+        plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.hoop_stiffness(fields, control)
         dofs = self._to_mode[contact.rule.dofs]
         k = dofs.shape[1]
         values = np.zeros((len(dofs), k + k // 2, k + k // 2))

@@ -158,7 +158,7 @@ class EnergyBalance:
             found["friction"] = self._friction(a, b)
         if self._problem.scene.heat is not None:
             found["heat"] = self._heat(a, b)
-        if any(c.law.pulls for c in self._problem.contacts):
+        if any(c.law.adhesive for c in self._problem.contacts):
             found["bonds"] = self._bonds(b) - self._bonds(a)
         if a.setting != b.setting:                          # a new stage: the body does not move
             if self._problem.forms.elastic_supports:
@@ -307,7 +307,7 @@ class EnergyBalance:
     def _bonds(self, state: Any) -> float:
         """Return the energy stored in the contacts with adhesive tools, on the body as modelled, in a state."""
         with self._problem.state_context(state) as p:
-            return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.pulls)
+            return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.adhesive)
 
     def _sum(self, values: Any) -> float:
         """Return the sum of an array, or of a number, over all entries and ranks; collective."""
