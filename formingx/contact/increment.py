@@ -156,7 +156,7 @@ class Increment:
         return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
-        """Set the sense of sliding that the next `linearise` assumes at some points.
+        """Set the sense of sliding at some points, from which the next `linearise` starts.
 
         Args:
             points: mask of these points, shape (n,).

@@ -73,11 +73,11 @@ class TemperatureCoefficient:
 
     @property
     def _functions(self) -> list[fem.Function]:
-        """DOLFINx functions of the coefficient and of its rate."""
+        """DOLFINx functions of the coefficient f and, if temperatures change, of its logarithmic rate a."""
         return [self._values] if self._rate is None else [self._values, self._rate]
 
     def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
-        """Evaluate the coefficient and its rate at temperatures, as in `update`."""
+        """Set the coefficient f and its logarithmic rate a from temperatures; see `update` for their shapes."""
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]

@@ -55,7 +55,7 @@ class Examination:
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
     def _find_worst(self, shape: Body) -> None:
-        """Find the smallest J, the worst element shape and the point nearest to its largest I1 in the last state."""
+        """Store the smallest J, the worst element shape and the point whose I1 is nearest to its limit, in `facts`."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
         facts["shape"] = float((shape.quality / shape.initial_quality).min())
@@ -69,7 +69,7 @@ class Examination:
             self._marks.append(("nearest to the material's limit", shape.moved[at]))
 
     def _find_compressed(self, shape: Body) -> None:
-        """Find the longest piece of a sheet that is compressed along its section in the last good state."""
+        """Store the mean stretch and the ends of the longest piece of a sheet that is compressed along its section."""
         columns = self._problem.scene.mesh.columns
         if columns is None:
             return
@@ -88,7 +88,7 @@ class Examination:
                                        tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
     def _examine_attempt(self, x: Any, attempt: Any) -> None:
-        """Find the smallest J, the residual and the changes of contact status of the failed attempt."""
+        """Store the smallest J, the residual and the number of changes of contact status of the failed attempt."""
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
