@@ -44,7 +44,7 @@ class Formulation(BodyModel):
         comm: MPI communicator.
         length: scale L of lengths, the largest extent of the mesh, length.
         stress: scale of stresses, the largest shear modulus, stress.
-        volume: reference volume, length^3.
+        volume: reference volume, length^3; in plane strain per depth, length^2.
         space: mixed `FunctionSpace` of all fields, displacement first.
         w: `Function` of all fields (dimensionless).
         displacement_element: scalar element of a displacement component.

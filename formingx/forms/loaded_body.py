@@ -48,7 +48,7 @@ class LoadedBody:
         kinematics: the `Kinematics` of the scene.
         stress: largest shear modulus, stress.
         length: largest extent, length.
-        volume: reference volume, length^3.
+        volume: reference volume, length^3; in plane strain per depth, length^2.
     """
 
     def __init__(self, forms: Any):
