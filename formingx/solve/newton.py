@@ -39,7 +39,7 @@ class Iteration(NamedTuple):
 
     Attributes:
         residual: |F| before the iteration, relative to the support forces (`relative`).
-        correction: |dx|/(|x| + `Newton.at_rest`), criterion (3.5.1) of Song (1993).
+        correction: ``|dx|/(|x| + Newton.at_rest)``, criterion (3.5.1) of Song (1993).
         work: |F . dx| over its value in the first iteration, criterion (3.5.2) of Song (1993).
         chord: True if the tangent of an earlier iteration was used.
     """
@@ -86,7 +86,7 @@ class Tolerances:
     """Convergence criteria of a state, all of which must be met.
 
     Attributes:
-        correction: tolerance of the relative correction |dx|/(|x| + `Newton.at_rest`) that quadratic convergence
+        correction: tolerance of the relative correction ``|dx|/(|x| + Newton.at_rest)`` that quadratic convergence
             predicts for the next iteration.
         residual: tolerance of the norm of F relative to the support forces (`relative`).
         iterations: largest number of iterations with the same active set of contact.
