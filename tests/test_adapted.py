@@ -105,3 +105,12 @@ def test_wrong_arguments_of_adapted_are_refused():
         plugged(mesh, adapt_mesh=True)
     with pytest.raises(fx.InputError, match="present_area"):
         fx.Contact("top", PLUG, 0.3, present_area=True)
+
+
+def test_column_factors_need_a_mesh_with_columns(tmp_path):
+    fx.mesh.write(disc((4, 1)), tmp_path / "sheet.msh")
+    scene = fx.Scene(mesh=fx.mesh.read(tmp_path / "sheet.msh"), materials=fx.NeoHookean(c10=1.0),
+                     loads=[fx.Pressure("bottom")], supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    path = fx.trace(scene, until=fx.pole_height(0.1), progress=False)
+    with pytest.raises(fx.InputError, match="column_factors: the mesh has no columns"):
+        path.column_factors(0.3, None)

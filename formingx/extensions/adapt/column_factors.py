@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import positive
+from ...errors import InputError, positive
 from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...results.extend import method_of
 from ...results.path import Path
@@ -38,11 +38,16 @@ def column_factors(path: Any, max_rotation: float | None, error: float | None) -
 
     Returns:
         Factors, shape (n,); inf where no state demands a size.
+
+    Raises:
+        InputError: a sheet in three dimensions, a mesh without columns, or a limit that is not above 0.
     """
     path.section_only("column_factors", "use fx.mesh.adapted")
     max_rotation, error = (value if value is None else positive(f"column_factors: {name}", value)
                     for name, value in (("max_rotation", max_rotation), ("error", error)))
     columns = path.problem.scene.mesh.columns
+    if columns is None:
+        raise InputError("column_factors: the mesh has no columns: must be made by disc, sphere, parison or from_lines")
     middles = columns.place((columns.ends[1:] + columns.ends[:-1]) / 2)
     factors = np.full(len(columns.ends) - 1, np.inf)
     if max_rotation is not None and path.problem.scene.model.solid:
