@@ -134,10 +134,12 @@ def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) ->
 
 
 def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    """Return the required over the present length of the n columns, which equidistributes the stress error, shape (n,).
+    r"""Return the required over the present length of the n columns for a given stress error, shape (n,).
 
-    The error of a column is C(s) h^p per length, with its length h and the order p. The optimal size is h ~ C^(-2/(2 p
-    + 1)), scaled so that the integral of (C h^p)^2 meets the tolerance. A mesh with the fewest elements has such sizes.
+    .. math:: h \propto C^{-2/(2p + 1)}, \qquad \int (C h^p)^2 \, ds = \varepsilon^2 \|\sigma\|^2
+
+    C h^p is the error of the stress in a column of length h, with the order p = 2, s the length along the sheet, and
+    epsilon the relative error of the stress sigma. The smallest length of all examined states counts.
 
     Args:
         path: the run.

@@ -86,6 +86,9 @@ def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
         row: cells of the row.
         width: number of cells that a row must have.
         columns: numbers of the columns with test, stretch, stress and, if there is one, time.
+
+    Raises:
+        InputError: another number of cells, or an unknown test.
     """
     if len(row) != width or len(columns) not in (3, 4):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"

@@ -66,7 +66,7 @@ def _part_of_grid(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 
 def _boundary_edges(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
-    """Return {frozenset of the ends of an edge: [first, last, middle]} for edges of a single triangle.
+    """Return {set of both end nodes: [first, last, middle node]} of the edges that belong to one triangle only.
 
     triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle.
     """
