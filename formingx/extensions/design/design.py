@@ -104,7 +104,7 @@ class Design:
     def _run(self, vector: np.ndarray) -> DesignRun:
         """Compute the run for the n numbers of the parameters, shape (n,)."""
         scene, end = self._make(vector)
-        scene = copy.copy(scene)                             # the script's scene is left as it is
+        scene = copy.copy(scene)                             # the scene of the script does not change
         scene.one_node_per_step = True
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._max_steps,
@@ -179,7 +179,7 @@ class Design:
                 break
             if not np.any(np.abs(jacobian * size) > 1e-9):
                 raise InputError("fit: no parameter has an effect on what is fitted")
-            # keeps parameters without effect
+            # the damping keeps parameters without effect at their values
             damping = objective.damping * np.linalg.norm(jacobian * size, 2) * np.eye(len(size))
             step = lsq_linear(np.vstack([jacobian * size, damping]), np.append(-residual, 0 * size), tol=1e-12,
                               bounds=((low - best.vector) / size, (high - best.vector) / size)).x * size

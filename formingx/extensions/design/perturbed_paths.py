@@ -201,9 +201,9 @@ class _PerturbedPaths:
             Mask of the points whose gap closes at the end of the step, shape (n,).
         """
         history, law, n = face.history, face.law, self.problem.n_owned
-        none = np.zeros(len(face.points), dtype=bool)
+        no_points = np.zeros(len(face.points), dtype=bool)
         if history is None or not law.has_friction or not face.present:
-            return none
+            return no_points
         distance = law.distance(face.positions(state.x[:n], state.control))
         newly_closed = (history.distance <= -law.theta) & (distance > -law.theta)
         closing = newly_closed & (np.isnan(history.closure[:, 0]) | (not face.contact.sticks) & (distance < law.theta))

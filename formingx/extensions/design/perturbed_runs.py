@@ -205,7 +205,7 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
         raise Failure("the quantity of the target does not change along the path at its end", [])
     problem.x.array_w[:] = state.x
     problem.residual(problem.x, state.control, newton.F)
-    base_residual = newton.F.array_r.copy()                  # round-off, and the forces of points kept open
+    base_residual = newton.F.array_r.copy()                  # round-off and forces of points that are kept open
 
     def constraint(k: int) -> float:
         """Return the residual of the constraint of the perturbed run with number k."""

@@ -120,7 +120,7 @@ def fit_timed_tests(material: type[RelaxingMaterial] | RelaxingMaterial, tests: 
         best = _fit_branches(data, _initial_material(material), count("fit: terms", terms))
     else:
         best = _fit_branches(data, _initial_material(material), 1)
-        for n in range(2, 11):                  # a branch more while the misfit falls and the data determine all
+        for n in range(2, 11):        # add branches while the misfit decreases and all constants are determined
             larger = _fit_branches(data, _initial_material(material), n)
             if larger[1] > 0.8 * best[1] or data.uncertainty(larger[0]).undetermined:
                 break

@@ -85,7 +85,7 @@ def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, size
         sizes: stress by which each misfit is divided, shape (n,).
     """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
-    largest = abs(values[i]) or math.inf                    # a larger step in an exponent without effect would show
+    largest = abs(values[i]) or math.inf        # a larger step of an exponent without effect would have one
     for _ in range(50):
         if abs(step) > largest:
             break

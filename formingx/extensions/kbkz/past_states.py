@@ -109,11 +109,11 @@ class PastStates:
         times = np.array([state.reduced_time for state in variables.states])
         self._past = np.array([state.C for state in variables.states])
         self._weights = self._law.weights(times[-1] - times)
-        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # with C, the rate of the motion
+        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # gives the strain rate
         self._parabola_allowed = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
         self._refreshed = None
 
-    @np.errstate(over="ignore", invalid="ignore")                   # of a guess far back in time: no state
+    @np.errstate(over="ignore", invalid="ignore")      # a trial state far back in time overflows, and is rejected
     def refresh(self) -> None:
         """Linearise the stress at the present fields and time: update its coefficients in the forms."""
         C, step, rate = self._present()
@@ -146,7 +146,7 @@ class PastStates:
         time = self._forms.time_at(control)
         if time == variables.time and len(states) > 2 and np.array_equal(states[-2].reduced_time,
                                                                       states[-3].reduced_time):
-            chosen = [*range(len(states) - 2), len(states) - 1]             # between two jumps at one instant
+            chosen = [*range(len(states) - 2), len(states) - 1]       # no state between two jumps at one instant
         else:
             chosen = self._indices_to_keep(states, C, smallest_h)
         self.put(StoredStates(time, tuple(states[k] for k in chosen),
@@ -198,7 +198,7 @@ class PastStates:
         times, past = np.array([s.reduced_time for s in states]), np.array([s.C for s in states])
         inverse, h, _, _ = self._law.inverses_and_damping(C, past, smallest_h)
         W = self._law.weights_after(self._law.weights(times[-1] - times), 0.0)[0]
-        g = h[:, None] * inverse                                            # of the stress of a state, (K, 4, n)
+        g = h[:, None] * inverse                                            # h C_k^-1, shape (K, 4, n)
         times = times.reshape(len(states), -1)
         length = times[2:] - times[:-2]
         share = np.where(length > 0, (times[1:-1] - times[:-2]) / np.where(length > 0, length, 1), 0.0)[:, None]
@@ -208,7 +208,7 @@ class PastStates:
         comm = self._forms.comm
         squares = comm.allreduce(np.array([*np.sum(deviation, axis=1), np.sum(total)]), MPI.SUM)
         jump = comm.allreduce(np.concatenate([[False], np.any(np.diff(times, axis=0) <= 0, axis=1)]).astype(int),
-                              MPI.SUM)                                      # a state that begins or ends one is needed
+                              MPI.SUM)                                      # states at the ends of a jump are needed
         small = squares[:-1] < _DROPPED_STATE_ERROR**2 * squares[-1]
         chosen, left_out = [0], False
         for k in range(1, len(states) - 1):

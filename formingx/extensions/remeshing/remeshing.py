@@ -337,7 +337,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     for new, (_, before, _) in zip(problem.contacts, contacts, strict=True):
         transfer_contact(new, before, x[: problem.n_owned], control)
     volume = problem.forms.volume / old.forms.volume / (1 + state.measures["mass_error"]) - 1
-    x = x if setting.fading else _balanced(problem, curve, x, control)      # else fade the residual, too
+    x = x if setting.fading else _balanced(problem, curve, x, control)      # a fading stage fades the residual, too
     start = curve.resume(x, control)
     if start.slope * state.slope < 0:
         start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation

@@ -81,7 +81,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
         return HoopResultants(*Tension(problem).hoop(state), problem.comm)
     profile = path.profile(state)
     (names, between), bottom, top = between_layers(scene.mesh, profile), profile.reference_bottom, profile.reference_top
-    lines = np.array([bottom, *between, top])[:, 1::2]                       # keep off the corners of the rim
+    lines = np.array([bottom, *between, top])[:, 1::2]              # mid-edge nodes: corners of the rim are singular
     gauss, weights = np.polynomial.legendre.leggauss(_POINTS_PER_LAYER)
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])
     for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):

@@ -78,7 +78,7 @@ def write(folder: FilePath, run: StudyRun) -> None:
         folder: path of the folder.
         run: the run.
     """
-    # the number is one above the largest; the checksum tells files of one number by two processes apart
+    # the number is one above the largest; the checksum distinguishes files of two processes with one number
     last = max((int(file.name[4:9]) for file in _files(folder)), default=-1)
     values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())
     file = folder / f"run-{last + 1:05d}-{values:08x}.json"

@@ -9,7 +9,7 @@ The results are tables, main effects, and the best run.
     def uniformity(path):
         return path.part().uniformity
 
-    if __name__ == "__main__":                               # processes read the script again
+    if __name__ == "__main__":                               # other processes import the script
         found = fx.study(pot, {"depth": [30, 40, 50], "radius": [18, 22]}, {"uniformity": uniformity},
                          goal={"uniformity": "max"}, folder="results/pots")
         print(found); found.to_csv("pots.csv"); found.plot_effects("uniformity")

@@ -128,7 +128,7 @@ def executor_context(executor: futures.Executor | None, workers: int) -> Any:
     """
     if executor:
         return nullcontext(executor)
-    from multiprocessing import get_context  # costs time, which others do not spend
+    from multiprocessing import get_context  # a slow import that only this call needs
     return futures.ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
 
 
