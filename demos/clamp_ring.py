@@ -90,12 +90,12 @@ def draw(numbers, paths, out):
     left.xaxis.get_major_locator().set_params(integer=True)
     left.legend(frameon=False)
     for axes, held in zip(right, ("clamped", "rings")):
-        shades = stressed(axes, paths[held], held)
+        shades = draw_stress(axes, paths[held], held)
     figure.colorbar(shades, ax=right, label="$\\sigma_1$, kg/cm$^2$", shrink=0.8)
     save(figure, out / "clamp_ring.png")
 
 
-def stressed(axes, path, held):
+def draw_stress(axes, path, held):
     """Draw the deformed elements at the rim; return their colours by the largest principal stress."""
     fields = Fields(path)
     found = fields.evaluate(path.met(fx.pole_stretch(STRETCH)))

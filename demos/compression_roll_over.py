@@ -5,7 +5,7 @@ I1 constant 1.0 MPa, I2 constant 0.1 MPa; compression ratios H/h to 5.23, on the
 
 import numpy as np
 from common import parser, save, say, summarise
-from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, press, where
+from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, positions, press
 
 import formingx as fx
 from formingx.contact import resultants
@@ -27,7 +27,7 @@ def plate_stress(path, state):
     for contact in path.problem.contacts:
         with path.problem.state_context(state):
             points, traction = resultants.traction(contact, state.x, state.control)
-        moved = where(path, state, points)
+        moved = positions(path, state, points)
         order = np.argsort(points @ (1, -1))                 # along the top outwards, then down the side
         moved, traction, points = moved[order], traction[order, 0], points[order]
         along = np.hypot(*np.gradient(moved, axis=0).T) / np.hypot(*np.gradient(points, axis=0).T)
@@ -56,7 +56,7 @@ def main():
         reached = HALF_HEIGHT / (HALF_HEIGHT - path.last.measures["travel"])
         found = grids[f"{elements[0]}x{elements[1]}"] = {
             "force_N_at_ratio": {r: force(s) for r, s in met.items()},
-            "mid_radius_cm_at_ratio": {r: float(where(path, s, [(1.32, 0.0)])[0, 0]) for r, s in met.items()},
+            "mid_radius_cm_at_ratio": {r: float(positions(path, s, [(1.32, 0.0)])[0, 0]) for r, s in met.items()},
             "reached_ratio": reached, "ended": end, "steps": path.counts.steps,
             "newton_iterations": path.counts.iterations, "cutbacks": path.counts.failures,
             "max_penetration_cm": path["penetration"].max(),
@@ -78,7 +78,7 @@ def main():
     left.set(xlabel="H / h", ylabel="force, N", title="force on one plate", yscale="log")
     Z = np.linspace(0, HALF_HEIGHT, 101)
     for k, (r, state) in enumerate(met.items()):
-        middle.plot(*where(path, state, np.column_stack([0 * Z + 1.32, Z])).T, color=f"C{k}", label=f"H/h = {r}")
+        middle.plot(*positions(path, state, np.column_stack([0 * Z + 1.32, Z])).T, color=f"C{k}", label=f"H/h = {r}")
         right.plot(*plate_stress(path, state), ".-", color=f"C{k}", markersize=3)
     middle.set(xlabel="r, cm", ylabel="z, cm", title="outer surface")
     middle.legend(frameon=False)

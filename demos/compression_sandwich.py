@@ -6,7 +6,7 @@ plates that its side may touch.
 """
 
 from common import parser, save, say, summarise
-from plates import HALF_HEIGHT, NEWTON, block, draw_grids, forces, press, where
+from plates import HALF_HEIGHT, NEWTON, block, draw_grids, forces, positions, press
 
 import formingx as fx
 from formingx.results import files
@@ -30,7 +30,7 @@ def main():
         path, end = press(scene, travels, max_steps=300)
         drawn[name] = path
         at = path.last
-        radii = where(path, at, [(1.32, 0.0), (1.32, (STRIP + HALF_HEIGHT) / 2)])[:, 0]
+        radii = positions(path, at, [(1.32, 0.0), (1.32, (STRIP + HALF_HEIGHT) / 2)])[:, 0]
         summary[name] = {"force_N_at_ratio": forces(path, travels, [f"{r:g}" for r in RATIOS]), "ended": end,
                          "radius_cm_middle": float(radii[0]), "radius_cm_soft_part": float(radii[1]),
                          "steps": path.counts.steps, "newton_iterations": path.counts.iterations}

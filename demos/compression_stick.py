@@ -58,7 +58,7 @@ def main():
     stuck = summary["force_N_at_total_deflection_cm"]["stick"]
     summary |= {"lindley_N": theirs, "tanner_N": {f"{d:g}": tanner(d) for d in DEFLECTIONS},
                 "stick_over_lindley": {d: stuck[d] / theirs[d] for d in stuck}}
-    summary["further"] = beyond(n, args.out)
+    summary["further"] = numbers_at_largest_deflection(n, args.out)
     say("stick over Lindley: " + "  ".join(f"{d}: {v:.4f}" for d, v in summary["stick_over_lindley"].items()))
     figure, axes = plots.figure(width=6.2)
     for name, path in curves.items():
@@ -72,7 +72,7 @@ def main():
     summarise(args.out, {**summary, "mesh": {"elements": [n, n]}, "versions": files.versions()})
 
 
-def beyond(n, out) -> dict:
+def numbers_at_largest_deflection(n, out) -> dict:
     """Return the numbers of stuck blocks at a total deflection of 1.3 cm, the largest of the thesis.
 
     The blocks have a side that may roll onto the plates or not, on 64 triangles and on n x n elements. A run that ends

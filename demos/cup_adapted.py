@@ -36,7 +36,7 @@ def disc(columns):
     return fx.mesh.disc(radius=RADIUS, thickness=THICKNESS, elements=(columns, 2))
 
 
-def least_walls(path, pressures) -> dict:
+def minimum_walls(path, pressures) -> dict:
     """Return {pressure as text: minimum wall over h0, away from the rim}."""
     shapes = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
     return {p: float(shape.wall_ratio[shape.reference_radius < INSIDE * RADIUS].min()) for p, shape in shapes.items()}
@@ -51,7 +51,7 @@ def main():
     for share in shares:
         path = form(fx.mesh.adapted(path, max_rotation=share), pressures)
         runs["adapted"].append(path)
-    walls = {name: {columns(p): least_walls(p, pressures) for p in paths} for name, paths in runs.items()}
+    walls = {name: {columns(p): minimum_walls(p, pressures) for p in paths} for name, paths in runs.items()}
     truth, last = walls["uniform"][uniform[-1]], f"{pressures[-1]:g}"
     summary: dict = {"reference": {"columns": uniform[-1], "least_wall": truth}}
     for name, found in walls.items():

@@ -44,7 +44,7 @@ def search(of, elements, knots, runs):
                       min_change=2e-3)
 
 
-def places(result):
+def reference_positions(result):
     """Return {name: reference R} of the points on the wall, and of those beside the corner on the floor."""
     profile = result.best.profile
     R, (r, z) = profile.reference_radius, profile.middle.T
@@ -55,7 +55,7 @@ def places(result):
     return found, floor
 
 
-def arc(result):
+def arc_radius(result):
     """Return the radius of the free arc in the corner.
 
     An arc that touches wall and floor is at a distance of (sqrt(2) - 1) of its radius from the corner.
@@ -75,7 +75,7 @@ def main():
     drawing, axes = figure(2)
     for k, of in enumerate(("h0", "C")):
         result = search(of, elements, knots, runs)
-        wall, floor = places(result)
+        wall, floor = reference_positions(result)
         profile, mean = result.values["profile"], result.best.wall[result.inside].mean()
         if of == "h0":
             summary["h0_over_h"], summary["h0_over_h_on_the_floor"] = (
@@ -85,9 +85,9 @@ def main():
             summary["C_over_C_rim"] = {name: float(np.exp(profile(wall[name]) - profile(wall["rim"])))
                                        for name in ("half_wall", "mouth")}
         summary[of] = {"cv_before": result.cv[0], "cv_after": result.cv[1], "paths": result.paths,
-                       "free_arc_radius": arc(result), "mean_wall": mean}
+                       "free_arc_radius": arc_radius(result), "mean_wall": mean}
         say(f"{of}: {result.paths} runs, cv {result.cv[0]:.4f}, after {result.cv[1]:.4f}; radius of the free arc"
-            f" {arc(result):.4f}", str(summary["h0_over_h" if of == "h0" else "C_over_C_rim"]))
+            f" {arc_radius(result):.4f}", str(summary["h0_over_h" if of == "h0" else "C_over_C_rim"]))
         R = np.linspace(0, 1, 201)
         axes[k].plot(R, np.exp(profile(R) - (of == "C") * profile(1.0)) * (SHEET / mean if of == "h0" else 1), "C0")
         for name, at in wall.items():

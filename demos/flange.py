@@ -27,7 +27,7 @@ def draw(thickness, elements):
     return fx.trace(scene, until=fx.travel(TRAVEL), intermediate=through, progress=False)
 
 
-def watch(path, thickness):
+def resultants(path, thickness):
     """Return the reference radii of the columns and their hoop resultants.
 
     The resultants are over shear modulus times thickness, shape (states, n).
@@ -46,7 +46,7 @@ def main():
         path = draw(thickness, elements)
         found = path.stability(modes, states="all")
         first, style = found.first, {"color": f"C{k}", "label": f"h = {thickness:g}"}
-        at, hoop = watch(path, thickness)
+        at, hoop = resultants(path, thickness)
         compressed = path["travel"][1:][hoop[1:].min(1) < -1e-3]
         ends = at[hoop[-1] < 0]
         numbers = summary[f"h_{thickness:g}"] = {"alarms": len(found.bifurcations)}

@@ -55,7 +55,7 @@ def forces(path, travels, keys) -> dict:
     return {key: force(state) for key, state in met.items() if state is not None}
 
 
-def where(path, state, points) -> np.ndarray:
+def positions(path, state, points) -> np.ndarray:
     """Return the positions of material points (R, Z) in a state; both shape (n, 2)."""
     x = path.problem.x.duplicate()
     x.setArray(state.x)
@@ -69,16 +69,16 @@ def draw_lines(path, state, axes, elements, height=HALF_HEIGHT, radius=RADIUS, *
     """Draw the edges of the elements in a state: material lines."""
     fine_r, fine_z = np.linspace(0, radius, 61), np.linspace(0, height, 61)
     for Z in np.linspace(0, height, elements[1] + 1):
-        axes.plot(*where(path, state, np.column_stack([fine_r, 0 * fine_r + Z])).T, **style)
+        axes.plot(*positions(path, state, np.column_stack([fine_r, 0 * fine_r + Z])).T, **style)
     for R in np.linspace(0, radius, elements[0] + 1):
-        axes.plot(*where(path, state, np.column_stack([0 * fine_z + R, fine_z])).T, **style)
+        axes.plot(*positions(path, state, np.column_stack([0 * fine_z + R, fine_z])).T, **style)
     axes.set_aspect("equal")
 
 
 def draw_grids(path, states, labels, elements, file, **size) -> None:
     """Draw deformed grids below one another, on one scale."""
     side = [(RADIUS, Z) for Z in np.linspace(0, HALF_HEIGHT, 41)]
-    moved = [where(path, s, [*side, (0.0, HALF_HEIGHT)]) for s in states]
+    moved = [positions(path, s, [*side, (0.0, HALF_HEIGHT)]) for s in states]
     wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]
     figure, _ = plots.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
     figure.clear()

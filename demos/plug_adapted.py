@@ -42,7 +42,7 @@ def main():
     ran = sorted(zip(cases, found), key=lambda case: (-case[0][1], case[0][0]))
     for (mu, fillet, _), (numbers, _) in ran:
         summary["fillet_h0/8" if fillet == SHARP else f"mu_{mu:g}"] = numbers
-        tell(mu, fillet, numbers)
+        print_numbers(mu, fillet, numbers)
     save(draw(ran), args.out / "plug_adapted.png")
     summarise(args.out, {**summary, "share": SHARE, "versions": files.versions()})
 
@@ -97,7 +97,7 @@ def forces(path, travels) -> dict:
     return {t: plugs.force(state) for t, state in met.items() if state is not None}
 
 
-def tell(mu, fillet, n) -> None:
+def print_numbers(mu, fillet, n) -> None:
     """Print the numbers of one run."""
     uniform = [n["uniform"]] if "uniform" in n else []
     say(f"mu = {mu:g}, edge {fillet:.3g} cm: {n['columns']} columns (pilots {n['columns_of_pilots']}), {n['jumps']}"

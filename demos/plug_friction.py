@@ -45,7 +45,7 @@ def main():
     cases = [(mu, args.fillet, args.refine, travels, args.out) for mu in frictions]
     runs = dict(sorted(zip(frictions, map(run, cases) if args.quick else sweep(run, cases))))
     for mu, found in runs.items():
-        tell(mu, found["numbers"])
+        print_numbers(mu, found["numbers"])
     save(draw(runs), args.out / "plug_friction.png")
     summarise(args.out, {**{f"mu_{mu:g}": found["numbers"] for mu, found in runs.items()},
                          "fillet_cm": args.fillet, "versions": files.versions()})
@@ -135,7 +135,7 @@ def key_numbers(path, end, travels) -> dict:
     }
 
 
-def tell(mu, n) -> None:
+def print_numbers(mu, n) -> None:
     """Print the numbers of one run."""
     say(f"mu = {mu:g}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton"
         f" iterations, {n['cutbacks']} cut back, {n['jumps']} jumps, {n['solve_seconds']:.1f} s; force (membrane), N: "

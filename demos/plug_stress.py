@@ -89,7 +89,7 @@ def main():
                 state = path.met(fx.travel(travel))
                 corners[law] = Corners(path, state)
                 summary[law][mesh][f"{travel:g}"] = n = key_numbers(path, state, corners[law])
-                tell(f"{law}, {elements[0]} x {elements[1]} elements, {travel:g} cm", n)
+                print_numbers(f"{law}, {elements[0]} x {elements[1]} elements, {travel:g} cm", n)
     tool, travel = plugs.plug(PLUG, THICKNESS, args.fillet), max(args.travels)
     for law, found in corners.items():
         save(draw(found, tool, travel, law), args.out / f"contours_{law}.png")
@@ -97,7 +97,7 @@ def main():
     summarise(args.out, {**summary, "fillet_cm": args.fillet, "versions": files.versions()})
 
 
-def tell(name, n) -> None:
+def print_numbers(name, n) -> None:
     """Print the numbers of one state."""
     say(f"{name}:", *(f"  largest {key[8:]:8} {m['value']:8.4f} at R = {m['R_cm']:.3f} cm, Z = {m['Z_over_h0']:.2f} h0,"
                       f" {m['side']}" for key, m in n.items() if key.startswith("largest")),

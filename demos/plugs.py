@@ -113,7 +113,7 @@ def force_limit(plug_radius, thickness, c10) -> float:
     return NEWTON * 4 * np.pi * plug_radius * c10 * thickness
 
 
-def course(path, end, travels, places) -> dict:
+def travel_numbers(path, end, travels, places) -> dict:
     """Return forces and thickness of one path; a travel that was not met has no entry.
 
     places: {name: reference radius}.
@@ -136,9 +136,9 @@ def course(path, end, travels, places) -> dict:
 
 
 def key_numbers(path, end, travels, places, plug_radius, thickness) -> dict:
-    """Return the numbers of the summary of the path of a plug: `course`, and numbers of its last state."""
+    """Return the numbers of the summary of the path of a plug: `travel_numbers`, and numbers of its last state."""
     return {
-        **course(path, end, travels, places),
+        **travel_numbers(path, end, travels, places),
         **shape_numbers(path, path.last, plug_radius, thickness),
         "largest_penetration_over_h0": float(path["penetration"].max()) / thickness,
     }
@@ -166,7 +166,7 @@ def pole_stretches(path, state, thickness) -> dict:
     return {"meridional": float(F[0, 0]), "hoop": float(F[2, 2]), "thickness": float(F[1, 1])}
 
 
-def tell(name, n) -> None:
+def print_numbers(name, n) -> None:
     """Print how far a run went, and its cost."""
     say(f"{name}: to {n['reached_travel_cm']:.4g} cm, {n['steps']} states, {n['newton_iterations']} Newton iterations,"
         f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s; hoop stretch outside the plug off 1 by"

@@ -73,7 +73,7 @@ def creep(accuracy):
     return path, stretch("creep", 0.0, (0, *CREEP)), stretch("recovery", end, (0, *RECOVERY))
 
 
-def miss(found, sought, stretches):
+def deviation(found, sought, stretches):
     """Return the largest relative difference of true stresses from nominal ones of a homogeneous test."""
     return float(np.abs(np.array(list(found.values())) / (np.asarray(sought) * stretches) - 1).max())
 
@@ -114,8 +114,9 @@ def main():
         paths[mode, "rate"] = {r: pull(mode, r, accuracy) for r in RATES}
         for key, name in (("held", "relaxation"), ("rate", "rate")):
             summary[name][mode] = {f"{k:g}": found for k, (_, found) in paths[mode, key].items()}
-        errors = [miss(found, P0.relaxation(mode, s, (0, *TIMES)), s) for s, (_, found) in paths[mode, "held"].items()]
-        rates = [miss(found, P1.constant_rate(mode, r, MET), MET) for r, (_, found) in paths[mode, "rate"].items()]
+        errors = [deviation(found, P0.relaxation(mode, s, (0, *TIMES)), s)
+                  for s, (_, found) in paths[mode, "held"].items()]
+        rates = [deviation(found, P1.constant_rate(mode, r, MET), MET) for r, (_, found) in paths[mode, "rate"].items()]
         summary["largest_error_of_homogeneous_tests"][mode] = {"relaxation": max(errors), "rate": max(rates)}
         say(f"{mode}: off homogeneous tests by {max(errors):.1e} (relaxation), {max(rates):.1e} (constant rate);"
             f" {sum(len(p) for kind in ('held', 'rate') for p, _ in paths[mode, kind].values())} states")

@@ -142,10 +142,10 @@ def geometry_of_the_thesis():
     """
     from scipy.optimize import brentq
 
-    def miss(A, B):
+    def relative_error(A, B):
         return thick_wall("tube", 1 + 50 / INCH / A, inner_radius=A, outer_radius=B,
                           **CONSTANTS["tube"]).pressure * PSI - THESIS_PRESSURE
-    return brentq(lambda B: miss(INNER, B), 8, 100), brentq(lambda A: miss(A, OUTER), 1, 18)
+    return brentq(lambda B: relative_error(INNER, B), 8, 100), brentq(lambda A: relative_error(A, OUTER), 1, 18)
 
 
 def table(cylinder, grids, sphere):

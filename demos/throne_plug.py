@@ -115,14 +115,14 @@ def main():
                 summary[name][key] = n = key_numbers(sheet, law, path, end, travels) | {
                     "elements": list(elements)}
                 paths[name, key] = path
-                tell(f"{sheet.label}, {law}, {rim} rim", n)
+                print_numbers(f"{sheet.label}, {law}, {rim} rim", n)
                 plugs.write(path, args.out, f"{name}_{key}")
         key = plugs.name_of(MU)
         path, end, elements = slide(sheet, travels, args.fillet, args.refine)
         summary[name][key] = n = key_numbers(sheet, key, path, end, travels) | {
             "elements": list(elements), "jumps": len(path.jumps)}
         paths[name, key] = path
-        tell(f"{sheet.label}, mu = {MU:g}, clamped rim", n)
+        print_numbers(f"{sheet.label}, mu = {MU:g}, clamped rim", n)
         plugs.write(path, args.out, f"{name}_{key}")
     summary["force_over_membrane_at_fillet_over_rp"] = sharpen(args.refine)
     summary["comparison"] = compare(summary)
@@ -166,9 +166,9 @@ def compare(found) -> dict:
     return compared
 
 
-def tell(name, n) -> None:
+def print_numbers(name, n) -> None:
     """Print the numbers of one run."""
-    plugs.tell(name, n)
+    plugs.print_numbers(name, n)
     for t, f in n["force_N_at_travel_cm"].items():
         exact = n["membrane_force_N_at_travel_cm"].get(t)
         say(f"  {t:>4} cm {f:9.3f} N" + (f"   membrane {exact:9.3f} N" if exact else ""))

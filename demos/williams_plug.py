@@ -40,7 +40,7 @@ def main():
         path, end = plugs.push(made, TRAVELS, stretch)
         n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
         summary[name], paths[name] = n | {"elements": list(elements)}, path
-        tell(name, n)
+        print_numbers(name, n)
         if law == "frictionless":                                # figures 6.3 and 6.4
             state = path.state_at(fx.pole_stretch(THESIS["pole_stretch_with_slip"]))
             n = plugs.shape_numbers(path, state, PLUG, THICKNESS)
@@ -55,11 +55,11 @@ def main():
                        fx.SimplySupported("rim"))
     path, end = plugs.push(made, TRAVELS)                        # figure 6.10
     summary["held_hinged"] = n = plugs.key_numbers(path, end, TRAVELS, PLACES, PLUG, THICKNESS)
-    tell("held, hinged rim", n)
+    print_numbers("held, hinged rim", n)
     elements = tuple(n * args.refine for n in RUNS["held"][0])
-    summary["driven_nodes"] = n = plugs.course(*plugs.push(plugs.driven_nodes(
+    summary["driven_nodes"] = n = plugs.travel_numbers(*plugs.push(plugs.driven_nodes(
         RADIUS, THICKNESS, PLUG, fx.NeoHookean(c10=C10), elements), TRAVELS), TRAVELS, PLACES)
-    tell_driven(n, summary["held"])
+    print_driven(n, summary["held"])
     tool = plugs.plug(PLUG, THICKNESS, args.fillet)
     save(draw(paths, tool, limit), args.out / "williams_plug.png")
     save(draw_rims(paths["held"], path), args.out / "rims.png")
@@ -68,15 +68,15 @@ def main():
     summarise(args.out, {**summary, "fillet_cm": args.fillet, "versions": files.versions()})
 
 
-def tell(name, n) -> None:
+def print_numbers(name, n) -> None:
     """Print the numbers of one run."""
-    plugs.tell(name, n)
+    plugs.print_numbers(name, n)
     for t, f in n["force_N_at_travel_cm"].items():
         ratios = "  ".join(f"{v:.4f}" for v in n["wall_ratio_at_travel_cm"][t].values())
         say(f"  {t:>4} cm {f:9.1f} N   wall over h0 at R = 0, rp + h0/2, rp + h0, rp + 2 h0: {ratios}")
 
 
-def tell_driven(n, held) -> None:
+def print_driven(n, held) -> None:
     """Print the thesis' own scheme beside the rounded plug that holds the sheet."""
     forces, others = n["force_N_at_travel_cm"], held["force_N_at_travel_cm"]
     walls, other = n["wall_ratio_at_travel_cm"], held["wall_ratio_at_travel_cm"]
