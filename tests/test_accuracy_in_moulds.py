@@ -77,7 +77,7 @@ def columns(mesh, **scene):
     return ends, [len(scene.mesh.cells.find(tag)) // 2 // (len(ends) - 1) for tag in scene.mesh.layers.values()]
 
 
-def test_columns_are_short_where_the_sheet_comes_to_lie_on_a_fillet():
+def test_columns_are_short_where_the_sheet_touches_a_fillet():
     """Also of a sharper fillet, of a thinner wall, and in plane strain."""
     def shortest(disc, **scene):
         ends, _ = columns(fx.mesh.disc(**{"radius": 10.0, "thickness": 0.3} | disc), **scene)
@@ -147,7 +147,7 @@ def test_a_small_nose_of_a_plug_gets_short_columns():
     assert lengths[(middle > 2.4) & (middle < 4.0)].max() < 0.6 * lengths[middle < 1.0].max()
 
 
-def test_a_scene_tells_that_it_chose_other_elements(caplog):
+def test_a_scene_logs_that_it_chose_other_elements(caplog):
     """A log entry and `scene.mesh`; the mesh that was given stays as it was."""
     mesh = fx.mesh.disc(radius=10.0, thickness=0.2)
     mould = fx.Contact("top", fx.tools.cup(radius=9.0, depth=4.0, mouth=0.2, fillet=1.0, lip=0.5), "stick")

@@ -18,7 +18,7 @@ def outside(tested, mode, stretch):
     return bool(tested.outside(strain(mode, stretch))[0])
 
 
-def test_a_uniaxial_test_covers_uniaxial_tension_alone():
+def test_a_uniaxial_test_covers_only_uniaxial_tension():
     tested = MeasuredRange.from_stretches({"uniaxial": np.linspace(1, 4, 9)})
     assert not outside(tested, "uniaxial", 3.9) and outside(tested, "uniaxial", 5.0)
     assert outside(tested, "pure_shear", 1.5) and outside(tested, "equibiaxial", 1.2)

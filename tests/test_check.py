@@ -257,7 +257,7 @@ def test_targets_that_cannot_be_met(make, target, words):
         fx.trace(scene, until=other, intermediate=[target], progress=False)
 
 
-def test_a_stage_refuses_what_cannot_be_met():
+def test_a_stage_refuses_targets_that_cannot_be_met():
     scene = formed()
     for word in ("until", "intermediate"):
         targets = {"until": fx.pole_height(0.1)} | ({"intermediate": [fx.pole_height(0.6)]}
@@ -308,7 +308,7 @@ def layers(pressure):
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", pressure)])
 
 
-def test_layers_and_nothing_driven():
+def test_very_different_layers_and_a_missing_control_are_found():
     report = fx.check(layers(1e12))
     assert [f.severity for f in report.findings] == ["warning"] * 4
     for words in ("nothing is driven", "layer 'a': it is 0.5 of the body's length thick", "1e+06 times stiffer",

@@ -26,7 +26,7 @@ def test_overview_lists_every_demo():
         assert (f"\n  {file.stem} " in text) == ("def main" in file.read_text())
 
 
-def test_a_reader_that_has_seen_enough_is_no_error():
+def test_a_closed_output_pipe_is_no_error():
     """`python -m formingx | head`"""
     there, end = os.pipe()
     os.close(there)
@@ -106,7 +106,7 @@ def test_check_of_no_scene(tmp_path, capsys):
 @pytest.mark.parametrize("text, words", [
     (b"\x89PNG\r\n\x1a\n\0\0", "is no Python: "), (b"scene = (1,\nprint 2\n", "is no Python: .*, line "),
     (b"\0" * 9, "is no Python: "), (b"x = " + b"(" * 10_000, "is no Python: ")])
-def test_check_of_what_is_no_python(text, words, tmp_path, capsys):
+def test_check_of_a_file_that_is_not_python(text, words, tmp_path, capsys):
     (tmp_path / "script.py").write_bytes(text)
     assert main(["check", str(tmp_path / "script.py")]) == 2
     error = capsys.readouterr().err

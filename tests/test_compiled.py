@@ -145,7 +145,7 @@ def test_a_process_waits_for_another_with_the_same_form(calls, tmp_path, monkeyp
     assert not waiting.is_alive() and len(calls) == 1
 
 
-def test_an_error_of_the_compiler_is_told(calls, tmp_path, monkeypatch, domain):
+def test_compiler_errors_are_reported(calls, tmp_path, monkeypatch, domain):
     with monkeypatch.context() as patch:
         patch.setenv("CFLAGS", "--no-such-flag")
         with pytest.raises(RuntimeError, match=r"(?s)C compiler failed.*no-such-flag"):

@@ -60,7 +60,7 @@ def test_a_law_without_its_ramp_is_refused():
         Misspelt(TOOL, K, THETA).tractions(points_near(TOOL, [0.2 * THETA])[0], None)
 
 
-def test_a_law_of_the_distance_alone():
+def test_force_and_stiffness_of_a_normal_contact_law_are_derivatives():
     """Force and stiffness are derivatives; some of its points, and all without some, are as in the whole."""
     law = Bond(TOOL, K, 5 * THETA)
     x, _ = points_near(TOOL, [-2.5 * THETA, -0.5 * THETA, 0.2 * THETA])
@@ -441,7 +441,7 @@ def test_coulomb_friction_that_never_slides_equals_stick():
 
 @pytest.mark.parametrize("pulls", [False, True])
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1000.0])
-def test_open_points_carry_nothing_alone_or_beside_closed_ones(mu, pulls):
+def test_open_points_do_not_depend_on_closed_ones(mu, pulls):
     """Forces, stiffness, sense and history variables of open points are the same whether another point touches."""
     law = Law(TOOL, mu, K, THETA, SLIP, adhesive=pulls and not 0 < mu < 1000)
     random = np.random.default_rng(5)

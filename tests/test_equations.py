@@ -127,7 +127,7 @@ def test_arch_snaps_through_and_loses_the_enclosed_energy():
         s for s in record.states if TOP + 1e-3 < s.x[0] < far - 1e-3]
 
 
-def test_a_failure_says_what_happened():
+def test_failed_equations_end_the_run_with_their_reason():
     """Beyond a deflection of 1 the equations are undefined: the run ends in words, its states kept."""
     class Breaks(Arch):
         def residual(self, x, control, out):

@@ -269,7 +269,7 @@ def test_columns_of_the_user_change_no_work(inflated):
     assert again.work()["pressure"] == pytest.approx(inflated.work()["pressure"], rel=1e-12)
 
 
-def test_weight_is_that_of_the_body_at_rest():
+def test_weight_follows_from_the_reference_volume():
     """A hot part that is larger weighs what it did."""
     weights = []
     for temperature in (0.0, 100.0):

@@ -23,7 +23,7 @@ def test_a_function_becomes_a_method_under_its_name():
     assert Result.doubled.__doc__ == "Double a number."
 
 
-def test_no_extension_replaces_what_a_class_has():
+def test_extensions_replace_no_existing_member():
     def own(result):
         return "another"
 

@@ -198,7 +198,7 @@ if path.problem.comm.rank == 0:
         np.testing.assert_allclose(two, one, rtol=1e-7, atol=1e-10)
 
 
-def test_a_run_goes_on_from_a_checkpoint(tmp_path):
+def test_a_frictional_run_continues_from_a_checkpoint(tmp_path):
     """A run with sliding points continues as if it had not been interrupted."""
     whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), intermediate=[fx.travel(0.4)], progress=False)
     whole.save(tmp_path)

@@ -205,7 +205,7 @@ def test_heat_stored_is_heat_given(kinematics):
     assert run.heat_stored.sum() == pytest.approx(stored, rel=1e-9)
 
 
-def test_no_flux_where_nothing_touches():
+def test_no_heat_flows_outside_the_contact_area():
     """A face half of which touches: the tool below the rest stays as it was, and only the touching half gives heat."""
     mesh = fx.mesh.disc(radius=0.04, thickness=D, elements=(8, 3))
     tool = fx.ConductingTool(thickness=0.01, back=30.0, **TOOL)

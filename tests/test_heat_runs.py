@@ -159,7 +159,7 @@ def test_wrong_requests_to_a_heat_result_are_refused(heated, tmp_path):
         sides(start=tmp_path / "part.csv")
 
 
-def test_a_run_that_takes_too_many_steps_says_so():
+def test_too_many_time_steps_are_reported():
     with pytest.raises(fx.ConvergenceError, match="max_steps = 5") as error:
         sides(max_steps=5)
     assert len(error.value.path.times) == 6

@@ -71,7 +71,7 @@ def test_no_circle():
         visit(name, [])
 
 
-def test_what_is_private_stays_so():
+def test_private_names_are_not_imported():
     """No file imports a name from another that begins with an underscore (the modules that do are not names)."""
     found = {(name_of(file), alias.name) for file in FILES for node in ast.walk(ast.parse(file.read_text()))
              if isinstance(node, ast.ImportFrom) and node.level and node.module for alias in node.names
@@ -159,7 +159,7 @@ def test_the_solver_sees_equations_alone():
     assert found == set()
 
 
-def test_protocols_say_what_they_take():
+def test_protocols_have_types_for_all_arguments():
     """No argument or result of an interface is just anything, but the history variables and matplotlib's objects."""
     histories = {"get", "put.variables", "save.variables", "load", "transfer", "transfer.variables", "transfer.source"}
     found = set()

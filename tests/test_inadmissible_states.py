@@ -66,7 +66,7 @@ def test_open_and_report_name_the_inadmissible_state(tmp_path):
 
 
 @pytest.mark.parametrize("height, gap", [(1.0, 0.05), (2.0, 0.07)])
-def test_a_travel_that_the_body_did_not_follow_is_no_target_met(height, gap):
+def test_a_penetrated_state_does_not_meet_its_target(height, gap):
     with pytest.raises(fx.ConvergenceError, match="did not follow the tool .* give Contact a penalty of") as error:
         fx.trace(block(height), until=fx.travel(height - gap), progress=False)
     penalty = float(re.search("a penalty of ([^;]+);", str(error.value))[1])
@@ -76,7 +76,7 @@ def test_a_travel_that_the_body_did_not_follow_is_no_target_met(height, gap):
 
 
 @pytest.mark.parametrize("gap, penalty", [(0.5, 2e5), (0.35, 2e5), (0.26, 2e5), (0.2, 2e5), (0.14, 2e5), (0.8, 1e3)])
-def test_a_run_says_how_much_penetration_changes_the_force(gap, penalty, caplog):
+def test_a_run_reports_the_force_error_of_penetration(gap, penalty, caplog):
     path = fx.trace(block(penalty=penalty), until=fx.travel(1 - gap), progress=False)
     off = abs(path["tool_force"][-1] / (2 * (gap**-3 - gap)) - 1)
     said = re.search(r"changes the force on the tool of 'top' by about (\S+) %", caplog.text)

@@ -80,7 +80,7 @@ def test_a_target_that_a_balloon_snaps_past_is_named(balloon):
     assert caught.value.path.last.kind == "jump"
 
 
-def test_what_a_balloon_loses_is_the_work_of_the_pressure_less_the_energy_gained(balloon):
+def test_energy_lost_by_a_snapping_balloon_is_work_minus_stored_energy(balloon):
     ball, limit, path = balloon
     (before,), (after,) = path.limit_points, path.jumps
     lost = after.jump["dissipated"]
@@ -170,7 +170,7 @@ def test_friction_keeps_its_law_through_jumps(rough):
     assert share_of_friction(rough) == pytest.approx(1.0, rel=1e-6)
 
 
-def test_work_is_energy_and_friction_and_what_jumps_lose():
+def test_work_equals_stored_energy_friction_and_snap_through_losses():
     path, slips = weighed(lambda: pushed(7.0))
     (work, energy), lost = work_and_energy(path), lost_in_jumps(path)
     assert slips > 0 and lost > 4e-3 * work

@@ -19,7 +19,7 @@ def test_without_damping_it_is_the_transient_network(mode, rate):
                                                                            rel=1e-6)
 
 
-def test_a_history_with_jumps_holds_and_unloading():
+def test_stress_of_a_strain_history_with_jumps_and_unloading():
     times, l = [0, 0, 1, 3, 3, 3.001, 50], [1.2, 2, 3, 3, 1.5, 2.5, 2.5]
     network = fx.TransientNetwork(None, SPECTRUM).stress("uniaxial", l, times=times)
     assert fx.KBKZ(SPECTRUM).stress("uniaxial", l, times=times) == pytest.approx(network, rel=1e-6, abs=1e-9)

@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
 
 
-def test_importing_loads_nothing_that_only_some_scripts_use():
+def test_importing_loads_no_optional_modules():
     code = "import sys, formingx; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert "formingx.extensions.heat" in loaded

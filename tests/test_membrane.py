@@ -107,7 +107,7 @@ def test_plane_strain_strip_is_an_arc(angle):
     assert path.last.measures["pole_stretch"] == pytest.approx(stretch, rel=2e-3)
 
 
-def test_path_leaves_rest_with_the_cube_of_the_height():
+def test_pressure_of_a_flat_membrane_grows_as_the_cube_of_the_height():
     """A flat membrane without stretch has no stiffness; nothing but its own geometry gives it one."""
     heights = (1e-4, 1e-3, 1e-2, 0.1)
     ratios = [trace(sheet(), fx.pole_height(h)).last.measures["pressure"] / h**3 for h in heights]
@@ -127,7 +127,7 @@ def test_first_step_does_not_matter(length):
 
 
 @pytest.mark.parametrize("increments", [1, 4])
-def test_fixed_control_from_rest(increments):
+def test_fixed_pressure_steps_start_from_the_flat_membrane(increments):
     path = fx.solve(sheet(), to=0.04, increments=increments)
     traced = trace(sheet(), fx.pressure(0.04))
     assert path.last.measures["pole_height"] == pytest.approx(traced.last.measures["pole_height"], rel=1e-9)

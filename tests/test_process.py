@@ -73,7 +73,7 @@ def test_the_order_of_stages_does_not_matter_without_friction(there_and_back):
 
 
 @pytest.mark.parametrize("friction", ["none", 0.3, 1.0, "stick"])
-def test_a_plug_in_strokes_lets_the_sheet_come_back_to_rest(friction):
+def test_a_plug_in_strokes_leaves_the_sheet_undeformed(friction):
     """Back at rest the plug touches the pole without force: there its force grows as the square of the depth."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)), materials=fx.NeoHookean(c10=0.2),
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
@@ -320,7 +320,7 @@ STAGES = [plug("down", 1.0, intermediate=[fx.travel(0.5)]), Stage("gone", inacti
           plug("home", -4.0, inactive=["plug"]), plug("again", -1.5)]
 
 
-def test_a_process_goes_on_from_any_state():
+def test_a_process_continues_from_any_state():
     """From every state whose step was complete, as plain data: the same states follow."""
     whole = run(plugged("stick"), *STAGES)
     for k, state in enumerate(whole.states):
@@ -425,11 +425,11 @@ def test_ranks_agree():
     assert two == pytest.approx(one, rel=1e-8, abs=1e-10)
 
 
-def test_a_scene_pays_for_what_is_in_it():
+def test_frictionless_processes_have_no_history_variables():
     assert not Problem(plugged()).has_history and Problem(gripped()).contacts == []
 
 
-def test_the_stages_of_a_restart_are_those_that_were_run():
+def test_a_restart_with_other_stages_is_refused():
     path = run(plugged(), plug("down", 1.0))
     with pytest.raises(fx.InputError, match="last state is of stage 'down', number 1, but stage 1 is 'blow' now"):
         fx.Process(path.problem.scene).run([air("blow", 0.01)], start=path, progress=False)

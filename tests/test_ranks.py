@@ -82,7 +82,7 @@ if mesh.comm.rank == 0:
 """
 
 
-def test_a_driven_support_of_which_a_rank_has_nothing():
+def test_a_controlled_support_may_be_absent_on_a_rank():
     """The rank without a driven node waited for ever."""
     serial, parallel = (run_json(DRIVEN, ranks) for ranks in (1, 2))
     stretch = 1 - 0.5 / 3

@@ -47,7 +47,7 @@ def test_wall_deformed_fast_and_slowly(kind):
     assert bodies[0].creep([3.0, 9.0]) == pytest.approx(bodies[1].creep([3.0, 9.0]), rel=1e-9)
 
 
-def test_wall_without_pressure_has_none():
+def test_a_released_wall_is_free_of_pressure_while_it_recovers():
     """An unloaded wall stays free of load while it recovers, and recovers completely."""
     body = reference_time.wall("tube", inner_radius=1, outer_radius=2, c10=C10, branches=P1)
     body.deform(lambda t: ((1 + t) ** 2 - 1, 2 * (1 + t)), [1.0])

@@ -44,7 +44,7 @@ def test_remeshing_a_homogeneous_block_changes_no_force(monkeypatch):
     assert freed.path.last.measures["strain_energy"] < 1e-5 and freed.diameter == pytest.approx(2.0, rel=1e-4)
 
 
-def test_stages_go_on_where_they_were(monkeypatch):
+def test_stages_continue_on_new_meshes_without_repetition(monkeypatch):
     """A mesh made at the end of a stage, one within a stage that has no time, one on the way back: no stage runs twice,
     time stands."""
     from formingx.extensions.remeshing import remeshing
@@ -121,7 +121,7 @@ def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
     assert first == failed[0] + 1 and path.last.measures["travel"] == pytest.approx(0.55)
 
 
-def test_a_session_of_gmsh_that_is_open_stays_as_it_is():
+def test_an_open_gmsh_session_is_not_changed():
     """A mesh does not depend on what a script has set in gmsh, and leaves it alone."""
     import gmsh
 
@@ -444,7 +444,7 @@ def test_the_node_on_the_axis_stays_with_those_beside_it():
     assert np.ptp(place[:, 1]) < 1e-3 and np.abs(found.tangential[near]).max() < 0.2 * found.normal[near].max()
 
 
-def test_the_volume_of_each_point_is_held():
+def test_pointwise_volume_stiffness_keeps_J_near_1():
     """A stuck block: J stays nearer to 1, the force where it was."""
     def run(**options):
         like = block("stick")

@@ -232,7 +232,7 @@ def test_a_state_that_is_missing(copied):
         fx.load(folder, scene)
 
 
-def test_unfinished_states_count_for_nothing(whole, copied):
+def test_unfinished_states_are_ignored(whole, copied):
     folder, scene = copied
     shutil.copytree(folder / "0003", folder / "0099.part")                         # killed while writing
     path = whole["hinged"][2]
@@ -271,7 +271,7 @@ def test_contacts_are_compared_to_the_last_number(whole):
         fx.load(folder, cup("stick", fillet=1.1))
 
 
-def test_the_folder_of_another_run_is_left_alone(copied):
+def test_the_folder_of_another_run_is_not_overwritten(copied):
     folder, scene = copied
     before = sorted(map(str, folder.rglob("*")))
     with pytest.raises(fx.InputError, match="holds 9 states of another run: go on"):
@@ -394,7 +394,7 @@ fx.trace(make(), until=until, progress=False, checkpoint=sys.argv[1], record={"c
 """
 
 
-def test_ctrl_c_ends_in_one_line_and_the_run_goes_on(tmp_path):
+def test_an_interrupted_run_prints_one_line_and_can_be_continued(tmp_path):
     done = subprocess.run([sys.executable, "-c", INTERRUPTED, str(tmp_path / "run")], cwd=ROOT, capture_output=True,
                           text=True, timeout=300)
     assert done.returncode != 0 and len(done.stderr.strip().splitlines()) == 1, done.stderr

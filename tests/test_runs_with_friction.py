@@ -89,7 +89,7 @@ def test_a_parison_is_blown_into_a_bottle_without_friction():
 
 
 @pytest.mark.slow
-def test_a_flat_rough_plug_comes_back():
+def test_a_flat_rough_plug_is_withdrawn():
     made = plugs.scene(R, H, 5.0, 1.5, MATERIAL, "stick", (40, 1), name="plug")
     path = fx.Process(made).run([fx.Stage("push", control="plug", until=fx.travel(3.5)),
                                  fx.Stage("back", control="plug", until=fx.travel(0.0))])

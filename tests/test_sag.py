@@ -32,7 +32,7 @@ def sheet(material, *, elements=(20, 1), model=None, thickness=1e-3, **load):
 
 
 @pytest.mark.parametrize("small, close", [(1e-6, 5e-4), (1e-4, 3e-3)])
-def test_a_membrane_sags_as_hencky_says(small, close):
+def test_sag_of_a_membrane_agrees_with_hencky(small, close):
     """w = 0.595 a (rho g a/E)^(1/3), whatever the thickness, where the strain is small; E = 6 c10."""
     path = fx.trace(sheet(fx.NeoHookean(c10=1 / 6), model=fx.Membrane()), progress=False,
                     until=fx.sag(hencky() * small ** (1 / 3)))

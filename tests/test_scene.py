@@ -30,7 +30,7 @@ def contents(thing, seen=None):
     return thing
 
 
-def test_a_run_leaves_its_scene_as_it_was():
+def test_a_run_does_not_change_its_scene():
     """A process with friction by temperature, heat, relaxation and expansion leaves its scene unchanged."""
     scene = pressed()
     before, X = contents(scene), scene.mesh.domain.geometry.x.copy()

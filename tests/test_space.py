@@ -143,7 +143,7 @@ def test_triangles_refined_by_a_pilot_run_are_as_accurate():
     assert len(fx.mesh.adapted(path.pilot, max_rotation=None, error=1e9).nodes_of("rim")) < 5
 
 
-def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):
+def test_a_checkpoint_is_read_without_its_scene_and_checked_against_it(tmp_path):
     """A checkpoint is read without its scene, with its tools; a scene with another tool or thickness is refused."""
     at, floor = HELD, fx.tools.revolved(fx.tools.plane(-0.2).reversed())
     block_of = solid_of(tmp_path / "block.stl", block((-2, -2, -0.5), (2, 2, -0.2)))
@@ -168,7 +168,7 @@ def test_a_checkpoint_tells_of_itself_and_knows_its_scene(tmp_path):
         fx.trace(scene(), until=fx.pole_height(0.1))
 
 
-def test_goes_on_from_a_checkpoint_and_part_is_read_off(tmp_path):
+def test_a_run_in_three_dimensions_continues_from_a_checkpoint(tmp_path):
     scene, end = trough(), fx.pressure(0.4)
     whole = fx.trace(scene, until=end, progress=False, checkpoint=tmp_path / "run")
     on = fx.trace(scene, until=end, progress=False, start=fx.load(tmp_path / "run", scene, state=12))
@@ -359,7 +359,7 @@ def test_a_plug_goes_in_and_back_out(separates):
         assert height.max() > 0.3 and last["plug_force"] < -1e-4
 
 
-def test_a_plug_leaves_a_sheet_that_a_vacuum_holds():
+def test_a_plug_is_withdrawn_without_force_from_a_sheet_held_by_vacuum():
     """After a vacuum has pressed the sheet onto the mould, the plug is withdrawn without force, and walls stay."""
     mould = fx.Contact("bottom", fx.tools.revolved(fx.Tool([(3.0, 0.0), (1.0, 0.0), (0.9, -0.7), (0.0, -0.7)],
                                                            [0.0, 0.0, 0.15, 0.0])), name="mould")
@@ -617,7 +617,7 @@ def test_results_of_sections_are_refused_for_sheets_in_three_dimensions(tmp_path
 
 
 @pytest.mark.parametrize("wrinkles", [None, 0.01])
-def test_report_says_where_a_membrane_is_crushed_unless_its_energy_is_relaxed(tmp_path, monkeypatch, wrinkles):
+def test_report_warns_of_compression_without_relaxed_energy(tmp_path, monkeypatch, wrinkles):
     """The report warns of compression only without relaxed energy; without a screen it says that pictures lack."""
     path = fx.solve(disc(model=fx.Membrane(wrinkles=wrinkles)), to=0.001, increments=1)
     wall = path.wall()
@@ -638,7 +638,7 @@ def test_views_are_written(tmp_path):
     assert (tmp_path / "report.html").read_text().count("<img") == 2
 
 
-def test_a_run_that_ends_early_says_why():
+def test_a_run_that_ends_early_names_the_reason():
     with pytest.raises(fx.ConvergenceError, match="max_steps = 3 were used up") as failure:
         fx.trace(trough(), until=fx.pressure(1.0), max_steps=3, progress=False)
     assert len(failure.value.path) == 4

@@ -34,7 +34,7 @@ def test_quadratics_are_exact_and_other_functions_converge_with_order_three():
     assert np.all(np.log2(np.divide(errors[:-1], errors[1:])) > 2.5), errors
 
 
-def test_strains_since_a_past_state_are_carried_as_logarithms():
+def test_strains_since_a_past_state_are_transferred_as_logarithms():
     """Of C = F^T exp(H) F, H a quadratic without trace, at any F of det 1: exact, so det C stays 1."""
     rng = np.random.default_rng(0)
     source, target = rng.uniform(-1, 1, (400, 2)), rng.uniform(-0.9, 0.9, (50, 2))

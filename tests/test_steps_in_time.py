@@ -44,7 +44,7 @@ def test_a_target_at_a_corner_of_a_table(corner):
         assert met.measures["travel"] == pytest.approx(np.interp(corner, *np.transpose(QUICK)), abs=1e-9)
 
 
-def test_what_the_step_control_knows_is_part_of_a_state(tmp_path):
+def test_step_control_is_restored_from_any_state(tmp_path):
     """From any state, under a step control of one's own, the very same path goes on."""
     scene = sheet()
     stages = [Stage("in", control="ball", until=fx.travel(12), speed=20),
@@ -113,7 +113,7 @@ def test_accuracy_is_kept_under_a_tool_by_any_step_control(target, promised, pre
     assert of(path) == pytest.approx(of(pressed), rel=promised)
 
 
-def test_only_what_takes_time_has_an_error_in_time():
+def test_only_rate_dependent_runs_have_a_time_integration_error():
     path = run(sheet(0), Stage("at once", control="ball", until=fx.travel(7)), accuracy=1e-6)
     assert len(path) < 30
 
@@ -151,7 +151,7 @@ def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
         assert measured(path.state_at(BETWEEN)) == pytest.approx(measured(pressed.met(BETWEEN)), rel=accuracy)
 
 
-def test_between_states_of_a_flow_there_is_none_to_find():
+def test_states_between_those_of_a_flow_are_refused():
     path = run(block(), Stage("flow", control="pull", amplitudes={fx.travel: [(0, 0), (1, 1)]}), accuracy=1e-2)
     with pytest.raises(fx.InputError, match="in a stage that controls an output quantity"):
         path.state_at(fx.travel(0.987654))

@@ -67,7 +67,7 @@ def test_all_combinations(here, tmp_path):
         found.effects("h")
 
 
-def test_effects_are_not_those_of_what_failed(here):
+def test_main_effects_do_not_depend_on_failed_runs(here):
     """The best runs at y = 2 are missing: y = 2 is better by 3 all the same, as in each pair of runs."""
     found = run(here)
     found.runs = [one for one in found.runs if one.values not in ({"x": 1, "y": 2}, {"x": 2, "y": 2})]
@@ -148,7 +148,7 @@ def test_a_damaged_folder_is_refused(here, tmp_path, text, name):
         run(here, folder=tmp_path)
 
 
-def test_refining_finds_what_lies_between(here):
+def test_refining_finds_the_maximum_between_the_levels(here):
     """The maximum of the quadratic at (1, 2), which no run of the design is at."""
     found = run(here, x=(0.0, 2.5), y=(0.5, 3.0))
     before = found.best.measures["f"]

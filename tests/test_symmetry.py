@@ -126,7 +126,7 @@ def test_force_on_a_plate_is_a_target_of_the_whole():
     assert found == pytest.approx([1 - LENGTH] * 2, rel=1e-3)              # the penalty gives way
 
 
-def test_what_is_no_plane_of_symmetry_has_no_images():
+def test_supports_other_than_symmetry_planes_have_no_images():
     disc = fx.mesh.disc(radius=10.0, thickness=1.0, elements=(4, 1))
     held = [fx.Symmetry("axis"), fx.PrescribedDisplacement("top", "z")]
 

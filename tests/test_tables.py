@@ -96,7 +96,7 @@ def test_amplitude(function, start, until, tolerance):
 @pytest.mark.parametrize("function, words", [
     (lambda t: t > 0.3, "not smooth near t = 0.3"), (lambda t: np.where(t > 0.5, np.nan, t), "not a finite number"),
     (None, "fails")])
-def test_an_amplitude_that_is_none(function, words):
+def test_wrong_amplitudes_are_refused(function, words):
     with pytest.raises(fx.InputError, match=words):
         fx.amplitude(function, 1.0)
     with pytest.raises(fx.InputError, match="after start"):

@@ -146,7 +146,7 @@ def assert_derivatives_by_state_and_control(problem, x, d, control=0.7):
     (lambda body, value: body.integral(value * body.u[0] * body.du[0]), "unit"),
     (lambda body, value: body.integral(value * body.du[0], "skin"), "skin"),
 ])
-def test_a_load_that_is_none(work, message):
+def test_wrong_user_defined_loads_are_refused(work, message):
     load = type("Mine", (fx.Load,), {"virtual_work": lambda self, body, value: work(body, value)})()
     with pytest.raises(fx.InputError, match=message):
         Problem(fx.Scene(mesh=disc(), materials=fx.NeoHookean(c10=1.0), loads=[load],
@@ -477,7 +477,7 @@ def test_modulus_of_fibres(angle):
     assert found == pytest.approx((0.8 + 4.0 * stretch**2).max(), rel=1e-6)
 
 
-def test_fibres_that_are_stressed_at_rest_or_soften():
+def test_fibres_with_initial_stress_or_softening_are_refused():
     class Stressed(Fibres):
         def strain_energy(self, F, c10, k, angle):
             a = F * ufl.as_vector([ufl.cos(angle), 0, ufl.sin(angle)])

@@ -25,7 +25,7 @@ def test_a_ball_does_not_pass_in_the_first_step(radius, friction, more):
     assert path["tool_force"][-1] == pytest.approx(short["tool_force"][-1], rel=0.02) and path["pole_height"][-1] < -7
 
 
-def test_a_ball_that_comes_from_afar_does_not_pass_on_its_way():
+def test_a_ball_far_above_does_not_pass_through_the_sheet():
     """It ends in words or touches, always from above."""
     scene = ball(3.0, elements=16, gap=25.0)
     try:
@@ -49,7 +49,7 @@ def test_a_tool_between_two_points_is_refused(radius, elements, narrow):
     ball(radius, elements=int(np.ceil(40.0 / fits)))
 
 
-def test_where_a_point_slides_over_a_convex_tool_its_way_may_cut_it():
+def test_paths_of_sliding_points_may_cut_a_convex_tool():
     scene = ball(2.0, elements=24)
     path = fx.trace(scene, until=fx.travel(0.5), progress=False)
     with path.problem.state_context(path.last) as problem:
@@ -81,6 +81,6 @@ def test_a_sharp_open_tool_between_two_points_is_refused(points):
     ridge(12, 20.8, points, fillet=6.0)
 
 
-def test_a_sharp_tool_that_comes_down_on_a_node_is_felt():
+def test_a_sharp_tool_above_a_node_makes_contact():
     path = fx.trace(ridge(12, 20.0), until=fx.travel(2.0), progress=False)
     assert path["tool_force"][-1] > 0

@@ -40,7 +40,7 @@ def test_limit_pressure_is_the_largest_on_the_path(path):
         assert (found.measures["pole_stretch"] > limit.measures["pole_stretch"]) == (after is limit)
 
 
-def test_a_limit_point_found_behind_is_none_that_lies_ahead(monkeypatch):
+def test_a_limit_point_behind_the_state_is_not_taken_for_the_next(monkeypatch):
     """One behind a jump, at a kink of contact, was taken for the next, again and again; the step is made shorter."""
     locate, found = Curve.limit_point, []
 
@@ -104,7 +104,7 @@ def test_newton_is_quadratic(path, stretch):
 @pytest.mark.quick
 @pytest.mark.parametrize("length, stress", [(100.0, 1 / 98066.5), (0.1, 98066.5e-9 ** -1)],
                          ids=["m and Pa", "mm and GPa"])
-def test_units_change_nothing(path, length, stress):
+def test_results_do_not_depend_on_units(path, length, stress):
     """`length` cm and `stress` kg/cm2 are the units."""
     scene = treloar((40, 2), length=length, stress=stress)
     other = fx.trace(scene, until=fx.pole_stretch(8.5), intermediate=[fx.pole_stretch(s) for s in STRETCHES])
