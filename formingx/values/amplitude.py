@@ -13,7 +13,7 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
               ) -> list[tuple[float, float]]:
     """Return a table of a function of time, as `Stage(amplitudes={item: ...})` needs it.
 
-    Points are added until the table, linear between its points, agrees with the function amid each interval.
+    Points are added until the table, linear between its points, agrees with the function between them.
 
     Args:
         function: function of the time that returns the value of a load, support or tool. It is called with an array of

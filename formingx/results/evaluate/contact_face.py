@@ -113,13 +113,14 @@ class ContactFace:
         return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
 
     def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the contact points of all ranks with data, ordered by R, then Z; collective.
+        """Return data at the contact points of all ranks, ordered by R, then Z; collective.
 
         Args:
             columns: data at the n contact points of this rank, shape (n,) or (n, k) each.
 
         Returns:
-            Reference positions, shape (m, 2), length, and the data side by side, shape (m, columns), for the m points.
+            Reference positions of the m contact points of all ranks, shape (m, 2), length; their data, one row per
+            point and the given columns side by side, shape (m, all k).
         """
         rows = gathered(self._path.problem.comm, np.column_stack([self._contact.points, *columns]))
         rows, n = rows[np.lexsort((rows[:, 1], rows[:, 0]))], self._contact.points.shape[1]

@@ -32,7 +32,7 @@ class Snap(NamedTuple):
 
     @property
     def change(self) -> float:
-        """Relative change of the wall at this place, |ratio_after / ratio_before - 1|."""
+        """Relative change of the wall in the snap-through, |ratio_after / ratio_before - 1|."""
         return abs(self.ratio_after / self.ratio_before - 1)
 
 

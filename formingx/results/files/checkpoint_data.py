@@ -244,7 +244,7 @@ def _instead(file: FilePath) -> str:
 
 
 def crc_sums(data: dict, content: bytes) -> dict[str, int]:
-    """Return {name of the file: CRC-32 checksum} of the two files of a state.
+    """Return {name of the file: CRC-32 checksum} of the two files of a state in a checkpoint.
 
     Args:
         data: data of the file state.json.

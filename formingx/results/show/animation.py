@@ -140,7 +140,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
         return Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert("RGB")
 
     def width(names):
-        """Return the width of the axes of a loading curve beside their labels, as a fraction of the figure."""
+        """Return the width of the plot of a loading curve without its labels, as a fraction of the figure's width."""
         draw(shapes[0], ratios[0], tools[0], names, (curves[names][0][0], curves[names][1][0]))
         return loading.get_position().width
     width(min(curves, key=width))

@@ -225,13 +225,13 @@ def _warnings(record: Record, lead: str = "") -> str:
 
 
 def _finding(found: Finding) -> str:
-    """Return a finding as an element of the page."""
+    """Return a finding as an HTML element."""
     return (f"<details class='note{' bad' if found.severity != 'note' else ''}'><summary><b>{found.severity}</b>:"
             f" {html.escape(found.text)}</summary></details>")
 
 
 def _versions(records: list[Record]) -> list[list[str]]:
-    """Return rows (name, value) with the date, the scripts and the versions of programs."""
+    """Return rows (name, value) of a table: date of the report, scripts, and versions of programs."""
     try:
         version = importlib.metadata.version("formingx")
     except importlib.metadata.PackageNotFoundError:
@@ -310,7 +310,7 @@ def _key_numbers(record: Record, units: Units) -> str:
 
 
 def _stages(record: Record, units: Units) -> str:
-    """Return a table with one row per stage: states, iterations, controls at its end, tool forces, gap and wall."""
+    """Return an HTML table with a row per stage: states, iterations, controls at its end, tool forces, gap, wall."""
     columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
@@ -329,7 +329,7 @@ def _stages(record: Record, units: Units) -> str:
 
 
 def _tools(record: Record, units: Units) -> str:
-    """Return a table of the contacts, with travel of each tool and force on it in the last state."""
+    """Return an HTML table of the contacts, with the travel of each tool and the force on it in the last state."""
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
         force = record.forces.get(name)
@@ -373,7 +373,7 @@ def _convergence(record: Record) -> str:
 
 
 def _iterations(record: Record, units: Units) -> str:
-    """Return a table of the Newton iterations of each drawn state: control, corrections and last residual."""
+    """Return an HTML table of the Newton iterations of each drawn state: control, corrections and last residual."""
     controls = {k: record.control(k) for k in record.frames}
     rows, columns = [], list(dict.fromkeys(controls.values()))
     for k, control in controls.items():
@@ -386,7 +386,7 @@ def _iterations(record: Record, units: Units) -> str:
 
 
 def _states(record: Record, units: Units) -> str:
-    """Return a table of all columns in the drawn states."""
+    """Return an HTML table of all output quantities (columns) in the drawn states."""
     rows = [[str(k), record.kinds[k], *(page.number(v[k]) for v in record.measures.values())] for k in record.frames]
     return page.table(["state", "kind", *map(units.label, record.measures)], rows)
 
