@@ -358,9 +358,9 @@ class States:
         return list(np.array(rows).T)
 
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
-        """Return one row of values for each point of `curve` but the first, along successive states of one stage.
+        """Return the values of columns on a smooth curve through successive states of one stage (`curve`).
 
-        For the arguments see `curve`; `segment` is the segment of the states.
+        There is one row per point, with one value per column. The point of the first state is left out.
         """
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns

@@ -270,7 +270,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     Args:
         contact: the `FaceContact` with the tool.
         state: the state, with the tangent of the path and the column "strain_energy" of the whole part.
-        images: number of images of the modelled body in the whole part.
+        images: factor from the modelled body to the whole part: 2 for a half, 4 for a quarter, else 1.
     """
     if not contact.contact.driven:
         return 0.0

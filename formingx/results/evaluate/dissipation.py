@@ -14,8 +14,8 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
     .. math::
         \int_{t_0}^{t_1} D \, dt
 
-    The third value lies between both states. There the unknowns are interpolated, and the history variables are
-    advanced to that time.
+    The third value lies between both states. There the unknowns are interpolated, and the history variables
+    are advanced from the first state.
 
     Args:
         segment: the segment of the run with these states.

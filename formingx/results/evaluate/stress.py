@@ -359,7 +359,7 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
-        """Return the parts of the second Piola-Kirchhoff stress S of layers: material, then volume term.
+        """Return the second Piola-Kirchhoff stress S of layers as two addends: material, then volume term.
 
         Args:
             names: names of the layers, which have one material.

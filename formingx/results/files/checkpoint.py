@@ -351,7 +351,7 @@ def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> li
         variables: data of each set of history variables.
 
     Raises:
-        InputError: their number differs from the scene.
+        InputError: the scene has another number of sets of history variables.
     """
     if len(variables) != len(problem.histories):
         raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"

@@ -149,10 +149,10 @@ def _page(records: list[Record], names: list[str], parts: list, title: str, fail
 
 
 def scripts(data: str) -> str:
-    """Return the scripts at the end of a page, which draw its data in `PROCESS` and in the element "charts".
+    """Return the scripts at the end of a page as HTML; they draw the sheet, the tools and the curves.
 
     Args:
-        data: result of `interactive.data`.
+        data: data of the drawings, as JSON text (`interactive.data`).
     """
     packed = (("library", interactive.library()), ("data", interactive.packed(data)))
     code = resources.files(__package__).joinpath("report.js").read_text()
@@ -206,9 +206,9 @@ def _details(record: Record, units: Units) -> list[str]:
 
 
 def _warnings(record: Record, lead: str = "") -> str:
-    """Return the findings on a run as elements of the page, or a sentence that there are none.
+    """Return the findings on a run as HTML elements, or a sentence that there are none.
 
-    Of each finding two lines are shown, and the whole text after a click.
+    The page shows two lines of each finding, and after a click its whole text.
 
     Args:
         record: the run.
@@ -297,7 +297,7 @@ def _lead(record: Record, units: Units) -> str:
 
 
 def _key_numbers(record: Record, units: Units) -> str:
-    """Return a table of all columns, and of the smallest and largest wall, at limit points and in the last state."""
+    """Return an HTML table of all columns and the extreme walls, at limit points and in the last state."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
