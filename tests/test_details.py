@@ -195,7 +195,7 @@ def test_a_snap_through_does_not_pass_its_target():
 
         def __init__(self):
             pass
-    targets = RunTargets(SimpleNamespace(value=lambda bound, x, control: control), [(fx.travel(0.5), Driven())])
+    targets = RunTargets(SimpleNamespace(value=lambda quantity, x, control: control), [(fx.travel(0.5), Driven())])
     near = State(np.zeros(1), 0.49, np.ones(1), 1.0)
     assert targets.short_of_targets(near, 0.1) == pytest.approx(0.01)
     assert targets.short_of_targets(near, 1e-3) == pytest.approx(1e-3)

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from ..errors import ConvergenceError
 from ..measures.targets import Target
-from .equations import Array, Constraint, Measure
+from .equations import Array, Constraint, Quantity
 from .newton import Failure, fixed
 from .state import State
 from .state_solver import StateSolver
@@ -181,13 +181,13 @@ class Curve(StateSolver):
         control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
         return x, control
 
-    def between(self, a: State, b: State, bound: Measure, target: float) -> State:
+    def between(self, a: State, b: State, quantity: Quantity, target: float) -> State:
         """Return the state between two states at which an output quantity has a given value.
 
         Args:
             a: first state.
             b: second state.
-            bound: the output quantity.
+            quantity: the output quantity.
             target: the value, in the user's units, between the values of the quantity at a and b.
 
         Returns:
@@ -197,14 +197,14 @@ class Curve(StateSolver):
             Failure: no such state was found.
         """
         low, high = 0.0, 1.0
-        sign = self.value(bound, a.x, a.control) - target
+        sign = self.value(quantity, a.x, a.control) - target
         for _ in range(40):
             middle = (low + high) / 2
-            if (self.value(bound, *self.interpolate(a, b, middle)) - target) * sign > 0:
+            if (self.value(quantity, *self.interpolate(a, b, middle)) - target) * sign > 0:
                 low = middle
             else:
                 high = middle
-        return self.solve(*self.interpolate(a, b, low), bound.equation(target), "target", a)
+        return self.solve(*self.interpolate(a, b, low), quantity.equation(target), "target", a)
 
     def inside(self, a: State, b: State, fraction: float) -> State:
         """Return the state between two states in a plane that is normal to the tangent of the first.
@@ -223,13 +223,13 @@ class Curve(StateSolver):
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
-    def find(self, a: State, b: State, bound: Measure, target: Target) -> State:
+    def find(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
         """Return the state between two states that meets a target, for the user.
 
         Args:
             a: first state.
             b: second state.
-            bound: output quantity of the target.
+            quantity: output quantity of the target.
             target: the target.
 
         Returns:
@@ -239,7 +239,7 @@ class Curve(StateSolver):
             ConvergenceError: no such state was found.
         """
         try:
-            return self.between(a, b, bound, target.value)
+            return self.between(a, b, quantity, target.value)
         except Failure as failure:
             raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
                                    f" {failure.reason}; run with intermediate=[...] to have one") from None
@@ -271,7 +271,7 @@ class Curve(StateSolver):
         return found
 
     def close_penetrated(self, old: State, states: list[State],
-                         targets: Sequence[tuple[Target, Measure]]) -> list[State]:
+                         targets: Sequence[tuple[Target, Quantity]]) -> list[State]:
         """Put points that penetrate tools in three dimensions into contact, and solve again for the end of a step.
 
         A point closes at the position where it met the tool. At a target the points of all tools are considered, and
@@ -291,13 +291,13 @@ class Curve(StateSolver):
             Failure: no such state was found.
         """
         limit, (new, *rest) = self.problem.limit, states
-        bound = next((bound for target, bound in targets if target is new.met), None)
+        quantity = next((quantity for target, quantity in targets if target is new.met), None)
         if limit is None or new.kind == "limit point":
             return states
-        equation = fixed(new.control) if bound is None or new.met is None else bound.equation(new.met.value)
+        equation = fixed(new.control) if quantity is None or new.met is None else quantity.equation(new.met.value)
         for sweep in range(self.sweeps):
-            late, variables = limit.close_penetrated(new, bound is not None, sweep), self.problem.history_variables
-            if not late and (bound is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
+            late, variables = limit.close_penetrated(new, quantity is not None, sweep), self.problem.history_variables
+            if not late and (quantity is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
                 return [new, *rest]
             try:
                 new = self.solve_again(new, equation, old)

@@ -40,7 +40,7 @@ Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 """Function (x, control, gradient) -> (c, dc/dcontrol) of a constraint c = 0; it sets the vector `gradient` to dc/dx."""
 
 
-class Measure(Protocol):
+class Quantity(Protocol):
     """Output quantity: a number that every state has, such as a pole height.
 
     Attributes:

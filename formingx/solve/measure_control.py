@@ -15,7 +15,7 @@ import numpy as np
 from ..contact.step_limit import TrialStep
 from ..measures.targets import Target, is_met, process_time
 from . import predictor
-from .equations import Array, Measure
+from .equations import Array, Quantity
 from .newton import Failure, tangents
 from .path_following import Run
 from .record import Record
@@ -53,8 +53,8 @@ class QuantityRun(Run):
 
     Args:
         record: record of the states.
-        measure: the prescribed output quantity (`Quantity`).
-        course: function of time that returns the prescribed value of the quantity, in the user's units.
+        quantity: the prescribed output quantity (`Quantity`).
+        amplitude: function of time that returns the prescribed value of the quantity, in the user's units.
         times: times that are met exactly: the start, the corners and the end of the amplitude.
         targets: pairs (target, output quantity) to meet on the way.
         step: step control, whose lengths are fractions of the duration of the run; None: the default of `Run`.
@@ -62,12 +62,12 @@ class QuantityRun(Run):
         label: text before the target beside a progress bar.
     """
 
-    def __init__(self, record: Record, measure: Measure, course: Callable[[float], float], times: Sequence[float],
-                 targets: Sequence[tuple[Target, Measure]], step: StepControl | None, accuracy: float,
+    def __init__(self, record: Record, quantity: Quantity, amplitude: Callable[[float], float], times: Sequence[float],
+                 targets: Sequence[tuple[Target, Quantity]], step: StepControl | None, accuracy: float,
                  label: str = ""):
         end = process_time(times[-1])
         super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "continue", accuracy, label)
-        self._measure, self._course, self._times, self._duration = measure, course, times, times[-1] - times[0]
+        self._quantity, self._amplitude, self._times, self._duration = quantity, amplitude, times, times[-1] - times[0]
 
     def _accept(self, state: State) -> None:
         """Accept a state, and set the process time of the problem to the time of the state."""
@@ -112,14 +112,14 @@ class QuantityRun(Run):
             Failure: no such state was found.
         """
         problem, problem.clock = self.problem, time
-        value = float(self._course(time))
+        value = float(self._amplitude(time))
         x, control = self._predicted(old, time, value)
         trial, limit = TrialStep(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
         if limit and limit.length(trial) < _STEPS.contact:
             raise Failure("too many points would come into contact in one step", [])
         if limit:
             limit.prepare(trial)
-        new = self.curve.solve(x, control, self._measure.equation(value), "step", old, chords=True)
+        new = self.curve.solve(x, control, self._quantity.equation(value), "step", old, chords=True)
         rejection = limit and limit.check(old, new, 1.0)
         if rejection:
             raise Failure(rejection.reason, [])
@@ -174,7 +174,7 @@ class QuantityRun(Run):
         value: the value, in the user's units. Without such a point nearby, (x, control) of `old` is returned.
         """
         def deviation(s: float) -> float:
-            return self.curve.value(self._measure, old.x + s * old.direction, old.control + s * old.slope) - value
+            return self.curve.value(self._quantity, old.x + s * old.direction, old.control + s * old.slope) - value
         now = deviation(0.0)
         for sense in (1.0, -1.0):
             high = 1e-9 * sense
@@ -189,28 +189,28 @@ class QuantityRun(Run):
         """Return the first state in time, after `old` and up to `new`, that meets an open target; `new` if none does.
         """
         problem, best = self.problem, new
-        for target, bound in self.targets.open:
+        for target, quantity in self.targets.open:
             if target.name == "process_time":
                 new.met = target if abs(target.value - new.time) <= SAME_TIME * max(abs(new.time), 1e-300) else new.met
                 continue
             values = []
             for state in (old, new):
                 problem.clock = state.time
-                values.append(self.curve.value(bound, state.x, state.control) - target.value)
+                values.append(self.curve.value(quantity, state.x, state.control) - target.value)
             if values[0] * values[1] < 0:
-                found = self._state_at_target(old, target, bound, old.time, new.time)
+                found = self._state_at_target(old, target, quantity, old.time, new.time)
                 best = found if found.time < best.time else best
         if best.met is not None:
             best.kind = "target"
         return best
 
-    def _state_at_target(self, old: State, target: Target, bound: Measure, low: float, high: float) -> State:
+    def _state_at_target(self, old: State, target: Target, quantity: Quantity, low: float, high: float) -> State:
         """Return the state, one step after `old`, at which an output quantity meets its target.
 
         Args:
             old: the accepted state.
             target: the target.
-            bound: its output quantity.
+            quantity: its output quantity.
             low: process time of `old`.
             high: process time at which the quantity has passed the target.
 
@@ -221,11 +221,11 @@ class QuantityRun(Run):
 
         def deviation(time: float) -> float:
             found[time] = self._solve_at(old, time) if time > low else old
-            return self.curve.value(bound, found[time].x, found[time].control) - target.value
+            return self.curve.value(quantity, found[time].x, found[time].control) - target.value
         time = _root(deviation, low, high)
         miss, most = deviation(time), _STEPS.met * max(abs(target.value), _STEPS.met)
         state = found[time]
-        if not is_met(target, bound.size, miss + target.value) and abs(miss) > most:
+        if not is_met(target, quantity.size, miss + target.value) and abs(miss) > most:
             raise Failure(f"{target} was passed but could not be solved for", [])
         state.met = target
         return state

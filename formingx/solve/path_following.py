@@ -21,7 +21,7 @@ from . import predictor
 from .arc_length import Predictor
 from .branches import warn_of_branches
 from .diagnose import diagnose, not_reached
-from .equations import Array, Attempt, Measure
+from .equations import Array, Attempt, Quantity
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
@@ -64,7 +64,7 @@ class Run:
 
     settings = PathFollowing()
 
-    def __init__(self, record: Record, targets: Sequence[tuple[Target, Measure]], step: StepControl | None = None,
+    def __init__(self, record: Record, targets: Sequence[tuple[Target, Quantity]], step: StepControl | None = None,
                  at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "",
                  requested: Target | None = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
@@ -179,8 +179,8 @@ class Run:
         """
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
-        targets, bound = self.targets, self.targets.measure
-        pressure = isinstance(bound, Amplitude) and bound.is_load
+        targets, quantity = self.targets, self.targets.quantity
+        pressure = isinstance(quantity, Amplitude) and quantity.is_load
         if may_turn and last.stepping.get("until") != [*targets.until[:2]] and not pressure:
             with self.problem.state_context(last):
                 turned = targets.directed_to_target(replace(last))
@@ -190,7 +190,7 @@ class Run:
             with self.problem.state_context(state):
                 targets.add_known(state)
         met = [s.met[:2] for s in self.states if s.met]
-        targets.open = [(target, bound) for target, bound in targets.open if target[:2] not in met]
+        targets.open = [(target, quantity) for target, quantity in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
         self._ahead, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
         self._no_equilibrium_at = np.nan if no_equilibrium_at is None else no_equilibrium_at
@@ -223,11 +223,11 @@ class Run:
         while True:
             length = min(self.step.length, most)
             length = limit.length(self._trial._replace(length=length)) if limit else length
-            target, bound, reach = self.targets.within_reach(old, length)
+            target, quantity, reach = self.targets.within_reach(old, length)
             if length < self.step.length:
                 self._limited("gap closure", length)
             try:
-                return self._take(old, length, target, bound, reach, end)
+                return self._take(old, length, target, quantity, reach, end)
             except Cutback as cut:
                 most, end = cut.part * reach, cut.control if cut.lasts and most < np.inf else None
                 self.step.length = most if cut.lasts else self.step.length
@@ -261,19 +261,19 @@ class Run:
         self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
-    def _take(self, old: State, length: float, target: Target | None, bound: Measure | None,
+    def _take(self, old: State, length: float, target: Target | None, quantity: Quantity | None,
               reach: float, end: float | None = None) -> list[State]:
         """Return the states of one step from `old`, of a given arc length, or to a target at the arc length `reach`.
 
-        bound: output quantity of the target. end: control at the end of the step, in place of its length, or None.
+        quantity: output quantity of the target. end: control at the end of the step, in place of its length, or None.
         A step that fails raises `Failure`, and a step that is too long raises `Cutback`.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
         earlier = None if self.problem.has_kinks else predictor.parabola_state(self.states, reach, self.curve.distance)
         with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
-            if target is not None and bound is not None:
-                new = self.curve.step_to(old, reach, bound.equation(target.value), self._predictor, earlier, bend)
+            if target is not None and quantity is not None:
+                new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
             elif end is not None:
                 new = self.curve.step_to(old, reach, fixed(end), self._predictor, earlier, bend, kind="step")
             else:
@@ -406,13 +406,13 @@ class Run:
             if (limit.control - old.control) * old.slope < 0:   # on the piece of path that a jump has skipped
                 raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
-        for target, bound in self.targets.open:
+        for target, quantity in self.targets.open:
             if target is new.met:
                 continue
-            a, b = (self.curve.value(bound, s.x, s.control) - target.value for s in (old, new))
+            a, b = (self.curve.value(quantity, s.x, s.control) - target.value for s in (old, new))
             if a * b < 0:
                 try:
-                    state = self.curve.between(old, new, bound, target.value)
+                    state = self.curve.between(old, new, quantity, target.value)
                 except Failure as failure:
                     raise Failure(f"{target} was passed but could not be solved for: {failure.reason}", []) from None
                 state.met = target

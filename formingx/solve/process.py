@@ -19,7 +19,7 @@ from ..forms.schedule import StepData
 from ..measures.targets import Amplitude, Target, change_completed, process_time
 from .arc_length import Curve
 from .diagnose import diagnose
-from .equations import Array, Measure
+from .equations import Array, Quantity
 from .measure_control import QuantityRun
 from .newton import Failure, relative
 from .path_following import Run
@@ -36,7 +36,7 @@ _CONTACT_IN_TIME = replace(_IN_TIME, target=8)
 """Step control for a body in contact while only time passes: its contact points hardly move, so more Newton
 iterations per step are allowed. The time integration error sets the step length."""
 
-_Targets: TypeAlias = list[tuple[Target, Measure]]
+_Targets: TypeAlias = list[tuple[Target, Quantity]]
 
 
 class Execution:
@@ -104,7 +104,7 @@ class Execution:
             if self.record.ended:
                 break
 
-    def _bind(self, plan: Plan) -> list[tuple[Target, Measure]]:
+    def _bind(self, plan: Plan) -> list[tuple[Target, Quantity]]:
         """Return pairs (target, output quantity) of a stage: the intermediate targets, then the target `until`.
 
         The target `until` is left out if process time is the control and does not end early.
@@ -115,12 +115,12 @@ class Execution:
         found = []
         for target in (*stage.intermediate, *([stage.until] if stage.until and (plan.numbers or stage.waits) else [])):
             try:
-                bound = target.bind(self.problem)
+                quantity = target.bind(self.problem)
             except InputError as error:
                 raise InputError(f"{stage.label}: {error}") from None
-            if isinstance(bound, Amplitude) and not bound.is_controlled:
+            if isinstance(quantity, Amplitude) and not quantity.is_controlled:
                 raise InputError(f"{stage.label}: target {target}: this stage does not drive that")
-            found.append((target, bound))
+            found.append((target, quantity))
         return found
 
     def _left_to_meet(self) -> _Targets:
@@ -129,7 +129,7 @@ class Execution:
         """
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
-        return [(target, bound) for target, bound in self._targets[self._k]
+        return [(target, quantity) for target, quantity in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
     def _present(self) -> tuple[StepData, Array, float]:
@@ -256,8 +256,8 @@ class Execution:
         numbers: numbers of the adjusted item, then of the items that move with it. begun: True to continue the piece.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
-        target, course, times = self._prescribed_amplitude(self.problem.setting.base[-1])
-        run = QuantityRun(self.record, target.bind(self.problem), course, times, self._left_to_meet(),
+        target, amplitude, times = self._prescribed_amplitude(self.problem.setting.base[-1])
+        run = QuantityRun(self.record, target.bind(self.problem), amplitude, times, self._left_to_meet(),
                    self._stage.step or self._step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
@@ -275,8 +275,8 @@ class Execution:
             value = stage.constant.value
             return stage.constant, lambda time: value, [now, now + stage.duration]
         assert stage.prescribed is not None
-        measure, course = stage.prescribed
-        corners = [] if callable(course) else course[:, 0].tolist()
+        make_target, amplitude = stage.prescribed
+        corners = [] if callable(amplitude) else amplitude[:, 0].tolist()
         if corners and corners[0] > now:
             raise InputError(f"{stage.label}: the table begins at time {corners[0]:g}, but the process time is"
                              f" {now:g}: nothing is given for the time between")
@@ -284,8 +284,8 @@ class Execution:
         if last <= now:
             raise InputError(f"{stage.label}: ends at time {last:g}, but the process time is {now:g} already: time"
                              f" cannot go back")
-        at = course if callable(course) else lambda time: np.interp(time, *course.T)
-        return measure(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
+        at = amplitude if callable(amplitude) else lambda time: np.interp(time, *amplitude.T)
+        return make_target(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _run_tables(self, tables: list[tuple[int, Array]], piece: int) -> None:
         """Run pieces 1, 2, ... of a stage with tables, each from knot to knot, with process time as the control.
@@ -329,12 +329,12 @@ class Execution:
             return through
         target, requested = process_time(then), self._stage.until if self._stage.waits else None
         left = self._trace([*through, (target, target.bind(self.problem))], None if begun else 0.0, requested)
-        for waited, bound in left:
+        for waited, quantity in left:
             if waited is requested and not self.record.ended:
                 last = self.record.last
                 raise ConvergenceError(f"{self._stage.label}: {waited} was not reached within its duration of"
                                        f" {self._stage.duration:g}: it is"
-                                       f" {self.curve.value(bound, last.x, last.control):.6g} then: give it longer")
+                                       f" {self.curve.value(quantity, last.x, last.control):.6g} then: give it longer")
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:

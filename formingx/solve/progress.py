@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from ..measures.targets import Amplitude, Target, is_met
 from .arc_length import Curve
-from .equations import Measure
+from .equations import Quantity
 from .state import State
 
 log = logging.getLogger("formingx")
@@ -29,7 +29,7 @@ class RunTargets:
     Attributes:
         open: pairs (target, output quantity) of the targets that are still to be met.
         until: the last target.
-        measure: output quantity of the last target.
+        quantity: output quantity of the last target.
         values: values of this quantity in the states of the run so far, in the user's units.
         patience: number of states after which a run gives up, if they changed its progress (`gained`) by less than
             1e-3.
@@ -37,16 +37,16 @@ class RunTargets:
 
     patience = 500
 
-    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Measure]], requested: Target | None = None):
+    def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Quantity]], requested: Target | None = None):
         self._curve, self.open, self._best = curve, list(targets), 0.0
-        self.until, self.measure = self.open[-1]
+        self.until, self.quantity = self.open[-1]
         self.values: list[float] = []
         self._ends = [target for target in (self.until, requested) if target is not None]
 
     @property
     def of_control(self) -> bool:
         """True if the last target is a value of the control, or of an amplitude that depends on the control."""
-        return isinstance(self.measure, Amplitude)
+        return isinstance(self.quantity, Amplitude)
 
     def is_open(self) -> bool:
         """Return True until the last target or the requested target is met."""
@@ -70,7 +70,7 @@ class RunTargets:
         Args:
             state: the state.
         """
-        self.values.append(self._curve.value(self.measure, state.x, state.control))
+        self.values.append(self._curve.value(self.quantity, state.x, state.control))
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
@@ -79,14 +79,14 @@ class RunTargets:
         Args:
             state: the state.
         """
-        self.values.append(self._curve.value(self.measure, state.x, state.control))
+        self.values.append(self._curve.value(self.quantity, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.met     # other targets may be met, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
 
     def met_by(self, state: State) -> Target | None:
         """Return the first open target that a state meets to round-off, or None."""
-        return next((target for target, bound in self.open
-                     if is_met(target, bound.size, self._curve.value(bound, state.x, state.control))), None)
+        return next((target for target, quantity in self.open
+                     if is_met(target, quantity.size, self._curve.value(quantity, state.x, state.control))), None)
 
     def close_met(self, start: State) -> None:
         """Close the targets that the first state of the run meets already."""
@@ -94,7 +94,7 @@ class RunTargets:
             start.met = start.met or target
             self.open = [(t, b) for t, b in self.open if t is not target]
 
-    def within_reach(self, old: State, length: float) -> tuple[Target | None, Measure | None, float]:
+    def within_reach(self, old: State, length: float) -> tuple[Target | None, Quantity | None, float]:
         """Return the first open target within a step along the tangent of a state, by linear extrapolation.
 
         Args:
@@ -105,11 +105,11 @@ class RunTargets:
             (target, its output quantity, arc length to the target); (None, None, length) if no target is within this
             length.
         """
-        best: tuple[Target | None, Measure | None, float] = (None, None, length)
-        for target, bound in self.open:
-            left, rate = self._curve.target_residual(bound, target.value, old)
+        best: tuple[Target | None, Quantity | None, float] = (None, None, length)
+        for target, quantity in self.open:
+            left, rate = self._curve.target_residual(quantity, target.value, old)
             if left * rate < 0 and -left / rate < best[2]:
-                best = (target, bound, -left / rate)
+                best = (target, quantity, -left / rate)
         return best
 
     def directed_to_target(self, start: State, first: bool = False) -> State:
@@ -121,7 +121,7 @@ class RunTargets:
                 such a target may be reached in both directions.
         """
         if self.until.signed or not first:
-            left, rate = self._curve.target_residual(self.measure, self.until.value, start)
+            left, rate = self._curve.target_residual(self.quantity, self.until.value, start)
             if left * rate > 0:
                 start.direction, start.slope = -start.direction, -start.slope
                 start.orientation = -start.orientation
@@ -137,9 +137,9 @@ class RunTargets:
         Returns:
             Change of the control, dimensionless.
         """
-        for target, bound in self.open:
-            if isinstance(bound, Amplitude) and bound.is_controlled:
-                then, now = (self._curve.value(bound, old.x, c) - target.value
+        for target, quantity in self.open:
+            if isinstance(quantity, Amplitude) and quantity.is_controlled:
+                then, now = (self._curve.value(quantity, old.x, c) - target.value
                              for c in (old.control + change, old.control))
                 change *= now / (now - then) if now * then < 0 else 1.0
         return change

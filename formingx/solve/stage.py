@@ -152,19 +152,19 @@ class Stage:
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.label}: both control and amplitudes are given: then amplitudes must be {{measure:"
                              f" [(time, value), ...]}} with a function that makes targets, such as enclosed_volume")
-        ((measure, course),) = amplitudes.items()
-        if callable(course):
+        ((make_target, amplitude),) = amplitudes.items()
+        if callable(amplitude):
             if self.until is None:
                 raise InputError(f"{self.label}: follows a function of time: until when? give it"
                                  " until=process_time(...)")
         else:
-            ((measure, course),) = self._tables(amplitudes)
-            if len(course) < 2:
-                raise InputError(f"{self.label}: the table of {measure!r} must have two points at least")
-        first = course(0.0) if callable(course) else course[0, 1]
-        instance(f"{self.label}: amplitudes", measure(finite(f"{self.label}: amplitudes: value", first)), Target,
+            ((make_target, amplitude),) = self._tables(amplitudes)
+            if len(amplitude) < 2:
+                raise InputError(f"{self.label}: the table of {make_target!r} must have two points at least")
+        first = amplitude(0.0) if callable(amplitude) else amplitude[0, 1]
+        instance(f"{self.label}: amplitudes", make_target(finite(f"{self.label}: amplitudes: value", first)), Target,
                  "made by its measure")
-        return measure, course
+        return make_target, amplitude
 
     def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
         """Return the tables that the user gave as amplitudes.

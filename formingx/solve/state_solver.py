@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import ConvergenceError
-from .equations import Array, Attempt, Constraint, Equations, Measure
+from .equations import Array, Attempt, Constraint, Equations, Quantity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
@@ -229,11 +229,11 @@ class StateSolver:
             self._ahead_of = state, self.newton.solver.count
         return True
 
-    def value(self, bound: Measure, x: Array, control: float) -> float:
+    def value(self, quantity: Quantity, x: Array, control: float) -> float:
         """Return the value of an output quantity.
 
         Args:
-            bound: the quantity.
+            quantity: the quantity.
             x: unknowns, locally owned entries, shape (n,).
             control: load parameter (control), dimensionless.
 
@@ -241,24 +241,24 @@ class StateSolver:
             The value, in the user's units.
         """
         self._b.array_w[:] = x
-        return float(bound.value(self._b, control))
+        return float(quantity.value(self._b, control))
 
-    def target_residual(self, bound: Measure, target: float, state: State) -> tuple[float, float]:
+    def target_residual(self, quantity: Quantity, target: float, state: State) -> tuple[float, float]:
         """Return the residual c of the constraint "quantity = target" at a state, and dc/ds along the tangent.
 
         The target is extrapolated by this derivative. Values of the quantity on the tangent would be far off for a
         stiff quantity, such as a contact force.
 
         Args:
-            bound: the output quantity.
+            quantity: the output quantity.
             target: its target, in the user's units.
             state: the state.
 
         Returns:
-            (c, dc/ds), scaled as `Measure.equation` scales the constraint; s is the arc length.
+            (c, dc/ds), scaled as `Quantity.equation` scales the constraint; s is the arc length.
         """
         self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
-        left, by_control = bound.equation(target)(self._a, state.control, self.newton.gradient)
+        left, by_control = quantity.equation(target)(self._a, state.control, self.newton.gradient)
         return left, self.newton.gradient.dot(self._b) + by_control * state.slope
 
     def unit_slope(self, state: State) -> float:
