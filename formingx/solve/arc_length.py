@@ -130,7 +130,10 @@ class Curve(StateSolver):
 
     def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
-        """Return the guess (x, control) of a step from `old`; arguments as in `step`. x: locally owned entries."""
+        """Return the guess (x, control) of a step from `old`; x: locally owned entries, shape (n,).
+
+        length, earlier, bend: as in `step`.
+        """
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if earlier is not None:
             h = self.distance(earlier, old)
@@ -147,7 +150,8 @@ class Curve(StateSolver):
         """Return the state of a given kind at which a constraint holds, from the guess (x, control).
 
         Away from limit points, the predictor replaces the guess of x, and tangents of earlier iterations are kept. Near
-        a limit point tangents must be new, since limit points are located by the tangents of neighbouring states.
+        a limit point tangents must be new, since limit points are located by the tangents of neighbouring states. old:
+        accepted state at the start of the step.
         """
         if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, constraint, kind, old)

@@ -125,7 +125,11 @@ class CondensedColumns:
         adjoint.destroy()
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions of contact points for each right-hand side, as `Columns.motions`."""
+        """Return the motions of contact points for each right-hand side, shape (k, m), length.
+
+        Args:
+            moved: function that returns k motions for an update of unknowns and control (`Moved`).
+        """
         x, found = np.zeros(self._border.b.getLocalSize()), []
         for column in self._found.T:
             x[self._rows] = column
@@ -133,7 +137,14 @@ class CondensedColumns:
         return np.array(found).T + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
 
     def update(self, forces: Array) -> tuple[Array, float]:
-        """Return the updates of unknowns and control for a linear combination, as `Columns.update`."""
+        """Return the updates of unknowns and control for a linear combination of the right-hand sides.
+
+        Args:
+            forces: factors of the right-hand sides, shape (m,).
+
+        Returns:
+            Update of the unknowns, locally owned entries, shape (n,); update of the control.
+        """
         rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ forces)
         rhs.array_w[:] = 0.0
         rhs.array_w[self._rows] = self._E @ forces
@@ -144,7 +155,11 @@ class CondensedColumns:
         return dx, step
 
     def updates(self, forces: Array) -> Array:
-        """Return the updates of the unknowns for several linear combinations, as `Columns.updates`."""
+        """Return the updates of the unknowns for k linear combinations of the right-hand sides, shape (n, k).
+
+        Args:
+            forces: factors of the right-hand sides, a column for each combination, shape (m, k).
+        """
         return np.array([self.update(column)[0] for column in forces.T]).T
 
 

@@ -249,8 +249,8 @@ def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, di
 def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Return {field of `Diagnosis`: value} for the fields that follow from the tangents of the states.
 
-    These fields are the condition numbers, the sign changes of the determinant of dF/dx, and the limit points. A limit
-    point ahead is extrapolated from the squared slopes of the last two states, which are linear in the control.
+    These fields are the condition numbers, the sign changes of the determinant of dF/dx, and the limit points. The
+    control at a limit point ahead is extrapolated linearly from the squared slopes of the last two states.
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -320,7 +320,7 @@ def _buckling_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _buckles(facts: dict[str, Any]) -> bool:
-    """Return True if the last good state has a sheet in contact that is compressed along its section."""
+    """Return True if, by the `facts` of a failed run, a sheet in contact is compressed along its section."""
     return bool(facts.get("shortened") and facts["touching"])
 
 

@@ -64,7 +64,7 @@ class ProblemState(Protocol):
         control: load parameter (control), dimensionless.
         time: process time.
         history_variables: history variables of the problem after this state.
-        setting: step data as plain data (`StepData`), or empty.
+        setting: step data, as a dict of the fields of `StepData`; empty for a problem without stages.
     """
 
     x: Array
@@ -170,7 +170,7 @@ class Viscosity(Protocol):
         """Return the viscous forces eta V dx for a change dx of the unknowns, locally owned entries, shape (n,)."""
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent matrix."""
+        """Add eta V, with the viscosity eta, to a tangent matrix in place."""
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -202,7 +202,7 @@ class Examined(Protocol):
     facts: dict[str, Any]
 
     def draw(self, file: str | PathLike[str], title: str) -> None:
-        """Draw the last good state to an image file, on rank 0.
+        """Draw the last good state to an image file with a title, on rank 0.
 
         Raises:
             InputError: there is nothing to draw.
@@ -245,7 +245,7 @@ class Residual(Protocol):
         """Compute dF/dcontrol at (x, control) in `out`; `ahead`: as in `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the inner product of two changes of x, from which arc length is computed; dimensionless.
+        """Return the inner product of two changes a and b of x, from which arc length is computed; dimensionless.
 
         An example is the mean over the body of u_a . u_b with displacements u over the size of the body.
         """
@@ -427,7 +427,7 @@ class Units(Protocol):
         return []
 
     def shown(self, control: float) -> tuple[str, float]:
-        """Return the name of the controlled quantity and its value in the user's units."""
+        """Return (name of the controlled quantity, its value in the user's units) at a value of the control."""
         return "control", control
 
     def implausible(self, control: float) -> str | None:

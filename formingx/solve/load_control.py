@@ -69,11 +69,11 @@ class FixedControl:
         self._snes.destroy()
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Compute the residual F in `out`, for SNES."""
+        """Compute the residual F at x and the present control in `out`, as SNES calls it."""
         self._problem.residual(x, self._control, out)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Compute the tangent dF/dx in the matrix of the problem, for SNES."""
+        """Compute the tangent dF/dx at x in the matrix of the problem, as SNES calls it; A and P are this matrix."""
         self._problem.tangent(x, self._control)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:

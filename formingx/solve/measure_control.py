@@ -75,7 +75,7 @@ class QuantityRun(Run):
         super()._accept(state)
 
     def _next(self, old: State) -> list[State]:
-        """Return the next state in time, in a list: the end of the step, or a target or limit point inside it."""
+        """Return a list with the next state in time after `old`: a target or limit point in the step, or its end."""
         event = self._next_event(old.time)
         while True:
             left = event - old.time
@@ -126,7 +126,7 @@ class QuantityRun(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """Return the state between two states in time at which the control has an extremum, or `new` if there is none.
+        """Return the state in time between `old` and `new` at which the control has an extremum; `new` without one.
 
         Corners of the amplitude, and round-off of a constant control, do not count as extrema.
         """

@@ -267,7 +267,7 @@ class BorderedNewton:
         return True
 
     def solve_ahead(self, E: Array) -> Array | None:
-        """Return K^-1 E for the tangent K ahead of a state, as `tangent` or `update_ahead` computed it last.
+        """Return K^-1 E for the tangent K that `tangent` or `update_ahead` computed last.
 
         Args:
             E: right-hand sides as columns, locally owned rows, shape (n, m).
@@ -289,7 +289,7 @@ class BorderedNewton:
             x: guess of the unknowns; changed in place to the solution.
             control: guess of the load parameter (control), dimensionless.
             constraint: the constraint c.
-            old: accepted state before the guess, or None.
+            old: last accepted state, at which contact increments start; None for the first state.
             chords: True to allow tangents of earlier iterations (`ModifiedNewton`), if F has no kinks.
 
         Returns:

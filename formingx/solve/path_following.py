@@ -212,7 +212,7 @@ class Run:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
         A failure halves the step. If short steps fail, or the path leads back, a snap-through is tried. Only the
-        smallest step triggers it at a first state with history variables, and near a snap-through that failed.
+        smallest step triggers it at a first state with history variables, and near the control of a failed one.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -252,12 +252,12 @@ class Run:
                                   failure.attempt)
 
     def _failed(self, why: str, length: float) -> None:
-        """Count a rejected step and its reason; `length`: length of the next attempt."""
+        """Count a rejected step and its reason `why`; `length`: length of the next attempt."""
         self.record.counts.failures += 1
         self._limited(why, length)
 
     def _limited(self, why: str, length: float) -> None:
-        """Count the reason for a shortened or rejected step; `length`: length of the next attempt."""
+        """Count the reason `why` for a shortened or rejected step; `length`: length of the next attempt."""
         self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
@@ -314,7 +314,8 @@ class Run:
         return x
 
     def _error_in_time(self, new: State) -> float:
-        """Return the time integration error of a step over its tolerance; raise `Cutback` if it is much larger."""
+        """Return the time integration error of a step to `new` over its tolerance; raise `Cutback` if it is too large.
+        """
         if self._time_error is None:
             return 0.0
         error = self._time_error.ratio(self.states, new.x, new.control)
@@ -325,9 +326,9 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """Return the state after a snap-through from `old`, at which the path leads back, in a list.
+        """Snap through from the state `old`, at which the path leads back; return a list with the new state.
 
-        The list is empty, and the run ends, if a body with constant loads reaches no equilibrium.
+        If a body with constant loads reaches no equilibrium, the list is empty and the run ends.
         """
         work_sign = self._sense * (self._limit_rule == "continue_volume")
         if old.kind != "limit point":
@@ -373,7 +374,7 @@ class Run:
         return new
 
     def _found_no_equilibrium_near(self, old: State) -> bool:
-        """Return True if an earlier snap-through, from nearly the control of this state, reached no equilibrium."""
+        """Return True if an earlier snap-through, at nearly the control of `old`, reached no equilibrium."""
         return abs(old.control - self._no_equilibrium_at) < self.settings.snap_through.furthest
 
     def _max_solutions(self, old: State) -> int:
@@ -396,7 +397,7 @@ class Run:
             self._give_up(why)
 
     def _states_within(self, old: State, new: State) -> list[State]:
-        """Return the states at limit point and targets inside a step, in order, then its end; may raise `Failure`."""
+        """Return the states at limit point and targets between `old` and `new`, then `new`; may raise `Failure`."""
         found = []
         if old.slope * new.slope < 0 and old.kind != "limit point":
             try:

@@ -89,7 +89,7 @@ class RunTargets:
                      if is_met(target, quantity.size, self._curve.value(quantity, state.x, state.control))), None)
 
     def close_met(self, start: State) -> None:
-        """Close the targets that the first state of the run meets already."""
+        """Close the targets that the first state of the run, `start`, meets already."""
         while (target := self.met_by(start)) is not None:
             start.met = start.met or target
             self.open = [(t, b) for t, b in self.open if t is not target]

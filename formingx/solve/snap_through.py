@@ -145,7 +145,7 @@ class ViscousDrag:
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add the derivative of the viscous forces with respect to x, eta V, to a tangent matrix."""
+        """Add eta V, the derivative of the viscous forces with respect to x, to a tangent matrix in place."""
         self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:

@@ -27,7 +27,7 @@ class State:
         history_variables: history variables of the problem after this state (`Problem.histories`).
         history_variables_before: history variables with which the state was solved for; empty in a loaded path.
         stage: name of the stage of a process.
-        setting: step data of the stage, as plain data (`StepData`).
+        setting: step data of the stage, as a dict of the fields of `StepData`.
         stepping: data with which a run continues after this state: its next step, its counts and its target; empty for
             a state inside a step.
         time: process time.

@@ -342,7 +342,8 @@ class StateSolver:
     def _state(self, control: float, history: list[Iteration], kind: str, before: State | None) -> State:
         """Return the state with the unknowns `_x` and a control, with the tangent that `newton` computed last.
 
-        The tangent is directed away from the state `before`; None: the control increases along it.
+        The tangent is directed away from the state `before`; None: the control increases along it. history: Newton
+        iterations of the state. kind: `State.kind`.
         """
         b = self.newton.b
         size = self._length_of(b)

@@ -310,7 +310,7 @@ class Conduction(HeatVectors):
         return ufl.grad(f) if self._gradient_map is None else self._gradient_map * ufl.grad(f)
 
     def _layer_measures(self, materials: Mapping[str, ThermalProperties]) -> list[tuple[Any, Any]]:
-        """Return pairs (material, UFL measure over all layers of this material) for {layer: material}."""
+        """Return pairs (material, UFL measure over all layers of this material); `materials`: {layer: material}."""
         groups: dict[int, tuple[Any, list[int]]] = {}
         for name, tag in self.mesh.layers.items():
             groups.setdefault(id(materials[name]), (materials[name], []))[1].append(tag)
@@ -441,7 +441,7 @@ class Conduction(HeatVectors):
             raise ConvergenceError("heat: the matrix of a step is singular")
 
     def _solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Return the solution with the factorised matrix for a right-hand side, locally owned entries, shape (n,)."""
+        """Return the solution for a right-hand side with the factorised matrix; locally owned entries, shape (n,)."""
         self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, rhs)
         self._solver.solve(self._rhs, self._out)
         return self._out.array_r.copy()

@@ -83,7 +83,7 @@ def height_at(mesh: Mesh, face: str) -> float:
 
 
 def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
-    """Return (median height of the elements along a boundary, length of the boundary, area of the mesh's section)."""
+    """Return (median height of the elements at the boundary `face`, length of the boundary, area of the whole grid)."""
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
     ends = grid.boundaries[face][:, :2]

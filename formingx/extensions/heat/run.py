@@ -97,7 +97,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
     """Return {boundary: penetration depths of heat at the first and the last time of interest, length}.
 
     A depth is sqrt(a t) with the diffusivity a at the time t. At a boundary with absorption the first depth is at most
-    1 / absorption coefficient. times: output times, shape (n,).
+    1 / absorption coefficient. materials: {layer: material}. boundaries: laws of heat. times: output times, shape (n,).
     """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())

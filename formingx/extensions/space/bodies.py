@@ -115,5 +115,5 @@ def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edg
 
 
 def _overlap(box: np.ndarray, other: np.ndarray) -> bool:
-    """Return True if two bounding boxes overlap; each is the lowest and highest coordinates, shape (2, 3), length."""
+    """Return True if two bounding boxes overlap, each (lowest, highest) coordinates, shape (2, 3), length."""
     return bool((box[0] <= other[1]).all() and (other[0] <= box[1]).all())
