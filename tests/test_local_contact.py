@@ -44,12 +44,12 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     tool pulls it out: the state, a root of one equation for its depth, is at the foot of the ramp."""
     C = np.array([[1.0, coupling], [coupling, 1.0]])
     face, free = Face(slip=0.3), np.array([0.1, -0.5 * THETA + inside])
-    f0, S0 = (values[0] for values in face.increment.taken(np.array([0])))
+    f0, S0 = (values[0] for values in face.increment.last_tractions(np.array([0])))
     tangent = np.eye(2) + C @ S0                            # that of the body with the law as it was linearised
     problem = SimpleNamespace(comm=MPI.COMM_SELF, present=[face], constrained=np.zeros(0, dtype=int),
                               x=PETSc.Vec().createSeq(2))
     solver = SimpleNamespace(solve_all=lambda E: np.linalg.solve(tangent, C @ E))
-    law = face.increment.ahead(np.array([0]))
+    law = face.increment.law_at(np.array([0]))
 
     def along(depth):
         """Motion with a depth, in equilibrium along the tool, where forces are linear."""

@@ -89,7 +89,7 @@ class Increment:
         """Half-width theta of the ramp, the range of distances over which the contact pressure sets in, length."""
         return self._law.theta
 
-    def taken(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def last_tractions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the tractions and stiffnesses that the last `linearise` used at some points.
 
         Args:
@@ -109,9 +109,9 @@ class Increment:
         Returns:
             Tractions of the law, linearised at the predicted distances and slips.
         """
-        return self.ahead(slice(None))(motion)
+        return self.law_at(slice(None))(motion)
 
-    def ahead(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+    def law_at(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
         """Return a function that predicts the tractions at some points after a further motion.
 
         Args:

@@ -275,7 +275,7 @@ class States:
         if segment.problem.has_history:                      # states between them depend on the history
             found = self._run_to(segment, left, right, target, bound)
         else:
-            found = segment.curve.find(left, right, bound, target)
+            found = segment.curve.state_at_target(left, right, bound, target)
             found.stage, found.setting = left.stage, left.setting
             found.measures = self._measures(segment, found)
         segment.curve.spent()

@@ -185,7 +185,7 @@ class Curve(StateSolver):
         control = weights[0] * a.control + weights[1] * b.control + weights[2] * a.slope + weights[3] * b.slope
         return x, control
 
-    def between(self, a: State, b: State, quantity: Quantity, target: float) -> State:
+    def state_at_value(self, a: State, b: State, quantity: Quantity, target: float) -> State:
         """Return the state between two states at which an output quantity has a given value.
 
         Args:
@@ -210,7 +210,7 @@ class Curve(StateSolver):
                 high = middle
         return self.solve(*self.interpolate(a, b, low), quantity.equation(target), "target", a)
 
-    def inside(self, a: State, b: State, fraction: float) -> State:
+    def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
         """Return the state between two states in a plane that is normal to the tangent of the first.
 
         Args:
@@ -227,8 +227,8 @@ class Curve(StateSolver):
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
-    def find(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
-        """Return the state between two states that meets a target, for the user.
+    def state_at_target(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
+        """Return the state between two states that meets a target, as `state_at_value` with an error for the user.
 
         Args:
             a: first state.
@@ -243,7 +243,7 @@ class Curve(StateSolver):
             ConvergenceError: no such state was found.
         """
         try:
-            return self.between(a, b, quantity, target.value)
+            return self.state_at_value(a, b, quantity, target.value)
         except Failure as failure:
             raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
                                    f" {failure.reason}; run with intermediate=[...] to have one") from None

@@ -88,11 +88,13 @@ class Diagnosis:
         I1: largest (I1 - 3) / (limit - 3) in the last good state, with the limit of the material at each point; None
             without a limit.
         limit: place of `I1`.
-        turned: pairs (control before, control after) between which the determinant of the tangent changed its sign
-            without a limit point.
-        limit_points: controls of the limit points on the path.
-        limit_ahead: control of a limit point extrapolated from the slopes of the last states, or None.
-        flipped: number of nodes whose contact status (open, sticking, sliding) changed in the last iteration.
+        turned: pairs of values of the controlled quantity, in the user's units, between which the determinant of the
+            tangent changed its sign without a limit point.
+        limit_points: values of the controlled quantity at the limit points of the path, in the user's units.
+        limit_ahead: value of the controlled quantity at a limit point ahead, extrapolated from the slopes of the last
+            states; None without one.
+        flipped: number of nodes whose contact status (open, sticking, sliding) changed in the last iteration of the
+            failed attempt.
         touching: number of nodes in contact in the last good state.
         condition: estimate of the 1-norm condition number of the tangent of the last good state.
         condition_before: the same estimate for the state 10 states earlier.

@@ -109,7 +109,7 @@ class Increment(Protocol):
     def newly_closed(self) -> Array:
         """Mask of points that are closed now but were open at the start of Newton's method, shape (n,)."""
 
-    def taken(self, points: Array) -> tuple[Array, Array]:
+    def last_tractions(self, points: Array) -> tuple[Array, Array]:
         """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c) and (m, c, c).
 
         points: numbers of the points. Tractions are stresses, stiffnesses stress/length.
@@ -118,7 +118,7 @@ class Increment(Protocol):
     def predicted(self, motion: Array) -> Tractions:
         """Return the tractions at all points after a motion relative to their tool, shape (n, c), length."""
 
-    def ahead(self, points: Array | slice) -> Callable[[Array], Tractions]:
+    def law_at(self, points: Array | slice) -> Callable[[Array], Tractions]:
         """Return a function that maps motions of m points relative to their tool, shape (m, c), length, to tractions.
         """
 

@@ -14,10 +14,10 @@ class Newton:
     """Settings of Newton's method besides the convergence criteria (`newton.Tolerances`).
 
     Attributes:
-        unloaded: lower bound of the support forces in the relative residual, dimensionless.
-        at_rest: lower bound of the displacements (dimensionless) in the relative correction. On a tool whose force
-            grows as the square of the penetration, corrections near the reference configuration are as large as
-            displacements.
+        unloaded: number that is added to the norm of the support forces in the relative residual, dimensionless.
+        at_rest: number that is added to the norm of the displacements in the relative correction, dimensionless. On a
+            tool whose force grows as the square of the penetration, corrections near the reference configuration are
+            as large as displacements.
         hurried: largest number of iterations in which the active set of a contact with history variables may change, if
             a shorter step follows a failure.
         small: size of a correction (dimensionless displacement) below which growing corrections are no sign of
@@ -33,8 +33,8 @@ class Newton:
             corrects the errors of the iteration before it.
         chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
             iteration takes a residual and a solve, about a sixth of the time.
-        slow: ratio of the residuals after and before an iteration, above which a tangent is not kept. With slower
-            convergence, round-off would be mistaken for it.
+        slow: ratio of the residuals after and before an iteration, above which a tangent is not kept. Round-off could
+            be mistaken for slower convergence.
     """
 
     unloaded: float = 1e-5

@@ -128,7 +128,7 @@ class FixedControlCurve(Curve):
         """
         return self._correct(old, length, kind)
 
-    def inside(self, a: State, b: State, fraction: float) -> State:
+    def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
         """Return the state at the control a.control + fraction (b.control - a.control), with a fraction from 0 to 1.
 
         Raises:

@@ -235,7 +235,7 @@ class _Points:
         """
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._linearised()
-        laws, ramps = [c.increment.ahead(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
+        laws, ramps = [c.increment.law_at(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
@@ -327,7 +327,7 @@ class _Points:
     def _linearised(self) -> tuple[Array, Array]:
         """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.
         """
-        return self._forces([c.increment.taken(i) for c, i in self._some])
+        return self._forces([c.increment.last_tractions(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
         """Return the forces, flat, and stiffnesses, shape (k, c, c), of the contact law after motions y, flat, length.

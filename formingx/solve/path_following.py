@@ -413,7 +413,7 @@ class Run:
             a, b = (self.curve.value(quantity, s.x, s.control) - target.value for s in (old, new))
             if a * b < 0:
                 try:
-                    state = self.curve.between(old, new, quantity, target.value)
+                    state = self.curve.state_at_value(old, new, quantity, target.value)
                 except Failure as failure:
                     raise Failure(f"{target} was passed but could not be solved for: {failure.reason}", []) from None
                 state.met = target

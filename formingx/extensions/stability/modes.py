@@ -257,7 +257,7 @@ class Modes:
         if self.problem.has_history:
             raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.state_context(a):
-            state = self.curve.inside(a, b, fraction)
+            state = self.curve.state_at_fraction(a, b, fraction)
         self.curve.spent()
         state.stage, state.setting, state.history_variables = a.stage, a.setting, a.history_variables
         x, control = self.curve.interpolate(a, b, fraction)

@@ -127,7 +127,7 @@ class EnergyBalance:
                     problem.clock = a.time + part * (b.time - a.time)
                 problem.limit.prepare(TrialStep(a.x, a.control, start.direction, start.slope, part * h))
                 try:
-                    found = curve.inside(start, end, part)
+                    found = curve.state_at_fraction(start, end, part)
                 except Failure:                             # the contact iteration may converge elsewhere
                     continue
                 finally:
