@@ -37,16 +37,16 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
         if not all(map(np.isfinite, travels.values())):
             unknown.append(plan)
         present = {i: tool for i, tool in tools.items() if i not in plan.inactive}
-        for where in _piece_ends(plan, travels):
-            for i in (i for i in present if where[i] != travels[i] and np.isfinite(where[i])):
+        for ends in _piece_ends(plan, travels):
+            for i in (i for i in present if ends[i] != travels[i] and np.isfinite(ends[i])):
                 try:
-                    scene.check_travel(tools[i], where[i])
+                    scene.check_travel(tools[i], ends[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.label}: {error}") from None
-            for part in np.linspace(0, 1, _CHECKED_POSITIONS) if where != travels else [1.0]:
-                now = {i: travels[i] + part * (where[i] - travels[i]) for i in tools}
-                _check_overlap(scene, plan.stage.label, present, outlines, now)
-            travels = where
+            for part in np.linspace(0, 1, _CHECKED_POSITIONS) if ends != travels else [1.0]:
+                current = {i: travels[i] + part * (ends[i] - travels[i]) for i in tools}
+                _check_overlap(scene, plan.stage.label, present, outlines, current)
+            travels = ends
     return unknown
 
 
@@ -66,26 +66,26 @@ def _piece_ends(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, floa
 
 
 def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
-                   where: dict[int, float]) -> None:
+                   travels: dict[int, float]) -> None:
     """Raise an InputError if two active tools overlap at given travels.
 
-    `present` are the contacts of the active tools, `outlines` points on the tools and `where` the travels of the tools,
-    each {number in `Scene.items`: value}; `caller` begins the message.
+    `present` are the contacts of the active tools, `outlines` points on the tools without travel and `travels` lengths,
+    each {number in `Scene.items`: value}. `caller` begins the error message.
     """
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
-            if j <= i or j in scene.same_tool(i) or not np.isfinite(where[i] + where[j]):
+            if j <= i or j in scene.same_tool(i) or not np.isfinite(travels[i] + travels[j]):
                 continue
-            shift = where[i] * a.travel_vector - where[j] * b.travel_vector
+            shift = travels[i] * a.travel_vector - travels[j] * b.travel_vector
             for points, other, back in ((outlines[i] + shift, b, 0.0), (outlines[j], a, shift)):
                 depth = other.tool.signed_distance(points - back)
                 worst = int(np.argmax(depth))
                 if depth[worst] > near:
-                    position = ", ".join(f"{x:.6g}" for x in points[worst] + where[j] * b.travel_vector)
+                    position = ", ".join(f"{x:.6g}" for x in points[worst] + travels[j] * b.travel_vector)
                     axes = ", ".join(scene.kinematics.axes).replace("r, z", "R, Z")
-                    raise InputError(f"{caller}: tools overlap: {_with_travel(a, where[i])} and"
-                                     f" {_with_travel(b, where[j])} reach {depth[worst]:.6g} into each other at"
+                    raise InputError(f"{caller}: tools overlap: {_with_travel(a, travels[i])} and"
+                                     f" {_with_travel(b, travels[j])} reach {depth[worst]:.6g} into each other at"
                                      f" ({axes}) = ({position}); leave one out with inactive=[...], or end the travel"
                                      f" earlier")
 
