@@ -130,10 +130,10 @@ class ContactLaw:
 
     In each increment a contact calls these methods in this order:
 
-    * `motion` and `touching` at its beginning, for distances, slips and points in contact;
+    * `motion` and `touching` at its beginning, for distances, slips and points in contact.
     * `tractions` in each Newton iteration, for tractions, stiffness and new history variables. The law is linearised at
-      the `Motion` that the iteration before predicts;
-    * `stiffness_ahead` at an accepted state, for the tangent towards the next step;
+      the `Motion` that the iteration before predicts.
+    * `stiffness_ahead` at an accepted state, for the tangent towards the next step.
     * `distance`, `nearest` and `ramp` for the limits of the next step.
 
     A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. Other

@@ -436,12 +436,12 @@ def cofactor_change(F, H):
 
 
 def _rows(gradient, last):
-    """Return the tensor with the in-plane gradient of a mode, shape (3, 2), and its last column (UFL, shape (3, 3))."""
+    """Return the tensor (UFL, shape (3, 3)) with the columns `gradient`, shape (3, 2), and `last`, shape (3,)."""
     return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 
 def _block(F2, F33):
-    """Return F with the in-plane block F2, shape (2, 2), and the entry F33 (UFL, shape (3, 3))."""
+    """Return the tensor (UFL, shape (3, 3)) with the in-plane block F2, shape (2, 2), and the entry F33, else 0."""
     return ufl.as_tensor([[F2[0, 0], F2[0, 1], 0], [F2[1, 0], F2[1, 1], 0], [0, 0, F33]])
 
 

@@ -25,7 +25,7 @@ class _Stage(NamedTuple):
         setting: the `StepData`.
         active: the active constraints.
         place: values of the locally owned constrained unknowns at control 0, shape (n,).
-        rate: their derivative with respect to the control, shape (n,).
+        rate: derivative of these values with respect to the control, shape (n,).
         means: prescribed values of the constrained means.
         unbalanced: forces f of fading, locally owned entries of F: (1 - control) f is subtracted from F; or None.
     """

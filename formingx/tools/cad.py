@@ -49,7 +49,7 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 
 
 class _Reader:
-    """Reader of one STEP or BREP file, with a process of its own that ends with the `with` block.
+    """Reader of one STEP or BREP file in a separate process, which ends with the `with` block.
 
     Args:
         file: name of the file.
@@ -70,7 +70,7 @@ class _Reader:
         self._timer.start()
 
     def __enter__(self) -> _Reader:
-        """Return the reader after it has read the file."""
+        """Wait until the process has read the file, set `bounds`, and return the reader."""
         try:
             self.bounds = {int(tag): ends for tag, ends in self._answer()["curves"].items()}
         except BaseException:
@@ -90,7 +90,7 @@ class _Reader:
         return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
-        """Return the answer of the process to `question`, or its first line if this is None.
+        """Send `question` to the process, if it is not None, and return the next line of the process, as JSON data.
 
         Raises:
             InputError: the process reports an error, crashes, or takes too long.
@@ -144,7 +144,7 @@ def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], b
 
 
 def _raise(error: InputError) -> list[Line | Arc]:
-    """Raise an error: for a curve that cannot be read, in place of the function that returns its pieces."""
+    """Raise `error`; replaces the function that returns the pieces of a curve if the curve cannot be read."""
     raise error
 
 
