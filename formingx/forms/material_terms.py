@@ -254,6 +254,6 @@ class MaterialTerms:
         return self.forms.time - self.start
 
     def _rest_stress(self, constants: dict[str, Any]) -> Any:
-        """Return dW/dF11 at F = I (UFL scalar, stress)."""
+        """Return the stress dW/dF11 of the strain energy W at F = I (UFL scalar, stress)."""
         F = ufl.variable(ufl.Identity(3))
         return ufl.diff(self.material.strain_energy(F, **constants), F)[0, 0]

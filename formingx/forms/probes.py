@@ -170,7 +170,7 @@ class MidSurfaceProbe(Probe):
         self._average_slopes(element, geometry)
 
     def _average_slopes(self, element: Any, geometry: Any) -> None:
-        """Average the slopes of both elements at points where two elements meet."""
+        """Store the mean of the tangents and of the displacement slopes d/dS at points where two elements meet."""
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]

@@ -81,7 +81,9 @@ class Support(Part):
         return None
 
     def all_constraints(self) -> list[Constrained | ConstrainedMean]:
-        """Return the constraints for the check for rigid motions: `constraints`, and one for each of `resists`.
+        """Return the constraints that count in the check for rigid motions of the body.
+
+        These are `constraints`, and a constraint of each component in `resists`.
 
         Returns:
             List of `Constrained` and `ConstrainedMean`.

@@ -129,7 +129,10 @@ def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
-    """Return the residual by field over the support forces; place and position of the largest displacement entry."""
+    """Return {field: norm of its residual over the norm of the support forces}, and where a node is least balanced.
+
+    The node has the largest out-of-balance force; its place in the mesh and its reference position are returned.
+    """
     out, comm, space = x.duplicate(), problem.comm, problem.forms.space
     problem.residual(x, control, out)
     values, n = out.array_r.copy(), space.dofmap.index_map.size_local

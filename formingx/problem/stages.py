@@ -87,7 +87,7 @@ class Stages(Vectors):
 
     @property
     def constrained_rate(self) -> np.ndarray:
-        """Derivative of the constrained unknowns with respect to the control, as `constrained`, shape (n,)."""
+        """Derivative of the constrained unknowns with respect to the control, for the n unknowns `constrained`."""
         return self._stage.rate
 
     @contextlib.contextmanager

@@ -117,7 +117,7 @@ class _Reader:
 
 def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
-    """Return a function that returns the lines and arcs of a curve, or raises the error that its evaluation gave.
+    """Return a function that returns the lines and arcs of a curve, or raises the error of their computation.
 
     Args:
         evaluate: function of parameters, shape (n,), that returns points and derivatives, shape (n, 3) each.

@@ -194,7 +194,7 @@ class Tool:
         return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return points of the profile and its straight pieces (`RigidTool.surface`).
+        """Return straight pieces that replace the profile, see `RigidTool.surface`.
 
         Returns:
             Points of `outline`, shape (n, 2), length, and numbers of the ends of each piece, shape (m, 2).
