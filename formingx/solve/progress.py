@@ -149,8 +149,8 @@ class RunTargets:
     def turned_back(self) -> str:
         """Return a reason to give up if the path leads away from the last target, else "".
 
-        This is the case if more than half of the progress is lost or, for a target of the control, all of it: the
-        control may decrease after a limit point.
+        This is the case if more than half of the progress is lost. For a target of the control all progress must be
+        lost, since the control may decrease after a limit point.
         """
         if not self.is_open():
             return ""

@@ -65,13 +65,13 @@ class ReferencePoints:
             negligible = SEARCH.limit * (np.abs(N).max() + SEARCH.comparison_length * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != ContactStatus.STICKS) & (mu > 0)
-            turns = slides & (status * along < -SEARCH.none * np.abs(along).max())
+            turns = slides & (status * along < -SEARCH.negligible * np.abs(along).max())
             other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
             most = mu * ((1 - SEARCH.limit) * N - negligible)
             at_limit = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * negligible, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            slips = at_limit & (over > SEARCH.none * np.abs(dT).max())
+            slips = at_limit & (over > SEARCH.negligible * np.abs(dT).max())
             other[slips], miss[slips] = sense[slips], (over * compliance)[slips]
             opens = held & ~self.pulls & (negligible >= N) & (dN < 0)
             other[opens], miss[opens] = ContactStatus.FREE, -(dN * compliance)[opens]
@@ -133,7 +133,7 @@ class ReferencePoints:
         compliance, a = A @ C @ B, np.zeros(len(point))
         largest = np.abs(compliance).max(1, initial=0.0)
         most = largest.max(initial=0.0)
-        stiff = np.flatnonzero(largest < SEARCH.none * most)
+        stiff = np.flatnonzero(largest < SEARCH.negligible * most)
         compliance[stiff, stiff] = most
         if to is not None:
             n = 2 * len(sticks)

@@ -121,13 +121,13 @@ class _Segment(NamedTuple):
 
     def extended(self, m: int) -> _Segment:
         """Return the segment extended to m points of known compliance; added points are open."""
-        more = m - len(self.status)
-        if not more:
+        added = m - len(self.status)
+        if not added:
             return self
-        blank = np.zeros((more, self.force.shape[1]))
+        blank = np.zeros((added, self.force.shape[1]))
         grown = {name: np.concatenate([getattr(self, name), blank])
                  for name in ("place", "force", "rate", "extra", "growth")}
-        return self._replace(status=np.append(self.status, np.full(more, ContactStatus.FREE)), **grown)
+        return self._replace(status=np.append(self.status, np.full(added, ContactStatus.FREE)), **grown)
 
 
 class ContactEventSequence:
@@ -243,10 +243,10 @@ class ContactEventSequence:
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = points.values_at(moved) if moved else np.zeros_like(piece.force)
         targets = points.motion_to_targets(piece.positions, piece.place, near)
-        force, more = points.forces_at_end(u, piece.status, near, piece.force, targets)
-        positions = [x - points.motion_under(more, f) for f, x in enumerate(piece.positions)]
+        force, added = points.forces_at_end(u, piece.status, near, piece.force, targets)
+        positions = [x - points.motion_under(added, f) for f, x in enumerate(piece.positions)]
         return piece._replace(positions=[x + m for x, m in zip(positions, moved)] if moved else positions, force=force,
-                              extra=piece.extra + more)
+                              extra=piece.extra + added)
 
     def _piece(self, length: float) -> _Segment:
         """Return the last segment that begins before an arc length."""

@@ -36,14 +36,14 @@ class StatusSearch:
     Attributes:
         all_at_once: number of trials in which all statuses that violate the law change; later one changes at a time.
         tries: maximum number of status sets that are tried.
-        none: fraction of the largest rate of force or motion below which a rate is negligible.
+        negligible: fraction of the largest rate of force or motion below which a rate is negligible.
         comparison_length: arc length by which rates of forces are multiplied to compare them with forces.
         limit: relative distance from the Coulomb limit mu N, or from N = 0, below which a force counts as on it.
     """
 
     all_at_once: int = 6
     tries: int = 60
-    none: float = 1e-9
+    negligible: float = 1e-9
     comparison_length: float = 1e-4
     limit: float = 1e-6
 
@@ -89,12 +89,12 @@ class Points:
 
     def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
         self._faces, self._n, self._response, self._comm = faces, n, response, faces[0].comm
-        none: Any = np.zeros(0)
+        empty: Any = np.zeros(0)
         self.point_ids: list[tuple[int, int, int]] = []
-        self.columns, self.steps = np.zeros((size, 0)), none
+        self.columns, self.steps = np.zeros((size, 0)), empty
         c = self._components = faces[0].points.shape[1]
         self.motions = [np.zeros((*face.points.shape, 0)) for face in faces]
-        self.friction, self.elastic_slip, self._scale, self._pulls = none, none, none, none.astype(bool)
+        self.friction, self.elastic_slip, self._scale, self._pulls = empty, empty, empty, empty.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
         self._owned: list[tuple[int, np.ndarray, np.ndarray, Any]] = []
 
@@ -121,10 +121,10 @@ class Points:
             self.motions[f] = np.concatenate([self.motions[f], *motions], axis=-1)
         self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
         ones = [np.ones(len(face.points)) for face in self._faces]
-        more = self.values_at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
+        added = self.values_at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
                                          face.law.elastic_slip * unit, face.scale, face.law.adhesive * unit])
                         for face, unit in zip(self._faces, ones)], new)
-        friction, slip, scale, pulls = more.T
+        friction, slip, scale, pulls = added.T
         self.friction = np.append(self.friction, np.where(friction < FAR, friction, np.inf))
         self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
         self._pulls = np.append(self._pulls, pulls > 0)

@@ -41,10 +41,10 @@ class Stage(NamedTuple):
     """Result of an implicit stage of a time step, for a body and the tools in contact with it.
 
     Attributes:
-        changes: changes of temperature since the start of the step: of the body, locally owned entries, shape (n,);
-            then of each tool in contact, along its depth, shape (nodes, m).
-        rates: rates of heat M dT/dt at the end of the stage: of the body over its heat capacity, degrees per time; of
-            the tools per contact area; shapes as of `changes`.
+        changes: changes of temperature since the start of the step. The first array is for the body, locally owned
+            entries, shape (n,). An array for each tool in contact follows, along its depth, shape (nodes, m).
+        rates: rates of heat M dT/dt at the end of the stage, shapes as of `changes`. For the body they are divided by
+            its heat capacity, degrees per time; for the tools they are per contact area.
         heats: heat per time into the whole body through each boundary and from each source, in the order of
             `Conduction.names`, without faces of prescribed temperature.
     """

@@ -256,8 +256,8 @@ class HeatContact:
             c: factor of the rate, time.
 
         Returns:
-            Flux q into the body, heat per time and area, shape (n,); changes of temperature of the lines, degrees,
-            shape (n, m); rates of heat of the lines per contact area, shape (n, m).
+            Flux q into the body, heat per time and area, shape (n,). Changes of temperature of the lines, degrees,
+            shape (n, m). Rates of heat of the lines per contact area, shape (n, m).
         """
         q = response.conductance * (response.face_temperature - T)
         change = response.change - np.outer(q, response.compliance)

@@ -239,9 +239,9 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
         List of the laws.
 
     Raises:
-        InputError: an object that is no law of heat, a boundary that the mesh does not have, a temperature below
-            absolute zero, a table that does not cover its boundary, or a second law (except `Absorption`) on a face of
-            prescribed temperature.
+        InputError: an object that is no law of heat, an unknown boundary, a temperature below absolute zero, or a table
+            that does not cover its boundary. Also a second law, except `Absorption`, on a face of prescribed
+            temperature.
     """
     found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]

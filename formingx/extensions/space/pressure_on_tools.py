@@ -69,7 +69,7 @@ class PressureOnTools:
         """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
 
         The coefficients are a mask of the nodes that slide on tools, the contact pressures at these nodes, the normals
-        of the tools and their derivatives. The pressures are those of the last accepted state.
+        of the tools and their derivatives. The pressures belong to the last accepted state.
         """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)

@@ -110,8 +110,8 @@ class Swept(SolidTool):
 
     The coordinate r of a position (x, y, z) depends on the kind of the tool:
 
-    * revolved: r is the distance from the axis x = y = 0;
-    * extruded along y: r is x; extruded along x: r is y;
+    * revolved: r is the distance from the axis x = y = 0.
+    * extruded along y: r is x. Extruded along x: r is y.
     * box: r is min(half) minus the distance inwards from the outline of a rectangle with rounded corners.
 
     Args:

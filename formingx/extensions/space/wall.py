@@ -114,8 +114,8 @@ class SheetWall(ColumnTable):
     def around(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.
 
-        The mean is taken over the triangles whose deformed centroid lies within a radius of the point, weighted with
-        their reference areas. If there is no such triangle, the ratio of the nearest triangle is returned.
+        It is the mean of the triangles whose deformed centroid lies within a radius of the point, weighted with their
+        reference areas. If there is no such triangle, the ratio of the nearest triangle is returned.
 
         Args:
             point: position (x, y, z) on the deformed part, length.
