@@ -378,8 +378,8 @@ class BorderedNewton:
     def _solve(self, x: PETSc.Vec, control: float, chord: bool, rescale: bool) -> bool:
         """Compute the correction `a` = -K^-1 F with the tangent K at (x, control); return False if K is singular.
 
-        The vector `b` = dx/dcontrol is computed, too, except with added forces and in a chord iteration. chord: True to
-        use the factors of an earlier tangent. rescale: as in `_factorise`.
+        The vector `b` = dx/dcontrol is computed, too, except with a `Drag` and in a chord iteration. chord: True to use
+        the factors of an earlier tangent. rescale: as in `_factorise`.
         """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False

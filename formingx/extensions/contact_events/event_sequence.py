@@ -381,7 +381,7 @@ class ContactEventSequence:
         return False
 
     def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return for each face the arc lengths at which points passed its surface that are inside the tool at `end`.
+        """Return for each face the arc lengths at which open points passed the tool's surface, if inside it at `end`.
 
         For other points, and for the point of the closure `but`, the result is the arc length of `end`.
         """
