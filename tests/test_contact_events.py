@@ -106,7 +106,7 @@ def test_sliding_points_move_as_in_the_tangent():
             nothing = ahead.bend(1e-12)
             assert nothing is not None and np.abs(nothing[0]).max() < 1e-8
             if len(law.sense[law.normal > 0]) > 1 and np.all(law.sense[law.normal > 0] != 0):
-                speed = faces[1].moved(old.direction[:n], old.slope)
+                speed = faces[1].relative_motion(old.direction[:n], old.slope)
                 change = np.abs(np.subtract(ahead.positions(1e-6)[1], ahead.positions(0.0)[1]) / 1e-6 - speed).max()
                 assert change < 1e-3 * np.abs(speed).max()
                 sliding += 1

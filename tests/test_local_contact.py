@@ -33,7 +33,7 @@ class Face:
     def add(self, values, forces):
         values += forces.ravel()
 
-    def moved(self, dx, step):
+    def relative_motion(self, dx, step):
         return dx.reshape(-1, 2)
 
 

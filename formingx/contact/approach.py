@@ -123,7 +123,7 @@ class Approach:
             Arc length, at most `length`.
         """
         face = self.face
-        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
         free = ~face.law.touching(start, face.history)
         if face.contact.lagged:                             # a tangent of a long step predicts no gap closures
             most = LIMITS.largest_approach * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
@@ -154,7 +154,7 @@ class Approach:
             are closed or stay open. Their positions at this arc length, relative to the tool, shape (n, c), length.
         """
         face = self.face
-        start, velocity = face.positions(fields, control), face.moved(direction, slope)
+        start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
         free = ~face.law.touching(start, face.history) & (face.rule.area > 0)
         times = gap_closures(face.law, start, velocity, free, length)
         return times, start + times[:, None] * velocity
@@ -398,7 +398,7 @@ class Approach:
         face, law, history = self.face, self.face.law, self.face.history
         if history is None or not law.has_friction:
             return 1.0
-        end, velocity = face.positions(new, control), face.moved(direction, slope)
+        end, velocity = face.positions(new, control), face.relative_motion(direction, slope)
         near = law.nearest(end)
         F, grows = law.ramp(near.distance)
         rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)

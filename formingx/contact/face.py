@@ -130,7 +130,7 @@ class FaceContact:
         """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
 
-    def moved(self, dx: np.ndarray, step: float) -> np.ndarray:
+    def relative_motion(self, dx: np.ndarray, step: float) -> np.ndarray:
         """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
 
         Args:

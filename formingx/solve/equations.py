@@ -156,7 +156,7 @@ class ContactFace(Protocol):
     def keep_open(self, points: Array) -> None:
         """Keep the points of a mask, shape (n,), open until the next `ActiveSet.begin`."""
 
-    def moved(self, dx: Array, step: float) -> Array:
+    def relative_motion(self, dx: Array, step: float) -> Array:
         """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
 
         dx: update of the unknowns, locally owned entries. step: update of the control, which moves the tool.

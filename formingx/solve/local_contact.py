@@ -127,7 +127,7 @@ class LocalSolve:
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
-            law = contact.increment.predicted(contact.moved(dx, step))
+            law = contact.increment.predicted(contact.relative_motion(dx, step))
             new = (law.status != status) & ~mark
             mark |= new
             found |= bool(new.any())
@@ -322,7 +322,7 @@ class _Points:
 
         dx: update of the locally owned unknowns, shape (n,). step: update of the control.
         """
-        return np.concatenate([c.moved(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
+        return np.concatenate([c.relative_motion(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
 
     def _linearised(self) -> tuple[Array, Array]:
         """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.

@@ -152,7 +152,7 @@ class ContactEventSequence:
         self._faces, self._response, self._comm, self._batch = faces, response, faces[0].comm, batch
         self._n, self._tangent = n, (x, control, direction, slope)
         start = [face.positions(x[:n], control) for face in faces]
-        self._along = [face.moved(direction[:n], slope) for face in faces]
+        self._along = [face.relative_motion(direction[:n], slope) for face in faces]
         self._free = [~face.law.touching(x, face.history) & (face.rule.area > 0) for face, x in zip(faces, start)]
         self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
@@ -430,7 +430,7 @@ class ContactEventSequence:
             control + time * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()), forces)
         if change is None:
             return None
-        moved = [face.moved(change[0][: self._n], change[1]) for face in self._faces]
+        moved = [face.relative_motion(change[0][: self._n], change[1]) for face in self._faces]
         piece = self._projected(piece, moved)
         if not np.isfinite(piece.extra).all():
             return None

@@ -117,7 +117,8 @@ class Points:
         self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.point_ids)]
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
         for f, face in enumerate(self._faces):
-            motions = [face.moved(column[: self._n], step)[..., None] for column, step in zip(found[0].T, found[1])]
+            motions = [face.relative_motion(column[: self._n], step)[..., None]
+                       for column, step in zip(found[0].T, found[1])]
             self.motions[f] = np.concatenate([self.motions[f], *motions], axis=-1)
         self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
         ones = [np.ones(len(face.points)) for face in self._faces]

@@ -175,7 +175,7 @@ class _PerturbedPaths:
                 run.balance(residual)
             self._solved = state
             b = self.curve.newton.b.array_r
-            self._velocity = [face.moved(b, 1.0) for face in self.problem.contacts]
+            self._velocity = [face.relative_motion(b, 1.0) for face in self.problem.contacts]
 
     def _keep_open(self, state: State) -> None:
         """Keep the contact points of the perturbed runs open that are open in the base run at a state."""
@@ -207,7 +207,7 @@ class _PerturbedPaths:
         distance = law.distance(face.positions(state.x[:n], state.control))
         newly_closed = (history.distance <= -law.theta) & (distance > -law.theta)
         closing = newly_closed & (np.isnan(history.closure[:, 0]) | (not face.contact.sticks) & (distance < law.theta))
-        velocity = face.moved(before.direction, before.slope)
+        velocity = face.relative_motion(before.direction, before.slope)
         start = face.positions(before.x[:n], before.control)
         inside = np.flatnonzero(newly_closed & ~closing)
         if len(inside):
@@ -321,7 +321,7 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
         if with_gradient:
             forces, values = np.zeros_like(face.points), np.zeros(problem.n_owned)
             forces[local] = near.normal
-            rate = float((near.normal * face.moved(np.zeros(len(x.array_r)), 1.0)[local]).sum())
+            rate = float((near.normal * face.relative_motion(np.zeros(len(x.array_r)), 1.0)[local]).sum())
             face.add(values, problem.forms.length * forces)
             problem.fill(gradient, values)
         return (distance, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([distance, rate])))
