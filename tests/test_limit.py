@@ -100,12 +100,12 @@ def test_the_path_tangent_uses_the_stored_factors(monkeypatch, friction):
 def test_internal_variables_are_computed_four_times_per_step(monkeypatch):
     """Once, in two halves for the error, and half way for the energy dissipated (Simpson's rule): an accepted state
     takes the predicted values."""
-    calls, after = [0], MaterialHistory._after
+    calls, after = [0], MaterialHistory._values_at_end
 
     def counted(self, cells):
         calls[0] += 1
         return after(self, cells)
-    monkeypatch.setattr(MaterialHistory, "_after", counted)
+    monkeypatch.setattr(MaterialHistory, "_values_at_end", counted)
     fx = limit.fx
     mesh = fx.mesh.disc(radius=2.0, inner_radius=1.0, thickness=0.5, elements=(2, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.Viscoelastic(fx.NeoHookean(c10=0.05), branches=[(0.3, 0.5), (0.4, 5.0)]),
