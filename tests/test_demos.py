@@ -291,12 +291,15 @@ def test_plug_adapted_quick(tmp_path):
 
 @pytest.mark.slow
 def test_plug_adapted(tmp_path):
-    """Pilots at half the columns are as near to the membrane, which knows no bending, as uniform ones."""
+    """Pilots at half the columns are as near to the membrane, which knows no bending, as uniform ones.
+
+    Snaps lower the force by up to 3 %, at travels that depend on the mesh, so mean forces are compared.
+    """
     found = summary("plug_adapted", tmp_path, timeout=3600)
     for mu, force in (("0.1", 861), ("0.3", 1057), ("0.5", 1183), ("1", 1350)):
         numbers = found[f"mu_{mu}"]
         assert numbers["force_N"]["8"] == pytest.approx(force, rel=0.015)
-        assert numbers["force_N"]["12"] == pytest.approx(numbers["membrane_force_N"]["12"], rel=0.05)
+        assert numbers["mean_force_N"] == pytest.approx(numbers["membrane_mean_force_N"], rel=0.04)
     assert found["fillet_h0/8"]["force_N"]["8"] == pytest.approx(1153, rel=0.05)
 
 
