@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .fillets import FilletInSheet, fillets_in_sheet
+from .fillets import FilletInSheet, FlatsInSheet, fillets_in_sheet, flats_in_sheet
 from .mesh import Mesh, Preset
 from .sizes import GROWTH, ends_of_columns, length_along, moved_nodes
 
@@ -26,6 +26,7 @@ class Fineness(NamedTuple):
         through: smallest number of elements through the sheet.
         even: distance from a constrained end up to which the columns have their shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
+        promised: largest relative error of the wall.
     """
 
     along: int
@@ -33,10 +34,11 @@ class Fineness(NamedTuple):
     through: int
     even: float
     height: float
+    promised: float
 
 
-FINENESS = {"draft": Fineness(16, 1.15, 1, 0.0, 5.0), "standard": Fineness(20, 0.68, 2, 0.0, 4.0),
-            "fine": Fineness(40, 0.36, 3, 1.0, 4.0)}
+FINENESS = {"draft": Fineness(16, 1.15, 1, 0.0, 5.0, 0.03), "standard": Fineness(20, 0.68, 2, 0.0, 4.0, 0.01),
+            "fine": Fineness(40, 0.36, 3, 1.0, 4.0, 0.003)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 1 / 10
@@ -62,6 +64,21 @@ _MAX_WALL = 0.25
 
 _TURN = 1 / 8
 """Exponent of 1 - cos of the angle of the arc: the sheet bridges a short arc less, and its columns may be longer."""
+
+_ON_FLAT = 2.0
+"""Length of a column on a flat face of a tool over that on a fillet whose radius is the radius of the free surface when
+the sheet touches. A thin sheet leaves the face within this length; longer columns touch too late."""
+
+_THROUGH_ERROR = 0.14
+"""Relative error of the wall on a fillet, over the square of wall / (fillet radius times elements through the sheet):
+0.09 to 0.19 in five moulds."""
+
+_SHARPEST = 1.0
+"""Largest wall over fillet radius for which the elements through the sheet are chosen."""
+
+_BESIDE_END = 3.0
+"""Distance of the middle of a lip, a convex fillet, from a constrained end, over the thickness, below which the sheet
+is hardly stretched there and needs no more elements through it."""
 
 _SHEET_SAMPLES = 2000            # points of the sheet at which sizes are computed
 
@@ -89,8 +106,9 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
         return mesh
     fineness = FINENESS[preset.accuracy]
     longest = s[-1] / fineness.along
+    constrained = [s[end] for end in (0, -1) if rows[:, end, 0].max() > 1e-9 * s[-1]]     # the axis is none
     size = np.full(len(s), longest)
-    shortest, bending = longest, 0.0
+    shortest, bending, through = longest, 0.0, 1
     for item in touching:
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
             wall = thickness * fillet.area_ratio
@@ -98,16 +116,21 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
             column_length = fineness.fillet * fillet.stretch * mean
             column_length *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
             column_length = max(column_length, _SHORTEST * longest)
+            middle = (fillet.first + fillet.last) / 2
+            if fillet.concave or all(abs(middle - end) > _BESIDE_END * thickness for end in constrained):
+                through = max(through, _through_fillet(wall / fillet.radius, fineness.promised))
             shortest = min(shortest, column_length)
             size = np.minimum(size, column_length + GROWTH * _distance(s, fillet))
             if fillet.concave:
                 bending = max(bending, wall / fillet.radius * fillet.turn)
-    through = max(fineness.through if bending >= _WEAK_BENDING else min(fineness.through, 2),
+        if item.direction is None:
+            size = np.minimum(size, np.maximum(_on_flats(
+                flats_in_sheet(item.tool, faces[item.on], axisymmetric), s, thickness, fineness), _SHORTEST * longest))
+    through = max(through, fineness.through if bending >= _WEAK_BENDING else min(fineness.through, 2),
                   int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
-    for end in (0, -1):
-        if rows[:, end, 0].max() > 1e-9 * s[-1]:                     # the axis is no constrained end
-            distance = np.maximum(np.abs(s - s[end]) - fineness.even * thickness, 0.0)
-            size = np.minimum(size, _END_COLUMN_LENGTH * thickness / min(through, fineness.through) + GROWTH * distance)
+    for end in constrained:
+        distance = np.maximum(np.abs(s - end) - fineness.even * thickness, 0.0)
+        size = np.minimum(size, _END_COLUMN_LENGTH * thickness / min(through, fineness.through) + GROWTH * distance)
     ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return preset.make(ends, _through_layers(preset, through, keep_through))
 
@@ -119,6 +142,32 @@ def _distance(s: np.ndarray, fillet: FilletInSheet) -> np.ndarray:
     """
     error = _POSITION_ERROR * s[-1]
     return np.maximum(np.maximum(fillet.first - 3 * error - s, s - fillet.last - error), 0.0)
+
+
+def _through_fillet(wall: float, promised: float) -> int:
+    """Return the number of elements through a sheet on a fillet.
+
+    Args:
+        wall: wall over fillet radius.
+        promised: largest relative error of the wall.
+    """
+    return int(np.ceil(min(wall, _SHARPEST) * np.sqrt(_THROUGH_ERROR / promised) - 1e-9))
+
+
+def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, fineness: Fineness) -> np.ndarray:
+    """Return the largest length of a column at points of a sheet that touch flat faces, shape (n,), length.
+
+    Args:
+        flats: points of the sheet that touch.
+        s: lengths along the sheet from its start to the points, shape (n,).
+        thickness: thickness of the sheet, length.
+        fineness: sizes of the elements.
+    """
+    if not len(flats.positions):
+        return np.full(len(s), np.inf)
+    wall = np.minimum(thickness * flats.area_ratios, _MAX_WALL * flats.free_radii)
+    length = _ON_FLAT * fineness.fillet * flats.stretches * np.sqrt(flats.free_radii * wall)
+    return np.interp(s, flats.positions, length)
 
 
 def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:

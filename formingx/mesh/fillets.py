@@ -1,4 +1,4 @@
-"""Estimate of the part of an undeformed sheet that reaches each fillet of a tool.
+"""Estimate of the parts of an undeformed sheet that reach the fillets and the flat faces of a tool.
 
 A sheet under pressure is nearly a membrane. In the tool its free surface is a part of a sphere, whose radius decreases
 as the pressure increases. So the sheet touches a point of the tool when this radius equals the radius of the largest
@@ -39,6 +39,53 @@ class FilletInSheet(NamedTuple):
     concave: bool
 
 
+class FlatsInSheet(NamedTuple):
+    """Points of an undeformed sheet that are estimated to touch the straight pieces of a tool.
+
+    Attributes:
+        positions: lengths along the sheet from its start to the points, ascending, shape (n,), length.
+        free_radii: radius of the free surface of the sheet when a point touches, shape (n,), length.
+        stretches: reference over deformed length of the sheet there, along the section, shape (n,).
+        area_ratios: reference over deformed area there, shape (n,).
+    """
+
+    positions: np.ndarray
+    free_radii: np.ndarray
+    stretches: np.ndarray
+    area_ratios: np.ndarray
+
+
+class _Touched(NamedTuple):
+    """Estimate of the material that touches the points of a tool.
+
+    Attributes:
+        points: points of the tool in order along the sheet, shape (m, 2), length.
+        curvature: absolute curvature of the tool there, shape (m,), 1/length.
+        free_radii: radius of the largest ball outside the tool that touches it there, shape (m,), length.
+        positions: length along the sheet from its start to the material that touches there, shape (m,), length.
+        reference_radii: radius of this material in the reference configuration, shape (m,), length.
+    """
+
+    points: np.ndarray
+    curvature: np.ndarray
+    free_radii: np.ndarray
+    positions: np.ndarray
+    reference_radii: np.ndarray
+
+    def stretches(self, axisymmetric: bool, group: np.ndarray) -> tuple[float, float]:
+        """Return reference over deformed length along the section and over deformed area, at a group of points.
+
+        Args:
+            axisymmetric: True for bodies of revolution, False in plane strain.
+            group: numbers of the points, consecutive.
+        """
+        along = length_along(self.points)
+        before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(along) - 1)
+        stretch = (self.positions[after] - self.positions[before]) / max(along[after] - along[before], 1e-300)
+        mean = self.reference_radii[group].mean(), self.points[group, 0].mean()
+        return stretch, stretch * (mean[0] / max(mean[1], 1e-300) if axisymmetric else 1.0)
+
+
 _PIECE = 1 / 60
 """Distance between successive points of a tool over the size of the tool."""
 
@@ -63,28 +110,56 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
         moving: True if the tool moves, by an unknown amount.
     """
     s = length_along(face)
-    x, normal, curvature = _surface(tool, face, s[-1])
-    if len(x) < 2:
-        return
-    groups = _groups(curvature)
     if moving:
-        for group in groups:
+        x, _, curvature = _surface(tool, face, s[-1])
+        for group in _groups(curvature):
             r = x[group, 0].max()
             first, last = np.interp([_MIN_RADIUS_RATIO * r, r], face[:, 0], s)
             stretch = (1 + _MIN_RADIUS_RATIO) / 2
             yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, stretch, stretch, False)
         return
-    free = _free_radii(tool, x, normal, _MAX_SURFACE_RADIUS * s[-1])
-    place, along = _positions(x, free, face, s), length_along(x)
-    reference = np.interp(place, s, face[:, 0])
-    for group in groups:
-        radius = 1 / curvature[group[0]]
-        before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(x) - 1)
-        stretch = (place[after] - place[before]) / max(along[after] - along[before], 1e-300)
-        hoop = reference[group].mean() / max(x[group, 0].mean(), 1e-300) if axisymmetric else 1.0
+    found = _touched(tool, face)
+    along = length_along(found.points)
+    for group in _groups(found.curvature):
+        radius = 1 / found.curvature[group[0]]
+        before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(along) - 1)
         angle = min((along[after] - along[before]) / radius, np.pi / 2)
-        yield FilletInSheet(place[group[0]], place[group[-1]], radius, 1 - np.cos(angle), stretch, stretch * hoop,
-                            bool(free[group[len(group) // 2]] < 1.5 * radius))
+        yield FilletInSheet(*found.positions[group[[0, -1]]], radius, 1 - np.cos(angle),
+                            *found.stretches(axisymmetric, group),
+                            bool(found.free_radii[group[len(group) // 2]] < 1.5 * radius))
+
+
+def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:
+    """Return the points of a sheet that may touch the straight pieces of a tool at rest.
+
+    Args:
+        tool: a tool of a section.
+        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
+        axisymmetric: True for bodies of revolution, False in plane strain.
+    """
+    found = _touched(tool, face)
+    straight = np.flatnonzero(found.curvature == 0)
+    stretches = [found.stretches(axisymmetric, np.arange(max(k - 1, 0), min(k + 2, len(found.points))))
+                 for k in straight]
+    order = np.argsort(found.positions[straight], kind="stable")
+    along, area = np.array(stretches).reshape(-1, 2)[order].T
+    return FlatsInSheet(found.positions[straight][order], found.free_radii[straight][order], along, area)
+
+
+def _touched(tool: Any, face: np.ndarray) -> _Touched:
+    """Return the estimate of the material that touches the points of a tool at rest.
+
+    Args:
+        tool: a tool of a section.
+        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
+    """
+    s = length_along(face)
+    x, normal, curvature = _surface(tool, face, s[-1])
+    if len(x) < 2:
+        return _Touched(x[:0], *np.zeros((4, 0)))
+    free = _free_radii(tool, x, normal, _MAX_SURFACE_RADIUS * s[-1])
+    positions = _positions(x, free, face, s)
+    return _Touched(x, curvature, free, positions, np.interp(positions, s, face[:, 0]))
 
 
 def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -118,6 +193,8 @@ def _groups(curvature: np.ndarray) -> list[np.ndarray]:
 
     curvature: absolute curvature at each point of the tool, shape (m,), 1/length.
     """
+    if not len(curvature):
+        return []
     same = np.isclose(curvature[1:], curvature[:-1], rtol=1e-3)
     groups = np.split(np.arange(len(curvature)), np.flatnonzero(~same) + 1)
     return [group for group in groups if curvature[group[0]] > 0]
