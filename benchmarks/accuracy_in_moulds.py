@@ -1,4 +1,4 @@
-"""Error of the wall and cost of `accuracy=` for sheets that tools touch, in six moulds, beside uniform meshes.
+"""Error of the wall and cost of `accuracy=` for sheets that tools touch, in ten moulds, beside uniform meshes.
 
     ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--references FILE]
 
@@ -26,7 +26,9 @@ UNIFORM = [(20, 1), (20, 2), (30, 1), (30, 2), (40, 1), (40, 2), (60, 1), (60, 2
 
 BODIES = {"cup": {"radius": 10.0, "thickness": 0.3}, "trough": {"radius": 10.0, "thickness": 0.3},
           "pot": {"radius": 40.0, "thickness": 1.2}, "bottle": {"inner_radius": 1.1, "thickness": 0.3, "length": 10.6},
-          "dish": {"radius": 50.0, "thickness": 1.0}, "tub": {"radius": 32.0, "thickness": 1.2}}
+          "dish": {"radius": 50.0, "thickness": 1.0}, "tub": {"radius": 32.0, "thickness": 1.2},
+          "stepped": {"radius": 34.0, "thickness": 1.0}, "ribbed": {"radius": 42.0, "thickness": 1.0},
+          "thin": {"radius": 57.0, "thickness": 0.19}, "tray": {"radius": 48.0, "thickness": 2.5}}
 
 
 def body(name, **given):
@@ -86,7 +88,33 @@ def tub(mesh):
     return in_mould(mesh, fx.Gent(mu=0.5, Jm=60.0), tool, 1.0)
 
 
-MOULDS = {run.__name__: run for run in (cup, pot, bottle, trough, dish, tub)}
+def stepped(mesh):
+    """Return the path of a cup with a step half-way up, over which the sheet is bent; mm, MPa."""
+    tool = fx.tools.Tool([(0.0, 31.0), (16.0, 31.0), (18.0, 17.0), (29.0, 16.0), (32.0, 1.0), (80.0, 1.0)],
+                         [0.0, 4.0, 4.0, 4.0, 2.5, 0.0])
+    return in_mould(mesh, fx.MooneyRivlin(c10=0.3, c01=0.05), tool, 0.3)
+
+
+def ribbed(mesh):
+    """Return the path of a cup whose floor has a rib, with edges about as sharp as the sheet is thick; mm, MPa."""
+    tool = fx.tools.Tool([(0.0, 20.0), (12.0, 20.0), (14.0, 16.0), (18.0, 16.0), (20.0, 20.0), (36.0, 20.0),
+                          (40.0, 1.0), (90.0, 1.0)], [0.0, 1.5, 1.2, 1.2, 1.5, 3.5, 2.0, 0.0])
+    return in_mould(mesh, fx.NeoHookean(c10=0.4), tool, 0.25)
+
+
+def thin(mesh):
+    """Return the path of a thin sheet (r0/h0 = 300) in a wide shallow cup; mm, MPa."""
+    tool = fx.tools.cup(radius=55.0, depth=22.0, mouth=0.2, draft=6.0, fillet=5.0, lip=2.0)
+    return in_mould(mesh, fx.NeoHookean(c10=0.4), tool, 0.03)
+
+
+def tray(mesh):
+    """Return the path of a thick sheet (r0/h0 = 19) in a shallow mould; mm, MPa."""
+    tool = fx.tools.cup(radius=46.0, depth=7.0, mouth=2.5, draft=10.0, fillet=4.0, lip=3.0)
+    return in_mould(mesh, fx.NeoHookean(c10=0.4), tool, 0.4)
+
+
+MOULDS = {run.__name__: run for run in (cup, pot, bottle, trough, dish, tub, stepped, ribbed, thin, tray)}
 
 
 def wall(path):

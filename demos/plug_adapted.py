@@ -9,10 +9,10 @@ as many.
 At 8 cm the forces are within 3 % of those of the membrane. Then each snap lowers the force by 1 to 3 %, and between
 snaps it rises again: the force at one travel depends on the distance from the last snap, which differs from mesh to
 mesh. The mean force from 8 to 12 cm, which is the work over the travel, is within 3 % (with mu = 1: 4 %). Beyond 12 cm,
-the face penetrates itself (`first_verdict`). The runs continue with `allow_inadmissible=True`; the forces rise and fall as
-points leave the edge, and at 20 cm they are 5 to 23 % off those of the membrane. Last, to 10 cm, the edge has a radius
-of an eighth of the thickness, after two first runs (118 columns): 1112 N at 8 cm and 1258 N at 10 cm, where a membrane
-takes 991 and 1162 N. Lengths in cm, forces in N. (The thesis recommends such meshes: recommendation 2.)
+the face penetrates itself (`first_verdict`). The runs continue with `allow_inadmissible=True`; the forces rise and fall
+as points leave the edge, and at 20 cm they are 5 to 23 % off those of the membrane. Last, to 10 cm, the edge has a
+radius of an eighth of the thickness, after two first runs (118 columns): 1112 N at 8 cm and 1258 N at 10 cm, where a
+membrane takes 991 and 1162 N. Lengths in cm, forces in N. (The thesis recommends such meshes: recommendation 2.)
 """
 
 import numpy as np

@@ -10,11 +10,12 @@ from ..scene.scene import Scene
 from ..solve.branches import ANOTHER_PATH
 from ..solve.stage import Stage
 from ..units import NONE, Units
-from . import end_of_run, parallel, ranges, scenes, tool_contact
+from . import end_of_run, parallel, promised_walls, ranges, scenes, tool_contact
 from .sizes import Body
 
 # the imported modules register their checks
-__all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "ranges", "scenes", "tool_contact"]
+__all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "promised_walls", "ranges", "scenes",
+           "tool_contact"]
 
 
 class Report:

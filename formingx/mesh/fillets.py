@@ -124,8 +124,9 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
         radius = 1 / found.curvature[group[0]]
         before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(along) - 1)
         angle = min((along[after] - along[before]) / radius, np.pi / 2)
-        yield FilletInSheet(*found.positions[group[[0, -1]]], radius, 1 - np.cos(angle),
-                            *found.stretches(axisymmetric, group),
+        first, last = found.positions[group[[0, -1]]]
+        stretch, area_ratio = found.stretches(axisymmetric, group)
+        yield FilletInSheet(first, last, radius, 1 - np.cos(angle), stretch, area_ratio,
                             bool(found.free_radii[group[len(group) // 2]] < 1.5 * radius))
 
 

@@ -65,6 +65,7 @@ class Mesh:
             Python.
         columns: `Columns` of elements along a disc, a sphere, a parison or a `from_lines` body; None for other meshes.
         preset: `Preset` of a disc or parison whose elements a `Scene` may choose; None for other meshes.
+        inaccurate: for elements that a `Scene` chose, places where the wall may miss the promised accuracy, as text.
 
     >>> list(sheet.layers), list(sheet.boundaries), sheet.nodes_of("rim").shape
     (['sheet'], ['axis', 'rim', 'bottom', 'top'], (3, 2))
@@ -78,6 +79,7 @@ class Mesh:
     comm: MPI.Comm
     columns: Columns | None = None
     preset: Preset | None = None
+    inaccurate: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """Return a summary of the mesh; not collective, so on several ranks without sizes and numbers of edges."""
