@@ -8,7 +8,7 @@ import pytest
 from conftest import ROOT
 
 import formingx as fx
-from formingx.mesh.fillets import fillets_in_sheet
+from formingx.mesh.fillets import fillets_in_sheet, flats_in_sheet
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import accuracy_in_moulds as moulds  # noqa: E402
@@ -39,6 +39,14 @@ def test_standard_keeps_its_promise_in_the_cup(standard_cup):
     assert standard_cup.problem.n_unknowns < 1800
 
 
+@pytest.mark.parametrize("name", ["ribbed", "tray"])
+def test_draft_keeps_its_promise_over_sharp_edges_and_in_thick_sheets(name):
+    """With one element through the sheet the wall over the rib is 7 % wrong."""
+    path = moulds.MOULDS[name](moulds.body(name, accuracy="draft"))
+    assert error(name, path) < moulds.PROMISED["draft"]
+    assert moulds.elements(path)[1] == {"ribbed": 2, "tray": 1}[name]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", moulds.MOULDS)
 @pytest.mark.parametrize("accuracy", moulds.PROMISED)
@@ -66,6 +74,56 @@ def test_rounded_edges_are_met_before_the_film_bridges_them_and_plugs_anywhere_b
     plug = fx.tools.male(radius=4.0, height=60.0, base=-60.0, fillet=0.5)
     nose, = (fillet for fillet in fillets_in_sheet(plug, disc, True, moving=True) if fillet.last < 6)
     assert (nose.first, nose.last) == pytest.approx((2.4, 4.0), rel=0.01)
+
+
+def test_free_surface_that_touches_a_flat_floor_also_touches_the_edge_of_the_mouth():
+    """A circle through that edge, tangent to the floor."""
+    disc = np.column_stack([np.linspace(0, 10, 500), np.zeros(500)])
+    depth = 2.0
+    flats = flats_in_sheet(fx.tools.cup(radius=10.0, depth=depth), disc, axisymmetric=True)
+    assert flats.positions[0] < 0.2
+    assert flats.free_radii[0] == pytest.approx((10.0**2 + depth**2) / (2 * depth), rel=0.05)
+    floor = flats.positions < 6.0
+    assert floor.sum() > 10 and (np.diff(flats.free_radii[floor]) < 0).all() and (np.diff(flats.positions) >= 0).all()
+
+
+def test_a_thin_sheet_gets_shorter_columns_on_a_flat_floor():
+    """The fillet is too far away to shorten the columns that are compared."""
+    def on_floor(thickness):
+        mould = fx.tools.cup(radius=55.0, depth=10.0, mouth=thickness, fillet=1.0)
+        ends, _ = columns(fx.mesh.disc(radius=55.0, thickness=thickness, accuracy="draft"),
+                          contacts=[fx.Contact("top", mould)])
+        middle = (ends[1:] + ends[:-1]) / 2
+        return np.diff(ends)[(middle > 20.0) & (middle < 32.0)].mean()
+    assert on_floor(0.02) < 0.8 * on_floor(0.2)
+
+
+def test_elements_through_the_sheet_follow_the_sharpest_edge_inside_the_mould():
+    """As many as wall over fillet radius demands; a lip beside the clamp counts for little."""
+    def through(radius, accuracy):
+        rib = fx.tools.Tool([(0, 20), (12, 20), (14, 16), (18, 16), (20, 20), (36, 20), (40, 1), (90, 1)],
+                            [0, 3.0, radius, radius, 3.0, 3.5, 1.0, 0])
+        disc = fx.mesh.disc(radius=42.0, thickness=1.0, accuracy=accuracy)
+        return columns(disc, contacts=[fx.Contact("top", rib)])[1][0]
+    assert [through(1.2, accuracy) for accuracy in moulds.PROMISED] == [2, 4, 6]
+    assert [through(2.0, accuracy) for accuracy in moulds.PROMISED] == [2, 2, 4]
+
+
+def test_edges_sharper_than_the_wall_and_thick_sheets_are_reported():
+    """On an edge of radius 0.4 under a wall of 0.7 the error of "draft" is 4.7 %."""
+    def findings(radius, thickness):
+        rib = fx.tools.Tool([(0, 20), (12, 20), (14, 16), (18, 16), (20, 20), (36, 20), (40, 1), (90, 1)],
+                            [0, 1.5, radius, radius, 1.5, 3.5, 2.0, 0]).moved(z=thickness)
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=42.0, thickness=thickness), materials=fx.NeoHookean(c10=0.4),
+                         supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                         contacts=[fx.Contact("top", rib, "stick")])
+        return [(found.severity, found.text) for found in fx.check(scene, targets=[fx.pressure(0.25)]).findings
+                if found.about == "mesh" and "accuracy" in found.text]
+    (severity, text), *_ = findings(0.4, 1.0)
+    assert severity == "warning" and "radius 0.4 " in text and "1.0%" in text
+    assert not findings(1.2, 1.0)
+    (severity, text), = findings(1.2, 5.0)
+    assert severity == "note" and "thicker than a tenth" in text
 
 
 def columns(mesh, **scene):
