@@ -167,7 +167,7 @@ def is_thick_sheet(mesh: Mesh) -> bool:
     if mesh.preset is None or mesh.columns is None:
         return False
     ends = mesh.columns.ends
-    line = mesh.columns.place(np.linspace(ends[0], ends[-1], _SAMPLES))[[0, -1]].mean(0)
+    line = mesh.columns.place(np.linspace(ends[0], ends[-1], _SHEET_SAMPLES))[[0, -1]].mean(0)
     return _THICKEST < float(mesh.preset.thickness.sum()) / length_along(line)[-1] < _BLOCK
 
 
