@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from ..ranks import gathered
+from ..ranks import combined, gathered
 from .face import FaceContact
 from .gap_closures import gap_closures
 
@@ -86,7 +86,7 @@ class Approach:
 
     def __init__(self, face: FaceContact, conducts: bool):
         self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
-        self.points = face.comm.allreduce(len(face.rule.points))
+        self.points = combined(face.comm, len(face.rule.points))
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks
@@ -101,7 +101,7 @@ class Approach:
         Returns:
             True if a point on any rank is in contact.
         """
-        return bool(self._comm.allreduce(bool(self.face.touching(fields, control).any()), MPI.LOR))
+        return bool(combined(self._comm, bool(self.face.touching(fields, control).any()), MPI.LOR))
 
     def step_length(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
                     length: float) -> float:
@@ -129,12 +129,12 @@ class Approach:
             most = LIMITS.largest_approach * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
-            length = self._comm.allreduce(float(most.min(initial=length)), MPI.MIN)
+            length = combined(self._comm, float(most.min(initial=length)), MPI.MIN)
             length = self._within_pressure_change(start, velocity, length)
         times = gap_closures(face.law, start, velocity, free, length)
         ahead = (times > LIMITS.closed_at_start * length) & (times < length)
         times = np.sort(gathered(self._comm, times[ahead]))
-        touching = self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
+        touching = combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self.max_closures if touching > 1 else 1
         return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
 
@@ -175,7 +175,7 @@ class Approach:
                 None: unknown.
         """
         face = self.face
-        self._predicted_closures = self._comm.allreduce(int(np.sum(times < length)), MPI.SUM)
+        self._predicted_closures = combined(self._comm, int(np.sum(times < length)), MPI.SUM)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (times >= LIMITS.frictionless_from * length)
             if speeds is not None and at_end.any():
@@ -208,9 +208,9 @@ class Approach:
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         if face.contact.lagged:
             deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
-            return bool(self._comm.allreduce(float(deep.max(initial=0.0)), MPI.MAX) > 0)
+            return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
-        return bool(self._comm.allreduce(found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
+        return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
 
     @property
     def has_lagged_friction(self) -> bool:
@@ -269,7 +269,7 @@ class Approach:
         history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
         now = law.pressure(history)
         sums = np.array([face.rule.area @ np.abs(now - law.pressure_ahead(old)), face.rule.area @ now])
-        change, pressure = self._comm.allreduce(sums, MPI.SUM)
+        change, pressure = combined(self._comm, sums, MPI.SUM)
         if change <= LIMITS.difference_at_target * (pressure + LIMITS.least_force * face.force_scale):
             return False
         face.put(variables._replace(history=history))
@@ -311,7 +311,7 @@ class Approach:
         face, before = self.face, self.face.law.pressure(self.face.history)
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
-        change, pressure = self._comm.allreduce(sums, MPI.SUM)
+        change, pressure = combined(self._comm, sums, MPI.SUM)
         return float(change / (pressure + LIMITS.least_force * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
@@ -334,7 +334,7 @@ class Approach:
         distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - history.position))
         opens = area & (history.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
         closes = area & (history.distance <= -theta - LIMITS.negligible_gap * face.thickness) & (distance > -theta)
-        found = self._comm.allreduce(np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
+        found = combined(self._comm, np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
         return bool(np.all(found > 0))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
@@ -374,7 +374,7 @@ class Approach:
             parts = int(min(np.ceil((path_length / most)[far].max() * 2), LIMITS.most_positions)) + 1
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
-        return bool(self._comm.allreduce(found, MPI.LOR))
+        return bool(combined(self._comm, found, MPI.LOR))
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:
@@ -410,4 +410,4 @@ class Approach:
             counted = np.einsum("ni,ni->n", near.tangent, end - history.closure)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
         late = (history.distance <= -law.theta) & (F > 0) & wrong
-        return float(self._comm.allreduce(1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
+        return float(combined(self._comm, 1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from ..ranks import gathered
+from ..ranks import combined, gathered
 from .face import FaceContact
 from .rule import without_area
 
@@ -26,7 +26,7 @@ def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
         Depth, length; 0 if no point is inside the tool.
     """
     d = face.contact.tool.signed_distance(face.positions(fields, control))
-    return float(face.comm.allreduce(max(float(d.max(initial=0.0)), 0.0), MPI.MAX))
+    return float(combined(face.comm, max(float(d.max(initial=0.0)), 0.0), MPI.MAX))
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
@@ -80,7 +80,7 @@ def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
         Force, shape (components,), stress length^2; in plane strain per depth, stress length.
     """
     total = (face.area[:, None] * face.tractions(fields, control).force).sum(0) - face.unbalanced
-    return np.asarray(face.comm.allreduce(total, MPI.SUM))
+    return np.asarray(combined(face.comm, total, MPI.SUM))
 
 
 def normal_force(face: FaceContact, fields: np.ndarray, control: float) -> float:
@@ -148,4 +148,4 @@ def _beside(points: np.ndarray, i: int) -> int:
 
 def _sum(face: FaceContact, values: np.ndarray) -> float:
     """Return the sum of values at the locally owned points, shape (n,), over the points of all ranks."""
-    return float(face.comm.allreduce(float(values.sum()), MPI.SUM))
+    return float(combined(face.comm, float(values.sum()), MPI.SUM))

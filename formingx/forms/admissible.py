@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import _compat
 from ..mesh.nodes import cell_node_positions, own_cells
+from ..ranks import listed
 
 _MIDDLES = {basix.CellType.triangle: [[0.5, 0.5], [0, 0.5], [0.5, 0]], basix.CellType.interval: [[0.5]]}
 """Midpoints of the edges. Corners are left out: where a free side turns onto a plate, the determinant has no limit."""
@@ -91,7 +92,7 @@ class Admissible:
             if values.size:
                 k = np.unravel_index(np.argmin(np.where(np.isfinite(values), values, -np.inf)), values.shape)
                 found.append(WorstValue(quantity, float(values[k]), tuple(self._X[k].tolist())))
-        parts = [part for parts in self._forms.comm.allgather(found) for part in parts]
+        parts = [part for parts in listed(self._forms.comm, found) for part in parts]
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
     def furthest_volume_ratio(self) -> WorstValue | None:
@@ -107,7 +108,7 @@ class Admissible:
         if J.size:
             k = np.unravel_index(np.argmax(np.abs(np.log(np.maximum(J, 1e-300)))), J.shape)
             found = WorstValue("volume ratio", float(J[k]), tuple(self._X[k].tolist()))
-        return max(self._forms.comm.allgather(found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
+        return max(listed(self._forms.comm, found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
         """Return the root mean square of J - 1 over the elements far from given positions; collective.
@@ -123,7 +124,7 @@ class Admissible:
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
         near = np.min([np.hypot(*(X - place).transpose(2, 0, 1)).min(1) for place in places], axis=0) < distance
         size = np.where(near[:, None], 0.0, self._sizes * (self._R[:, :n] if self._has_hoop else 1.0))
-        sums = self._forms.comm.allgather((float((size * (J - 1) ** 2).sum()), float(size.sum())))
+        sums = listed(self._forms.comm, (float((size * (J - 1) ** 2).sum()), float(size.sum())))
         squares, total = map(sum, zip(*sums))
         return float(np.sqrt(squares / total)) if total else 0.0
 
@@ -134,7 +135,7 @@ class Admissible:
             Smallest and largest J for the current field (dimensionless).
         """
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
-        found = self._forms.comm.allgather((J.min(initial=np.inf), J.max(initial=-np.inf)))
+        found = listed(self._forms.comm, (J.min(initial=np.inf), J.max(initial=-np.inf)))
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
@@ -150,7 +151,7 @@ class Admissible:
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
                    for quantity, values in found.items())
-        return all(self._forms.comm.allgather(mine))
+        return all(listed(self._forms.comm, mine))
 
     def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
         """Count the inverted elements of a solid for the current field; collective.
@@ -164,7 +165,7 @@ class Admissible:
         if J.size:
             k = np.unravel_index(np.argmin(J), J.shape)
             mine = float(J[k]), tuple(self._X[k].tolist())
-        counts = self._forms.comm.allgather((int((J <= 0).any(1).sum()), len(J), mine))
+        counts = listed(self._forms.comm, (int((J <= 0).any(1).sum()), len(J), mine))
         return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
 
     def quantities(self) -> dict[str, np.ndarray]:

@@ -21,6 +21,7 @@ from ufl.algorithms.analysis import extract_constants
 from .. import _compat
 from ..errors import call_on_all_ranks
 from ..physics import kinematics as kin
+from ..ranks import combined
 from .admissible import Admissible
 from .body_model import BodyModel
 from .free_stretch import FreeStretch
@@ -318,7 +319,7 @@ class Formulation(BodyModel):
         Returns:
             Value of the form, in its own unit.
         """
-        return float(self.comm.allreduce(fem.assemble_scalar(self.compile(form)), MPI.SUM))
+        return float(combined(self.comm, fem.assemble_scalar(self.compile(form)), MPI.SUM))
 
     def test_function(self) -> Any:
         """Return the test function of all fields.

@@ -15,6 +15,7 @@ import ufl
 from mpi4py import MPI
 
 from .. import _compat
+from ..ranks import combined
 
 _STRESS_FREE = 1e-6
 """Stress over the largest modulus below which a body counts as stress-free."""
@@ -123,7 +124,7 @@ class StepError:
     def _norm(self, values: list[np.ndarray]) -> float:
         """Return the root mean square of stresses over all points of all ranks; values: shape (points, 4) each."""
         comm = self._problem.comm
-        total, number = (comm.allreduce(v, MPI.SUM)
+        total, number = (combined(comm, v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))
         return float(np.sqrt(total / max(number, 1)))
 

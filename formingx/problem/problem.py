@@ -27,6 +27,7 @@ from ..forms.schedule import StepData
 from ..forms.step_error import StepError
 from ..forms.temperature import Temperature
 from ..forms.viscosity import Viscosity
+from ..ranks import combined, listed
 from ..scene.scene import Scene
 from .examine import Examination
 from .stages import Stages
@@ -89,7 +90,7 @@ class Problem(Stages, Units):
     @property
     def active_set(self) -> Any:
         status = tuple(c.increment.status.tobytes() for c in self.present)
-        return tuple(self.comm.allgather(status)) if self.present else None
+        return tuple(listed(self.comm, status)) if self.present else None
 
     @property
     def temperature(self) -> Temperature | None:
@@ -149,7 +150,7 @@ class Problem(Stages, Units):
         """
         left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
-        return -float(self.comm.allreduce(left, MPI.SUM)) * forms.stress * forms.volume / forms.length
+        return -float(combined(self.comm, left, MPI.SUM)) * forms.stress * forms.volume / forms.length
 
     def driven_unknowns(self, number: int) -> np.ndarray:
         """Return the unknowns whose values a driven support prescribes.

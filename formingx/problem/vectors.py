@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from .. import _compat
 from ..forms.histories import Histories
+from ..ranks import combined
 
 
 class Vectors(Histories):
@@ -106,8 +107,7 @@ class Vectors(Histories):
         Returns:
             Value of the form.
         """
-        own = float(fem.assemble_scalar(form))
-        return own if self.comm.size == 1 else float(self.comm.allreduce(own, MPI.SUM))
+        return float(combined(self.comm, fem.assemble_scalar(form), MPI.SUM))
 
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
         """Set a vector from locally owned field values and multipliers.
@@ -123,5 +123,4 @@ class Vectors(Histories):
 
     def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
         """Return the dot product of two vectors of locally owned entries over all ranks."""
-        own = float(np.dot(a, b))
-        return own if self.comm.size == 1 else float(self.comm.allreduce(own, MPI.SUM))
+        return float(combined(self.comm, float(np.dot(a, b)), MPI.SUM))

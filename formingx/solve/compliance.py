@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from petsc4py import PETSc
 
+from ..ranks import combined
 from .equations import Array
 from .linear import CONDENSATION, DirectSolver
 
@@ -49,7 +50,7 @@ class BorderedTangent:
         Returns:
             Changes of the control, shape (m,).
         """
-        steps: Array = -self.b.comm.tompi4py().allreduce(self.gradient.array_r @ V) / self.slope
+        steps: Array = -combined(self.b.comm.tompi4py(), self.gradient.array_r @ V) / self.slope
         V += np.outer(self.b.array_r, steps)
         return steps
 

@@ -22,6 +22,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..contact.step_limit import StepLimit, TrialStep
+from ..ranks import combined
 from .arc_length import Curve
 from .equations import Array, Equations, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
@@ -289,7 +290,7 @@ class _Motion:
 
     def _sum(self, values: Array) -> float:
         """Return the sum of locally owned values over all ranks."""
-        return float(self.problem.comm.allreduce(values.sum()))
+        return float(combined(self.problem.comm, values.sum()))
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

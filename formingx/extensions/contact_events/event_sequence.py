@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import FAR, ContactStatus
+from ...ranks import combined, listed
 from .reduced_contact import Points
 from .response import Response
 
@@ -154,7 +155,7 @@ class ContactEventSequence:
         start = [face.positions(x[:n], control) for face in faces]
         self._along = [face.relative_motion(direction[:n], slope) for face in faces]
         self._free = [~face.law.touching(x, face.history) & (face.rule.area > 0) for face, x in zip(faces, start)]
-        self.touching = [int(self._comm.allreduce(int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
+        self.touching = [int(combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
                          for face, free in zip(faces, self._free)]
         self._sticks = [np.broadcast_to(face.law.friction == np.inf, len(x)) for face, x in zip(faces, start)]
         self._closures: list[GapClosure] = []
@@ -257,7 +258,7 @@ class ContactEventSequence:
         x, control = self._tangent[:2]
         slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
                  for face, free in zip(self._faces, self._free)]
-        if not 0 < self._comm.allreduce(sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.sliding_points:
+        if not 0 < combined(self._comm, sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.sliding_points:
             return True
         if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
             return False
@@ -314,7 +315,7 @@ class ContactEventSequence:
                 return False
             times = [gap_closures(face.law, x, w, free, length - last.begins)
                      for face, x, w, free in zip(self._faces, last.positions, last.speed, self._free)]
-            first = min(self._comm.allgather(min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
+            first = min(listed(self._comm, min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
             frame = self._points.tool_frame(last.positions, last.force)
             after, status = self._points.change(last.status, frame, last.force, last.rate)
             if not after < min(first, length - last.begins):
@@ -331,22 +332,21 @@ class ContactEventSequence:
         """Store the earliest closure before `length`; return False if there is none. times: arc lengths, by face."""
         best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
                    default=(length, 0, 0, 0))
-        time, rank, f, i = min(self._comm.allgather(best))
+        time, rank, f, i = min(listed(self._comm, best))
         if not time < length:
             return False
         self._closures.append(self._closure(rank, f, i, time, segment.after(time).positions))
         return True
 
     def _closure(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
-        """Return the gap closure of point i of face f near the arc length `time`, for `positions` at this arc length.
-        """
+        """Return the gap closure of point i of face f near the arc length `time`, with `positions` there."""
         closure = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
             ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.sticking, _SETTINGS.to_surface)
             closure = GapClosure(time + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
                                  bool(self._sticks[f][i]))
-        return self._comm.bcast(closure, root=rank)
+        return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
         """Equilibrate the path at the last closure and locate the closure again; return False without convergence."""
@@ -403,7 +403,7 @@ class ContactEventSequence:
         """
         changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.positions, y.positions)])
                             for x, y in tried])
-        gram = self._comm.allreduce(changes @ changes.T)
+        gram = combined(self._comm, changes @ changes.T)
         if not gram.trace() < FAR:
             return None
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from ...contact.approach import LIMITS, Approach
 from ...contact.step_limit import StepLimit
+from ...ranks import combined
 from .event_sequence import ContactEventSequence
 from .response import Response
 
@@ -162,7 +163,7 @@ class ContactEventPrediction:
         x = self._sequence.positions(length)
         tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
                       for f, closed, N, start, slope in self._sticking)
-        return bool(self._present[0].face.comm.allreduce(tension, MPI.LOR))
+        return bool(combined(self._present[0].face.comm, tension, MPI.LOR))
 
     def closures(self, length: float) -> list[tuple] | None:
         """Return the gap closures predicted within a step.

@@ -25,6 +25,7 @@ from mpi4py import MPI
 
 from ..._jit import address, address_of_integers
 from ...physics.contact_law import FAR, ContactStatus
+from ...ranks import combined, listed
 from .compiled_contact import compiled
 from .response import Response
 
@@ -111,8 +112,8 @@ class Points:
         found = self._response.to_points(chosen)
         if found is None:
             return False
-        new = [point for rank in self._comm.allgather([(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
-                                                       for i in numbers]) for point in rank]
+        new = [point for rank in listed(self._comm, [(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
+                                                     for i in numbers]) for point in rank]
         self.point_ids += new
         self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.point_ids)]
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
@@ -148,7 +149,7 @@ class Points:
         found = np.zeros((len(self.point_ids if point_ids is None else point_ids), *values[0].shape[1:]))
         for f, k, i, *_ in located:
             found[k] = values[f][i]
-        return found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
+        return combined(self._comm, found, MPI.SUM)
 
     def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
         """Write values at the m points into the arrays of the faces.
@@ -200,7 +201,7 @@ class Points:
             depth = law.depth(N if law.adhesive else np.maximum(N, 0.0))
             found[k, :c], found[k, c:-2], found[k, -2] = near.normal, near.tangent, near.curvature
             found[k, -1] = depth - near.distance
-        found = found if self._comm.size == 1 else self._comm.allreduce(found, MPI.SUM)
+        found = combined(self._comm, found, MPI.SUM)
         return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:

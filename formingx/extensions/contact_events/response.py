@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from ...ranks import combined
 from ...solve.arc_length import Curve
 from ...solve.equations import Array, ContactFace, Equations
 from ...solve.local_contact import unit_forces
@@ -88,5 +89,5 @@ class Response:
         V = self._newton.solve_ahead(E)
         if V is None:
             return None
-        along = self._problem.comm.allreduce(self._normal @ V)
+        along = combined(self._problem.comm, self._normal @ V)
         return V - np.outer(self._state.direction, along), -self._state.slope * along

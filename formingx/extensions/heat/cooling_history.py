@@ -12,7 +12,7 @@ from ...errors import ConvergenceError, InputError
 from ...findings import Finding
 from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
-from ...ranks import gathered
+from ...ranks import combined, gathered, listed
 from ...values.temperature import ABSOLUTE_ZERO
 from . import stepping
 from .conduction import Conduction
@@ -142,7 +142,7 @@ class CoolingHistory:
         errors = self.errors_in_space([states[k] for k in looked])
         temperatures = [states[k].history_variables[-1].temperature for k in looked]      # the temperature is last
         scene, comm = self._problem.scene, self._problem.comm
-        ends = comm.allgather([float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
+        ends = listed(comm, [float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
         worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
         duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])    # since it was looked at last
         allowed = max(self._cooling.tolerance, _WARNED_ERROR * span)
@@ -302,7 +302,7 @@ class CoolingHistory:
         """
         field, T, before = self._field, self._state[0], self._before
         seen = self._time, T, before
-        if self._problem.comm.allreduce(int(self._seen is None or not _equal(seen, self._seen))):
+        if combined(self._problem.comm, int(self._seen is None or not _equal(seen, self._seen))):
             self._seen = seen
             field.T.x.array[: self._n] = T
             field.T.x.scatter_forward()

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from ... import _compat
 from ...mesh.mesh import Mesh
+from ...ranks import combined
 
 
 class HeatVectors:
@@ -100,7 +101,7 @@ class HeatVectors:
 
     def _integral(self, form: Any) -> float:
         """Return the value of an integral (UFL) over all ranks."""
-        return float(self.comm.allreduce(fem.assemble_scalar(self._form(form)), MPI.SUM))
+        return float(combined(self.comm, fem.assemble_scalar(self._form(form)), MPI.SUM))
 
     def _assemble(self, form: Any) -> np.ndarray:
         """Return the locally owned entries of an assembled linear form, shape (n,)."""
@@ -123,8 +124,8 @@ class HeatVectors:
 
     def _largest(self, values: np.ndarray) -> float:
         """Return the largest absolute entry of an array over all ranks."""
-        return float(self.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
+        return float(combined(self.comm, np.abs(values).max(initial=0.0), MPI.MAX))
 
     def _sum(self, values: np.ndarray) -> float:
         """Return the sum of the entries of an array over all ranks."""
-        return float(self.comm.allreduce(values.sum(), MPI.SUM))
+        return float(combined(self.comm, values.sum(), MPI.SUM))
