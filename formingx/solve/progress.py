@@ -207,11 +207,13 @@ class Progress:
     silence = 30.0
 
     def __init__(self, comm: MPI.Intracomm, words: str, shown: bool):
-        from tqdm import tqdm
         self._words, self._here = words, comm.rank == 0
         self._level = logging.WARNING if shown else logging.INFO          # INFO is hidden by default
-        self._bar = tqdm(total=1.0, desc=words, delay=2, disable=not shown or comm.rank != 0, leave=False,
-                         bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
+        self._bar = None
+        if shown and comm.rank == 0:
+            from tqdm import tqdm
+            self._bar = tqdm(total=1.0, desc=words, delay=2, leave=False,
+                             bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
         self._gained, self._states, self._length = 0.0, 0, 0.0
         self._limits: Counter[str] = Counter()
         self._began = self._said = time.process_time()
@@ -226,7 +228,7 @@ class Progress:
             length: length of the next step, as `StepControl.length`.
         """
         self._gained, self._states, self._length = gained, states, length
-        if not self._bar.disable:
+        if self._bar is not None:
             self._bar.n = min(max(gained, 0.0), 1.0)
             self._bar.set_postfix_str(f"state {states}", refresh=False)
             self._bar.update(0)
@@ -245,7 +247,8 @@ class Progress:
 
     def close(self) -> None:
         """Close the progress bar."""
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()
 
     def _log_progress(self) -> None:
         """Log the progress if the last line is at least the processor time `silence` ago."""
@@ -256,7 +259,8 @@ class Progress:
         left = f"about {_duration_text((1 - self._gained) * spent / won)} left" if won > 0 else "no nearer to it since"
         common = self._limits.most_common(2)
         limits = ", ".join(f"{reason} ({n} times)" for reason, n in common) or "their own control only"
-        self._bar.clear()
+        if self._bar is not None:
+            self._bar.clear()
         log.log(self._level, "%s: %.3g %% of the way in %d states and %s of processor time; since the last line steps"
                 " of %.2g, limited by %s; %s", self._words, 100 * self._gained, self._states,
                 _duration_text(now - self._began), self._length, limits, left)
