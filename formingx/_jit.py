@@ -28,6 +28,7 @@ import ffcx
 import ffcx.compiler
 import numpy as np
 import ufl
+from _cffi_backend import from_buffer
 from dolfinx import jit
 from ffcx import naming
 from ffcx.codegeneration import get_include_path
@@ -214,12 +215,12 @@ def functions(name: str, header: str, code: str) -> Any:
 
 def address(values: Any) -> Any:
     """Return a pointer to the array `values` of floats for a function in C; to a copy if it is not contiguous."""
-    return _FFI.from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
+    return from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
 
 
 def address_of_integers(values: Any) -> Any:
     """Return a pointer to the array `values` of integers (long in C); to a copy if it is not contiguous."""
-    return _FFI.from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
+    return from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
 
 
 def compile_c(command: list[str], code: str) -> None:
