@@ -9,7 +9,7 @@ from reference.reduced_contact import ReferencePoints
 
 import formingx as fx
 from formingx.contact.gap_closures import crossing, gap_closures
-from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
+from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame, frame
 from formingx.physics.contact_law import ContactStatus
 from formingx.physics.penalty import Law
 
@@ -99,3 +99,15 @@ def test_gap_closures_are_those_of_array_operations(tool, shift):
         there = x[i] + times[i] * w[i]
         found, again = (crossing(law, i, there, w[i], -0.01, 1e-3, 3) for law in laws)
         assert found == pytest.approx(again, rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("pulls", [False, True])
+def test_the_frame_of_points_is_that_of_array_operations(pulls):
+    """Normals, curvatures and missing penetrations of points under pressure, little pressure and tension."""
+    random, n = np.random.default_rng(3), 60
+    tool = fx.tools.cup(radius=1.0, depth=1.0, mouth=0.1, fillet=0.2)
+    x, force, scale = random.uniform(-0.2, 1.3, (n, 2)), random.normal(size=(n, 2)), random.uniform(1, 2, n)
+    k, shift = random.choice([1.0, 50.0], n), random.uniform(0, 0.1, n)
+    laws = [kind(tool, np.inf, k, 1e-2, 1e-3, shift, pulls) for kind in (Law, _Arrays)]
+    for a, b in zip(*(frame(law, x, force, scale) for law in laws), strict=True):
+        np.testing.assert_array_equal(a, b)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..._jit import functions
+from ...tools.nearest import SOURCE
 
 _POINTS = "long, const double *, const double *, const double *, const double *, const double *, const double *"
 """Arguments for the C structure `Points`: m, friction, pulls, S, C, normals, curvatures."""
@@ -18,10 +19,11 @@ int forces_at_end({_POINTS}, const double *, const double *, const double *, con
                   const double *, const double *, double *, double *);
 int rates({_POINTS}, const double *, const double *, const long *, const double *, long *, double *, double *);
 double change({_POINTS}, const long *, const double *, const double *, const double *, long *);
+void frame(long, const double *, const double *, const double *, const double *, double, long, const double *, long,
+           long, const double *, double *, double *, double *);
 """
 
-_SOURCE = r"""
-#include <math.h>
+_SOURCE = SOURCE + r"""
 #include <stdlib.h>
 #include <string.h>
 
@@ -315,9 +317,25 @@ double change(long m, const double *friction, const double *pulls, const double 
     }
     return first;
 }
+
+/* normal (m, 2) and curvature (m) of the profile closest to points x (m, 2), and `beyond` (m): the distance at which
+   the normal part N of the force (m, 2) acts, `Law.depth`, less the distance of x, which is reduced by `shift` (m).
+   scale (m): N over the normal traction; k (m): penalty */
+void frame(long m, const double *x, const double *force, const double *scale, const double *k, double theta,
+           long pulls, const double *shift, long pieces, long lines, const double *table, double *normal,
+           double *curvature, double *beyond)
+{
+    for (long i = 0; i < m; i++) {
+        double distance, *n = normal + 2 * i;
+        nearest(1, x + 2 * i, pieces, lines, table, &distance, n, curvature + i);
+        double N = (force[2 * i] * n[0] + force[2 * i + 1] * n[1]) / scale[i];
+        double over = (pulls ? N : fmax(N, 0.0)) / (k[i] * theta);
+        beyond[i] = theta * (pulls || over > 1 ? over - pulls : 2 * sqrt(over) - 1) - (distance - shift[i]);
+    }
+}
 """
 
 
 def compiled() -> Any:
-    """Return the functions `forces_at_end`, `rates` and `change` in C, whose arguments are addresses of arrays."""
+    """Return the functions `forces_at_end`, `rates`, `change` and `frame` in C; arrays are passed by address."""
     return functions("reduced_contact", _HEADER, _SOURCE)

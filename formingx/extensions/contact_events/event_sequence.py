@@ -388,9 +388,12 @@ class ContactEventSequence:
         times = [np.full(len(free), end.begins) for free in self._free]
         for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.positions, last.speed, self._free)):
             near = face.law.nearest(x)
-            inside, rate = free & (near.distance > -face.law.theta), np.einsum("ni,ni->n", near.normal, w)
+            inside = free & (near.distance > -face.law.theta)
             if but and (but.rank, but.face) == (self._comm.rank, f):
                 inside[but.point] = False
+            if not inside.any():
+                continue
+            rate = np.einsum("ni,ni->n", near.normal, w)
             back = np.divide(near.distance + face.law.theta, rate, out=np.zeros(len(x)), where=inside & (rate > 0))
             left = end.begins - last.begins
             t[inside] = last.begins + np.clip(left - back, 1e-3 * left, 0.999 * left)[inside]
@@ -406,6 +409,8 @@ class ContactEventSequence:
         gram = combined(self._comm, changes @ changes.T)
         if not gram.trace() < FAR:
             return None
+        if len(tried) == 1:
+            return tried[0][1]
         ahead = gram[-1, -1] - gram[-1, :-1] - gram[:-1, -1, None] + gram[:-1, :-1]
         right = gram[-1, -1] - gram[:-1, -1]
         share = np.linalg.lstsq(ahead, right, rcond=1e-10)[0]

@@ -193,16 +193,13 @@ class Points:
         Returns:
             Normals, tangents and curvatures, and the penetrations that are missing for the forces.
         """
-        c = self._components
-        found = np.zeros((len(self.point_ids), c + c + 2))
+        found = np.zeros((len(self.point_ids), 4))
         for f, k, i, law in self._owned:
-            near = law.nearest(positions[f][i])
-            N = np.einsum("ni,ni->n", force[k], near.normal) / self._scale[k]
-            depth = law.depth(N if law.adhesive else np.maximum(N, 0.0))
-            found[k, :c], found[k, c:-2], found[k, -2] = near.normal, near.tangent, near.curvature
-            found[k, -1] = depth - near.distance
+            normal, found[k, 2], found[k, 3] = frame(law, positions[f][i], force[k], self._scale[k])
+            found[k, :2] = normal
         found = combined(self._comm, found, MPI.SUM)
-        return ToolFrame(found[:, :c], found[:, c:-2], found[:, -2], found[:, -1])
+        normal = found[:, :2].copy()
+        return ToolFrame(normal, normal[:, ::-1] * (-1.0, 1.0), found[:, 2], found[:, 3])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
         """Return the components of vectors normal and tangential to the tools.
@@ -300,3 +297,26 @@ class Points:
         """Return the arguments for the C structure `Points` (`compiled_contact`)."""
         return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
                 address(near.normal), address(near.curvature))
+
+
+def frame(law: Any, x: np.ndarray, force: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the geometry of the tool at n points that it touches.
+
+    Args:
+        law: contact law of these points.
+        x: positions of the points relative to the tool, shape (n, 2), length.
+        force: contact forces in F, shape (n, 2).
+        scale: forces in F over tractions, shape (n,), 1/stress.
+
+    Returns:
+        Normals, shape (n, 2), curvatures, shape (n,), 1/length, and `ToolFrame.beyond`, shape (n,), length.
+    """
+    if law.profile is None:
+        near = law.nearest(x)
+        N = np.einsum("ni,ni->n", force, near.normal) / scale
+        return near.normal, near.curvature, law.depth(N if law.adhesive else np.maximum(N, 0.0)) - near.distance
+    normal, curvature, beyond = np.empty(x.shape), np.empty(len(x)), np.empty(len(x))
+    k, shift = np.broadcast_to(law.k, len(x)), np.broadcast_to(law.shift, len(x))
+    compiled().frame(len(x), address(x), address(force), address(scale), address(k), law.theta, law.adhesive,
+                     address(shift), *law.profile.compiled_table, address(normal), address(curvature), address(beyond))
+    return normal, curvature, beyond

@@ -70,15 +70,15 @@ class Response:
             return None
         self._x.array_w[:] = x
         faces: list[ContactFace] = list(self._problem.present)
+        applied: list[Array] = []
         for face, given in zip(faces, forces, strict=True):
-            face.keep_open(~np.isnan(given[:, 0]))
+            face.keep_open(known := ~np.isnan(given[:, 0]))
+            applied.append(np.where(known[:, None], given, 0.0))
         self._problem.residual(self._x, control, self._F)
-        for face, given in zip(faces, forces, strict=True):
-            values = self._F.array_r.copy()
-            face.add(values, np.nan_to_num(given))
-            self._F.array_w[:] = values
-        self._problem.begin()
         left = self._F.array_r.copy()
+        for face, given in zip(faces, applied):
+            face.add(left, given)
+        self._problem.begin()
         left[self._problem.constrained] = 0.0
         found = self._solve(left[:, None])
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
