@@ -340,7 +340,7 @@ class ContactEventSequence:
 
     def _closure(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
         """Return the gap closure of point i of face f near the arc length `time`, with `positions` there."""
-        closure = None
+        closure: Any = None
         if rank == self._comm.rank:
             face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
             ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.sticking, _SETTINGS.to_surface)

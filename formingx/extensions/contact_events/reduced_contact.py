@@ -93,7 +93,7 @@ class Points:
         empty: Any = np.zeros(0)
         self.point_ids: list[tuple[int, int, int]] = []
         self.columns, self.steps = np.zeros((size, 0)), empty
-        c = self._components = faces[0].points.shape[1]
+        c = faces[0].points.shape[1]
         self.motions = [np.zeros((*face.points.shape, 0)) for face in faces]
         self.friction, self.elastic_slip, self._scale, self._pulls = empty, empty, empty, empty.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
