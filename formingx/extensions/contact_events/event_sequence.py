@@ -22,6 +22,7 @@ from mpi4py import MPI
 from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import FAR, ContactStatus
 from ...ranks import combined, listed
+from .gap_closure import GapClosure
 from .reduced_contact import Points
 from .response import Response
 
@@ -58,33 +59,6 @@ class EventSettings:
 
 
 _SETTINGS = EventSettings()
-
-
-class GapClosure(NamedTuple):
-    """Contact event: an open point reaches the outer edge of the ramp of its tool. All ranks store the same value.
-
-    Attributes:
-        time: arc length of the event from the accepted state.
-        rank: rank that owns the point.
-        face: number of the contact face.
-        point: local number of the point.
-        place: position of the point relative to the tool at the event, shape (2,), length.
-        length: tributary length of the point, length.
-        sticks: True if the point sticks under any force (contact without slip).
-    """
-
-    time: float
-    rank: int
-    face: int
-    point: int
-    place: np.ndarray
-    length: float
-    sticks: bool
-
-    @property
-    def point_id(self) -> tuple[int, int, int]:
-        """Identifier of the point, (rank, face, point)."""
-        return self.rank, self.face, self.point
 
 
 class _Segment(NamedTuple):
